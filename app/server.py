@@ -80,17 +80,17 @@ class AppServer:
     @property
     def link(self) -> str:
         """Link for browsers on this machine, with the token if one is needed."""
-        return self.url + _behind(self.entrance.visitor)
+        return self.url + _token_path(self.entrance.visitor)
 
     @property
     def class_link(self) -> str:
         """Link for browsers on other machines, if the server listens to them."""
-        return self._at(own_address) + _behind(self.entrance.visitor)
+        return self._at(own_address) + _token_path(self.entrance.visitor)
 
     @property
     def teacher_url(self) -> str:
         """Link of a lecture's teacher."""
-        return self.url + _behind(self.entrance.teacher)
+        return self.url + _token_path(self.entrance.teacher)
 
     @property
     def owners(self) -> list[object]:
@@ -152,7 +152,7 @@ def build_server(
     app = AppServer(server, pool, folder, entrance=entrance)
     if port and server.get_port() != port:
         app.stop()
-        raise InputError(_taken(port))
+        raise InputError(_taken_sentence(port))
     private.queue_from_any_thread(server)
     _dress(server)
     store, uploads, shared = Store(str(folder.path)), Uploads(folder.path), SharedViews()
@@ -242,7 +242,7 @@ def _let_in(app: AppServer, gate: Gate, begin: Callable[[Target, int], Session])
     server.on_client_disconnect(leave)
 
 
-def _behind(token: Token | None) -> str:
+def _token_path(token: Token | None) -> str:
     """Return the part of an address that admits a browser."""
     return "" if token is None else f"/{token.query}"
 
@@ -277,11 +277,11 @@ def _check_address(host: str, port: int) -> None:
             raise InputError(f"'{host}' is not an address of this machine; try --host 127.0.0.1.") from None
         except OSError as error:
             if error.errno == 98 or "in use" in str(error):
-                raise InputError(_taken(port)) from None
+                raise InputError(_taken_sentence(port)) from None
             raise InputError(f"Cannot listen on {host} ({error.strerror}); try --host 127.0.0.1.") from None
 
 
-def _taken(port: int) -> str:
+def _taken_sentence(port: int) -> str:
     return f"Port {port} is taken by another program; stop it or try --port {port + 1}."
 
 

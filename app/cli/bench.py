@@ -42,8 +42,8 @@ def bench(
         return
     served = {kind: partial(_browsers, kind, load_s) for kind in ("load", "soak")}
     results = {}
-    wanted = [name for names in only for name in names.split(",")]
-    for case, result in run_benchmarks(wanted, CASES | served):
+    case_names = [name for names in only for name in names.split(",")]
+    for case, result in run_benchmarks(case_names, CASES | served):
         peers = ", ".join(f"{name} {seconds:.3f} s" for name, seconds in result.peers.items()) or "no peer"
         say(f"{case}: {result.ours_s:.3f} s ({peers}), {result.peak_memory_bytes / 1e6:.0f} MB at most")
         for note in result.notes:

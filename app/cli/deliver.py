@@ -61,8 +61,8 @@ def deliver(
     source, imported = drain(iterate_imported(named, out), say_progress)
     if link_trace is not None:
         network = replace(network, mac=replace(network.mac, kind="replay", trace=str(link_trace)))
-    asked = DeliverySpec(Spec(source, chain, config), network, coding, moments, down)
-    steps = iterate_delivery(asked, processes=min(2, os.cpu_count() or 1))
+    delivery_spec = DeliverySpec(Spec(source, chain, config), network, coding, moments, down)
+    steps = iterate_delivery(delivery_spec, processes=min(2, os.cpu_count() or 1))
     first = next(steps)  # an error here leaves no folder
     writable_folder(out)
     _say_moment(first)

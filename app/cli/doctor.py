@@ -57,7 +57,7 @@ def examine() -> list[Finding]:
     ]
 
 
-def _tried(name: str, look: Callable[[], str], advice: str) -> Finding:
+def _finding_of(name: str, look: Callable[[], str], advice: str) -> Finding:
     try:
         return Finding(name, True, look())
     except Exception as error:
@@ -77,12 +77,12 @@ def _machine() -> Iterator[Finding]:
 
 def _packages() -> Iterator[Finding]:
     for name in PACKAGES:
-        yield _tried(name, partial(importlib.metadata.version, name), "run make again to install it")
+        yield _finding_of(name, partial(importlib.metadata.version, name), "run make again to install it")
 
 
 def _open3d() -> Iterator[Finding]:
     advice = f"on Debian or Ubuntu: apt-get install {LINUX_LIBRARIES}"
-    yield _tried(
+    yield _finding_of(
         "open3d", lambda: importlib.import_module("pipeline.kernels.open3d_runtime").o3d.__version__, advice
     )
 
@@ -94,7 +94,7 @@ def _network() -> Iterator[Finding]:
         network = DepthNetwork()
         return f"{network.model_path.name} runs on {network.provider}"
 
-    yield _tried("depth network", look, "restore assets/depth from the repository")
+    yield _finding_of("depth network", look, "restore assets/depth from the repository")
 
 
 def _scenes() -> Iterator[Finding]:
@@ -103,7 +103,7 @@ def _scenes() -> Iterator[Finding]:
 
         return f"{len(DEMO_SCENES)} demos, {sum(len(load_demo(name).frames) for name in DEMO_SCENES)} nodes"
 
-    yield _tried("scenes", look, "restore assets/scenes from the repository")
+    yield _finding_of("scenes", look, "restore assets/scenes from the repository")
 
 
 def _port() -> Iterator[Finding]:

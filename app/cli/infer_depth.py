@@ -73,7 +73,7 @@ def infer_depth(
     report = {"model": str(network.model_path), "kind": network.convention.kind, "provider": network.provider}
     say(f"{report['model']} ({report['kind']}) runs on {report['provider']}")
     inferred = {}
-    for photo, record in _inferred(photos, network, out, sensor, depth_scale, fill):
+    for photo, record in _infer_photos(photos, network, out, sensor, depth_scale, fill):
         say(_line(photo, record))
         for note in record.get("notes", ()):
             say(f"{sensor}: {note}")
@@ -82,7 +82,7 @@ def infer_depth(
         print_json({**report, "photos": inferred})
 
 
-def _inferred(
+def _infer_photos(
     photos: tuple[Path, ...],
     network: DepthNetwork,
     out: Path,
@@ -110,8 +110,8 @@ def _inferred(
             aligned = align_depth(depth, measured, disparity=network.convention.kind == "inverse")
             depth, record["alignment"] = aligned.depth, _alignment(aligned)
             if fill:
-                depth, record["filled"] = _filled(aligned, measured, rgb, network)
-        yield photo, record | _written(depth, network.convention.kind, out, photo.stem)
+                depth, record["filled"] = _fill_holes(aligned, measured, rgb, network)
+        yield photo, record | _write_depth(depth, network.convention.kind, out, photo.stem)
 
 
 def _alignment(result: AlignmentResult) -> dict[str, Any]:
@@ -124,7 +124,7 @@ def _alignment(result: AlignmentResult) -> dict[str, Any]:
     }
 
 
-def _filled(
+def _fill_holes(
     aligned: AlignmentResult, measured: DepthMap, rgb: ByteArray, network: DepthNetwork
 ) -> tuple[DepthMap, dict[str, Any]]:
     """Fill the holes of measured depth: by completion, or by the user's own network (SPEC 3.6)."""
@@ -144,7 +144,7 @@ def _filled(
     return depth, {"share": float(holes.mean()), "mean_confidence": confidence}
 
 
-def _written(depth: DepthMap, kind: ModelKind, out: Path, stem: str) -> dict[str, Any]:
+def _write_depth(depth: DepthMap, kind: ModelKind, out: Path, stem: str) -> dict[str, Any]:
     """Write the depth image and its preview; return a record of their content."""
     import numpy as np
 

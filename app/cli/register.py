@@ -88,10 +88,10 @@ def register(
     else:
         print(answers_table(metrics))
     if alone and not answers[0].agreed:
-        say(_parted(answers[0]))
+        say(_disagreement_warning(answers[0]))
 
 
-def _parted(answer: Answer) -> str:
+def _disagreement_warning(answer: Answer) -> str:
     """Return a warning that random draws of the points disagree, with advice."""
     ends = f"end up to {100.0 * answer.spread_m:.1f} cm from this answer, not within 0.5 cm"
     if not math.isfinite(answer.spread_m):

@@ -156,10 +156,10 @@ def iterate_rigs(
     """
     outcomes: dict[int, RigOutcome] = {}
     try:
-        for index, outcome in run_batch(reconstruct_one, tasks, scheduler, killed=_killed):
+        for index, outcome in run_batch(reconstruct_one, tasks, scheduler, killed=_killed_outcome):
             outcomes[index] = outcome
-            said = outcome.sentence or f"{outcome.no_hit_after:.1%} of the rays find no surface"
-            yield Progress(f"{outcome.name} {outcome.state}: {said}", len(outcomes) / len(tasks))
+            summary = outcome.sentence or f"{outcome.no_hit_after:.1%} of the rays find no surface"
+            yield Progress(f"{outcome.name} {outcome.state}: {summary}", len(outcomes) / len(tasks))
     finally:
         done = tuple(outcomes[index] for index in sorted(outcomes))
         if done:
@@ -167,7 +167,7 @@ def iterate_rigs(
     return done
 
 
-def _killed(task: RigTask) -> RigOutcome:
+def _killed_outcome(task: RigTask) -> RigOutcome:
     return RigOutcome(task.name, "failed", "Its process was killed, perhaps for lack of memory")
 
 
@@ -180,7 +180,7 @@ def reconstruct_one(task: RigTask) -> RigOutcome:
     log = out.with_name(f"{out.name}.log")
     log.unlink(missing_ok=True)
     try:
-        kept = _kept(task)
+        kept = _kept_outcome(task)
         if kept is not None:
             return kept
         (out / TASK).unlink(missing_ok=True)
@@ -196,8 +196,8 @@ def reconstruct_one(task: RigTask) -> RigOutcome:
     except Exception as error:  # one rig must not stop the others
         with suppress(OSError):
             log.write_text(traceback.format_exc(), encoding="utf-8")
-        said = f"An error of the program, {type(error).__name__}: {error}; see {log.name}"
-        return RigOutcome(task.name, "failed", " ".join(said.split()))
+        sentence = f"An error of the program, {type(error).__name__}: {error}; see {log.name}"
+        return RigOutcome(task.name, "failed", " ".join(sentence.split()))
 
 
 def _record(task: RigTask) -> dict[str, Any]:
@@ -205,7 +205,7 @@ def _record(task: RigTask) -> dict[str, Any]:
     return {"path": task.path, "depth_scale": task.depth_scale, "settings": settings(task.config)}
 
 
-def _kept(task: RigTask) -> RigOutcome | None:
+def _kept_outcome(task: RigTask) -> RigOutcome | None:
     """Return the outcome of an earlier run with the same inputs; None if there is no complete one."""
     try:
         written = json.loads((Path(task.out) / TASK).read_text(encoding="utf-8"))
@@ -230,12 +230,12 @@ def _outcome(task: RigTask, state: State, metrics: dict[str, Any]) -> RigOutcome
     sentences = [*metrics.get("import", {"notes": ()})["notes"]]
     for node in metrics["nodes"]:
         sentences += [node["place"]["sentence"], *(f"{node['name']}: {note}" for note in node["notes"])]
-    said = "; ".join(filter(None, sentences))
+    notes = "; ".join(filter(None, sentences))
     nodes = len(metrics["nodes"])
     if nodes > 1 and not metrics["agreement"]:
-        return RigOutcome(task.name, "failed", "; ".join(filter(None, [said, APART])), nodes)
+        return RigOutcome(task.name, "failed", "; ".join(filter(None, [notes, APART])), nodes)
     known = (float("nan") if number is None else float(number) for number in numbers)
-    return RigOutcome(task.name, state, said, nodes, *known)
+    return RigOutcome(task.name, state, notes, nodes, *known)
 
 
 def _write_picture(result: Reconstruction, out: Path) -> None:
@@ -267,9 +267,9 @@ def _page(outcomes: tuple[RigOutcome, ...], out: Path) -> Iterator[Markup]:
     yield Markup("<h1>{} rigs</h1>").format(len(outcomes))
     yield Markup('<p class="lead">{} reconstructed, {} failed.</p>').format(len(outcomes) - failed, failed)
     yield table((*HEADINGS[:-1], "state"), [(*rigs_row(outcome)[:-1], outcome.state) for outcome in outcomes])
-    said = [Markup("<li><b>{}</b>: {}</li>").format(o.name, o.sentence) for o in outcomes if o.sentence]
-    if said:
-        yield Markup("<h2>What there is to say</h2><ul>{}</ul>").format(Markup("").join(said))
+    items = [Markup("<li><b>{}</b>: {}</li>").format(o.name, o.sentence) for o in outcomes if o.sentence]
+    if items:
+        yield Markup("<h2>What there is to say</h2><ul>{}</ul>").format(Markup("").join(items))
     yield Markup("<h2>Their surfaces, each as its first camera sees it</h2>")
     yield Markup('<p class="note">Magenta: the camera\'s ray meets no surface. A click opens the report.</p>')
     yield pictures(_figures(outcomes, out), 3)
@@ -308,5 +308,5 @@ def rigs_row(outcome: RigOutcome) -> tuple[str, ...]:
     )
     numbers = [f"{share:.1%}" if share == share else "–" for share in shares]
     seconds = f"{outcome.elapsed_s:.1f}" if outcome.elapsed_s == outcome.elapsed_s else "–"
-    said = "; ".join(text for text in (outcome.state, outcome.sentence) if text)
-    return outcome.name, str(outcome.nodes or "–"), *numbers, seconds, said
+    state_text = "; ".join(text for text in (outcome.state, outcome.sentence) if text)
+    return outcome.name, str(outcome.nodes or "–"), *numbers, seconds, state_text

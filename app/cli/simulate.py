@@ -75,11 +75,11 @@ def _run(
     first, *others = replications(config, count)
     if out is not None:
         writable_folder(out)
-    _say_who_is_alone(config)
-    trace = _told(iterate_simulation(first))
+    _say_disconnected(config)
+    trace = _run_with_progress(iterate_simulation(first))
     runs = [metrics(trace)]
     if others:
-        runs += _told(iterate_runs(others, scheduler))
+        runs += _run_with_progress(iterate_runs(others, scheduler))
     estimates = estimates_of(runs)
     if out is not None:
         write_trace(trace, out)
@@ -88,7 +88,7 @@ def _run(
     _show(estimates, json)
 
 
-def _say_who_is_alone(config: NetworkConfig) -> None:
+def _say_disconnected(config: NetworkConfig) -> None:
     from network_sim.fixed.collection import disconnected
 
     alone = disconnected(config) if config.scenario == "collection" else ()
@@ -114,7 +114,7 @@ def _sweep(
         wrong_use(f"--sweep {sweep} names no values; try for example --sweep scheme.k=3,5,10,none")
     if out is not None:
         writable_folder(out)
-    cases = _told(iterate_sweep(config, key, values.split(","), count, scheduler))
+    cases = _run_with_progress(iterate_sweep(config, key, values.split(","), count, scheduler))
     record = {f"{key}={value}": _record(estimates) for value, estimates in cases.items()}
     if out is not None:
         write_json(out / "config.json", {"preset": preset, "sweep": sweep, "settings": settings(config)})
@@ -127,7 +127,7 @@ def _sweep(
         _show(estimates, json=False)
 
 
-def _told(steps: Generator[Progress, None, Result]) -> Result:
+def _run_with_progress(steps: Generator[Progress, None, Result]) -> Result:
     """Run a computation and return its result; print every tenth of its progress."""
     printed = 0
     while True:

@@ -171,7 +171,7 @@ class ComputePool:
                 if slot.process is not None:
                     slot.process.terminate()
         for ticket in waiting:
-            _tell(ticket.on_end, Outcome("stopped"))
+            _run_callback(ticket.on_end, Outcome("stopped"))
         for thread in self._threads:
             thread.join(timeout=5.0)
 
@@ -181,7 +181,7 @@ class ComputePool:
             if ticket not in self._waiting:
                 return False
             self._waiting.remove(ticket)
-        _tell(ticket.on_end, Outcome("stopped"))
+        _run_callback(ticket.on_end, Outcome("stopped"))
         return True
 
     def _slot_of(self, ticket: Ticket) -> _Slot | None:
@@ -224,7 +224,7 @@ class ComputePool:
             assert slot.process is not None
             try:
                 while True:
-                    self._hear(slot, *slot.connection.recv())
+                    self._on_message(slot, *slot.connection.recv())
             except (EOFError, OSError):
                 slot.process.join(timeout=2.0)
             except Exception:
@@ -253,7 +253,7 @@ class ComputePool:
             slot.connection = here
             return True
 
-    def _hear(self, slot: _Slot, kind: str, value: Any) -> None:
+    def _on_message(self, slot: _Slot, kind: str, value: Any) -> None:
         ticket = slot.ticket
         if kind == "warm":
             slot.next_may_start.set()
@@ -262,7 +262,7 @@ class ComputePool:
             with self._lock:
                 others = self._others(ticket)
             for one in (ticket, *others):
-                _tell(one.on_progress, value)
+                _run_callback(one.on_progress, value)
             return
         with self._lock:
             slot.ready, slot.ticket = True, None
@@ -274,7 +274,7 @@ class ComputePool:
             self._dispatch()
         if ticket is not None:
             for one in (ticket, *others):
-                _tell(one.on_end, Outcome(kind, value))  # type: ignore[arg-type]
+                _run_callback(one.on_end, Outcome(kind, value))  # type: ignore[arg-type]
 
     def _others(self, ticket: Ticket) -> list[Ticket]:
         """Return the waiting jobs with the same key. The caller holds the lock."""
@@ -298,7 +298,7 @@ class ComputePool:
             others = self._served(ticket, outcome.kind)
         if ticket is not None:
             for one in (ticket, *others):
-                _tell(one.on_end, outcome)
+                _run_callback(one.on_end, outcome)
 
 
 def _send(slot: _Slot, message: tuple[str, Any]) -> None:
@@ -310,10 +310,10 @@ def _send(slot: _Slot, message: tuple[str, Any]) -> None:
         logger.debug("the computing process is gone")
 
 
-def _tell(callback: Callable[[Any], None], what: Any) -> None:
+def _run_callback(callback: Callable[[Any], None], argument: Any) -> None:
     """Call a callback; its errors are logged, so that they do not end the attending thread."""
     try:
-        callback(what)
+        callback(argument)
     except Exception:
         logger.exception("a callback of a job failed")
 
@@ -335,14 +335,14 @@ def _child(connection: Connection, warm_up: Callable[[], Iterator[None]], thread
         os.environ.setdefault(name, str(threads))
     try:
         warming = warm_up()
-        more, said = _goes_on(warming), False
+        more, warm_sent = _goes_on(warming), False
         connection.send(("ready", None))
         while True:
             while more and not connection.poll():
                 more = _goes_on(warming)
-            if not (more or said):
+            if not (more or warm_sent):
                 connection.send(("warm", None))
-                said = True
+                warm_sent = True
             kind, job = connection.recv()
             if kind == "job":
                 connection.send(_answer(connection, *job))

@@ -79,7 +79,7 @@ class Spec(spec.Spec):
         line = spec.Spec.command(self, out)
         return f"{line} --baseline {self.shown}" if self.shown in get_args(Baseline) else line
 
-    def asks_for(self, step: Step) -> bool:
+    def includes(self, step: Step) -> bool:
         """Whether the step is to be computed: calibration and network wait until their screen is opened."""
         if step == "calibrate":
             return self.views is not None
@@ -167,7 +167,7 @@ class Results:
     def first_stale(self, spec: Spec, steps: Sequence[Step] = CHAIN) -> Step | None:
         """Return the first stale one of ``steps``; None if there is none, it failed or it is not needed."""
         for step in steps:
-            if not spec.asks_for(step):
+            if not spec.includes(step):
                 return None
             if not self.fresh(step, spec):
                 return None if self.failure(step, spec) else step

@@ -120,10 +120,10 @@ def _read(path: Path) -> Any:
     """Read a stored result; None if there is none or it is damaged, so that it is computed again."""
     try:
         with path.open("rb") as file:
-            said, checksum = file.read(CHECKSUM_BYTES), 0
+            stored_checksum, checksum = file.read(CHECKSUM_BYTES), 0
             while block := file.read(BLOCK_BYTES):
                 checksum = zlib.crc32(block, checksum)
-            if said != _as_bytes(checksum):
+            if stored_checksum != _as_bytes(checksum):
                 return None
             file.seek(CHECKSUM_BYTES)
             value = pickle.load(file)

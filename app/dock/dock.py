@@ -71,11 +71,11 @@ class Dock:
         self._playing, self._visible, self._loops, self._speed = False, False, False, 1.0
         self._counts = ""
         self._anchor = (0.0, 0)
-        self._heard: dict[str, int] = {}
+        self._last_applied: dict[str, int] = {}
         self._tip = ""
         self._chosen: dict[str, Any] = {}
         with add_hidden(ui, self._name):
-            self._field = ui.when_changed(ui.gui.add_text("Dock", ""), self._hear)
+            self._field = ui.when_changed(ui.gui.add_text("Dock", ""), self._on_message)
             self._setup, self._picture, self._state = (ui.gui.add_html(Markup("")) for _ in range(3))
         self._ticker = Ticker(lambda: ui.post(self._tick), PICTURE_S)
         ui.closers.append(self._ticker.close)
@@ -209,19 +209,19 @@ class Dock:
 
     # Actions of the user.
 
-    def _hear(self) -> None:
+    def _on_message(self) -> None:
         """Apply the page's actions that were not applied yet."""
         try:
             message = json.loads(self._field.value)
             page, actions = str(message["page"]), list(message["actions"])
         except (ValueError, KeyError, TypeError):
             return
-        self._heard[page] = self._heard.pop(page, 0)
-        while len(self._heard) > PAGES:
-            del self._heard[next(iter(self._heard))]
+        self._last_applied[page] = self._last_applied.pop(page, 0)
+        while len(self._last_applied) > PAGES:
+            del self._last_applied[next(iter(self._last_applied))]
         for number, name, *arguments in actions:
-            if number > self._heard[page] and name in ACTIONS:
-                self._heard[page] = number
+            if number > self._last_applied[page] and name in ACTIONS:
+                self._last_applied[page] = number
                 ACTIONS[name](self, *arguments)
         self._send_state()
         self._ui.flush()
@@ -261,7 +261,7 @@ class Dock:
         """Set the tip for the item under the pointer."""
         there = 0 <= lane < len(self._lanes)
         there = there and (t_ns <= self.now_ns or self._lanes[lane].veil < 1.0)
-        self._tip = self._lanes[lane].tell(round(t_ns), int(y_px), round(tolerance_ns)) if there else ""
+        self._tip = self._lanes[lane].tip(round(t_ns), int(y_px), round(tolerance_ns)) if there else ""
 
     def _click(self, lane: int, t_ns: float, y_px: float, tolerance_ns: float) -> None:
         """Move the clock to a click and mark the item there."""
@@ -274,11 +274,11 @@ class Dock:
 
     # Messages to the page.
 
-    def _tell(self, handle: Any, **what: Any) -> None:
-        handle.content = page_call("dock", {"dock": self._name, **what})
+    def _send(self, handle: Any, **fields: Any) -> None:
+        handle.content = page_call("dock", {"dock": self._name, **fields})
 
     def _send_setup(self) -> None:
-        self._tell(
+        self._send(
             self._setup,
             kind="setup",
             visible=self._visible and bool(self._lanes),
@@ -289,14 +289,14 @@ class Dock:
         )
 
     def _send_state(self) -> None:
-        self._tell(
+        self._send(
             self._state,
             kind="state",
             now=self.now_ns,
             playing=self._playing,
             loops=self._loops,
             speed=f"{self._speed:g} a second" if self._counts else speed_text(self._speed),
-            heard=self._heard,
+            heard=self._last_applied,
             tip=self._tip,
             chosen=self._chosen,
             labels=[
@@ -314,13 +314,13 @@ class Dock:
             encoded = cv2.imencode(".png", picture[..., ::-1], (cv2.IMWRITE_PNG_COMPRESSION, 1))[1]
             pictures.append(f"data:image/png;base64,{base64.b64encode(encoded.tobytes()).decode()}")
             words.append([astuple(word) for word in lane.words(*self._window_ns, self._width_px)])
-        self._tell(
+        self._send(
             self._picture,
             kind="picture",
             window=self._window_ns,
             pictures=pictures,
             words=words,
-            heard=self._heard,
+            heard=self._last_applied,
         )
 
 

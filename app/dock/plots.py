@@ -51,21 +51,21 @@ class PlotDock:
         """Show another sheet; None hides the dock."""
         if sheet is not None or self._sheet is not None:
             self._sheet = sheet
-            self._tell()
+            self._send()
 
     def show(self, visible: bool) -> None:
         """Show or hide the dock."""
         if visible != self._visible:
             self._visible = visible
-            self._tell()
+            self._send()
 
-    def _tell(self) -> None:
+    def _send(self) -> None:
         sheet = self._sheet if self._visible else None
-        said: dict[str, object] = {"dock": self._name, "run": self._run, "visible": sheet is not None}
+        content: dict[str, object] = {"dock": self._name, "run": self._run, "visible": sheet is not None}
         if sheet is not None:
-            said |= {"title": sheet.title, "legend": sheet.legend, "table": sheet.table}
-            said["figures"] = _figures(sheet.figures)
-        self._message.content = page_call("plots", said)
+            content |= {"title": sheet.title, "legend": sheet.legend, "table": sheet.table}
+            content["figures"] = _figures(sheet.figures)
+        self._message.content = page_call("plots", content)
 
 
 def _figures(figures: Sequence[go.Figure]) -> list[object]:

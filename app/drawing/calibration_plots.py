@@ -113,23 +113,23 @@ def residuals_figure(calibration: Calibration) -> go.Figure:
     return figure
 
 
-def radial_residuals_figure(told: RadialResiduals) -> go.Figure:
+def radial_residuals_figure(residuals: RadialResiduals) -> go.Figure:
     """Plot residuals along the radius with the mean of each band; a wave means a wrong lens model."""
     figure = titled_figure(
         "What is left along the radius", "distance from the principal point, px", "outward, px"
     )
     figure.add_scatter(
-        x=told.radius_px,
-        y=told.outward_px,
+        x=residuals.radius_px,
+        y=residuals.outward_px,
         mode="markers",
         marker={"size": 3, "color": css(NEUTRAL), "opacity": 0.4},
         name="points",
         hoverinfo="skip",
     )
     figure.add_scatter(
-        x=0.5 * (told.edges_px[1:] + told.edges_px[:-1]),
-        y=told.mean_px,
-        error_y={"type": "data", "array": BAND95 * told.sd_of_mean_px},
+        x=0.5 * (residuals.edges_px[1:] + residuals.edges_px[:-1]),
+        y=residuals.mean_px,
+        error_y={"type": "data", "array": BAND95 * residuals.sd_of_mean_px},
         mode="lines+markers",
         line={"color": css(SOURCE)},
         name="mean, 95 %",
@@ -169,14 +169,16 @@ def verdict_figure(judged: Verdict, sd: ErrorMap, size_px: tuple[int, int]) -> g
     return figure
 
 
-def coverage_figure(told: Coverage, size_px: tuple[int, int], views: Sequence[FittedView] = ()) -> go.Figure:
+def coverage_figure(
+    coverage: Coverage, size_px: tuple[int, int], views: Sequence[FittedView] = ()
+) -> go.Figure:
     """Draw a map of the number of points seen in each cell of the image; empty cells stay white."""
-    title = f"Points in {100.0 * told.share:.0f} % of the image"
+    title = f"Points in {100.0 * coverage.share:.0f} % of the image"
     figure = image_figure(title, size_px)
     figure.add_heatmap(
-        x=told.columns_px,
-        y=told.rows_px,
-        z=np.where(told.counts > 0, told.counts, np.nan),
+        x=coverage.columns_px,
+        y=coverage.rows_px,
+        z=np.where(coverage.counts > 0, coverage.counts, np.nan),
         colorscale=RAMP,
         zmin=0,
         colorbar={"title": {"text": "points"}},
@@ -234,17 +236,17 @@ def _dots(
 
 
 def _map_figure(
-    told: ErrorMap, values_mm: FloatArray, title: str, size_px: tuple[int, int], most_mm: float | None
+    errors: ErrorMap, values_mm: FloatArray, title: str, size_px: tuple[int, int], most_mm: float | None
 ) -> go.Figure:
     """Draw a map of millimetres over the image; the pointer shows pixels and value."""
     figure = image_figure(title, size_px)
     known = values_mm[np.isfinite(values_mm)]
     most_mm = most_mm or (float(np.quantile(known, 0.98)) if len(known) else 1.0)
     figure.add_heatmap(
-        x=told.columns_px,
-        y=told.rows_px,
+        x=errors.columns_px,
+        y=errors.rows_px,
         z=values_mm,
-        customdata=told.error_px,
+        customdata=errors.error_px,
         colorscale=RAMP,
         zmin=0.0,
         zmax=most_mm,

@@ -60,12 +60,12 @@ def bias_curve(fit: DepthFit, to_m: float | None = None) -> BiasCurve:
     return BiasCurve(fit.terms, z_m, off_m, sd_m, noise_m, far_m, points.z_m, points.before_m, points.after_m)
 
 
-def bias_figure(told: BiasCurve) -> go.Figure:
+def bias_figure(curve: BiasCurve) -> go.Figure:
     """Plot measured minus true depth over the distance: each view before and after the correction, the terms
     with their 95 % band, and the noise of a pixel.
     """
     figure = titled_figure("What the sensor is off by", "measured depth, m", "measured less true, mm")
-    z_m, off_m, sd_m = told.z_m, told.off_m, told.sd_m
+    z_m, off_m, sd_m = curve.z_m, curve.off_m, curve.sd_m
     figure.add_scatter(
         x=np.concatenate([z_m, z_m[::-1]]),
         y=1000.0 * np.concatenate([off_m - BAND95 * sd_m, (off_m + BAND95 * sd_m)[::-1]]),
@@ -79,27 +79,27 @@ def bias_figure(told: BiasCurve) -> go.Figure:
         x=z_m,
         y=1000.0 * off_m,
         line={"color": css(TARGET)},
-        name=" + ".join(told.terms) or "no bias",
+        name=" + ".join(curve.terms) or "no bias",
         hovertemplate="%{x:.2f} m: %{y:+.1f} mm<extra></extra>",
     )
     for name, values_m, color, symbol in (
-        ("views, measured", told.before_m, LOSS, "circle"),
-        ("views, corrected", told.after_m, DELIVERED, "diamond"),
+        ("views, measured", curve.before_m, LOSS, "circle"),
+        ("views, corrected", curve.after_m, DELIVERED, "diamond"),
     ):
         figure.add_scatter(
-            x=told.view_z_m,
+            x=curve.view_z_m,
             y=1000.0 * values_m,
             mode="markers",
             marker={"color": css(color), "symbol": symbol, "size": 7},
             name=name,
             hovertemplate="%{x:.2f} m: %{y:+.1f} mm<extra>" + name + "</extra>",
         )
-    if told.noise_m is not None:
-        _add_noise(figure, z_m, told.noise_m)
+    if curve.noise_m is not None:
+        _add_noise(figure, z_m, curve.noise_m)
     figure.add_hline(y=0.0, line={"color": css(NEUTRAL), "width": 1})
-    if z_m[-1] > told.far_m:
+    if z_m[-1] > curve.far_m:
         figure.add_vrect(
-            x0=told.far_m,
+            x0=curve.far_m,
             x1=float(z_m[-1]),
             fillcolor=css(NEUTRAL),
             opacity=0.12,

@@ -84,7 +84,7 @@ class Lane(Protocol):
     def pick(self, t_ns: int, y_px: int, tolerance_ns: int) -> int:
         """Return the index of the nearest item, or -1."""
 
-    def tell(self, t_ns: int, y_px: int, tolerance_ns: int) -> str:
+    def tip(self, t_ns: int, y_px: int, tolerance_ns: int) -> str:
         """Return one line about the items at a place; empty if there are none."""
 
     def place(self, item: int) -> tuple[int, int, int, int]:
@@ -174,7 +174,7 @@ class FramesLane:
         latest = len(away_ns) - 1 - int(np.argmin(away_ns[::-1]))
         return int(levels.item[some][latest])
 
-    def tell(self, t_ns: int, y_px: int, tolerance_ns: int) -> str:
+    def tip(self, t_ns: int, y_px: int, tolerance_ns: int) -> str:
         """Return a line about the one frame at a place, or a count of frames and causes of losses."""
         item = self.pick(t_ns, y_px, tolerance_ns)
         if item < 0:
@@ -243,7 +243,7 @@ class Curve:
         return np.concatenate([[np.nan], self.values])[index]
 
     def text(self, now_ns: int) -> str:
-        """Return the name and value at a time as text."""
+        """Return the name and value at ``now_ns`` as text."""
         value = float(self.at(np.array(now_ns)))
         if not np.isfinite(value):
             return f"{self.name} –"
@@ -311,8 +311,8 @@ class CurvesLane:
         """Return -1: curves have no items."""
         return -1
 
-    def tell(self, t_ns: int, y_px: int, tolerance_ns: int) -> str:
-        """Return the values at a time."""
+    def tip(self, t_ns: int, y_px: int, tolerance_ns: int) -> str:
+        """Return the values at ``t_ns`` as text."""
         return ", ".join(curve.text(t_ns) for curve in self._curves)
 
     def place(self, item: int) -> tuple[int, int, int, int]:

@@ -151,8 +151,8 @@ def read_lesson(
                 f"says it inside, for those who were not at stop {stop}."
             )
     stops = tuple(_stop(section, path.name, settings, default) for section in sections)
-    asked = [choice for stop in stops if stop.question for choice in stop.question.choices]
-    for name in (choice.when[0] for choice in asked if choice.when is not None):
+    choices = [choice for stop in stops if stop.question for choice in stop.question.choices]
+    for name in (choice.when[0] for choice in choices if choice.when is not None):
         if name not in numbers:
             raise InputError(
                 f"The lesson {path.name} has a choice that is right by {name}, which its screen does not "
@@ -163,8 +163,8 @@ def read_lesson(
 
 def _stop(section: str, file: str, settings: Mapping[str, Setting[Look]], look: Look) -> Stop[Look]:
     title, *lines = section.splitlines()
-    told = "\n".join(line for line in lines if not line.startswith(("set:", *POINTING)))
-    text, *parts = re.split(rf"^({'|'.join(PARTS)}):", told, flags=re.MULTILINE)
+    body = "\n".join(line for line in lines if not line.startswith(("set:", *POINTING)))
+    text, *parts = re.split(rf"^({'|'.join(PARTS)}):", body, flags=re.MULTILINE)
     opens, sees = (tuple(x[len(key) :].strip() for x in lines if x.startswith(key)) for key in POINTING)
     where = f"The lesson {file}, section '{title.strip()}',"
     if not text.strip():
@@ -185,10 +185,10 @@ def _stop(section: str, file: str, settings: Mapping[str, Setting[Look]], look: 
 
 def _question(parts: list[str], where: str) -> Question:
     """Return the question in the parts of a section; names and texts alternate."""
-    asked, choices, reveal = (
+    question, choices, reveal = (
         (part.strip() for part in parts[1::2]) if tuple(parts[::2]) == PARTS else ("",) * 3
     )
-    if not (asked and choices and reveal):
+    if not (question and choices and reveal):
         raise InputError(
             f"{where} must ask with 'ask:', 'choices:' and 'reveal:', in this order, each with text."
         )
@@ -211,7 +211,7 @@ def _question(parts: list[str], where: str) -> Question:
         if (mark == "x") == bool(one.reason):
             fault = "is right but has a reason why not" if one.reason else "has no reason why it is wrong"
             raise InputError(f"{where} choice '{one.text}' {fault}; a reason stands behind ' | '.")
-    return Question(asked, found, reveal)
+    return Question(question, found, reveal)
 
 
 def sets(key: str, read: Callable[[str], Any]) -> Callable[[Look, str], Look]:

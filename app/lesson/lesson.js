@@ -82,10 +82,8 @@
     if (!card.isConnected) home.append(card);
   }
 
-  // Return the text, and next to it the question with its choices or the answer. In large type the row is
-  // kept
-  // low: before a guess it has the title, question and choices; after it the question, right answer and
-  // reason.
+  // Return the text, and next to it the question with its choices or the answer. A row in large type is kept
+  // low: before a guess it has title, question and choices; after it question, right answer and reason.
   function columns(parts, large) {
     const asked = parts.findIndex((one, index) => index > 0 && isQuestion(one));
     if (asked < 0) return `<div>${html(parts)}</div>`;

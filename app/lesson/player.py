@@ -61,7 +61,7 @@ class LessonFolder(Generic[Look]):
         self._votes: dict[int, dict[int, int]] = {}
         """Votes by stop and voter."""
         self._lecture = ui.lecture
-        self._waiting = self._asking()
+        self._waiting = self._prompt()
         self._title = f"Lesson: {lesson.title}"
         with ui.gui.add_folder(self._title, expand_by_default=False, order=FIRST_OF_ALL):
             self._stop = ui.gui.add_dropdown(
@@ -147,7 +147,7 @@ class LessonFolder(Generic[Look]):
             return
         self._known.pop(index, None)
         self._on_stop(self._lesson.stops[index].look)
-        self._write(self._asking())
+        self._write(self._prompt())
         self._poll()
         self._point_out()
 
@@ -175,21 +175,21 @@ class LessonFolder(Generic[Look]):
         """Take a guess; only the first one counts."""
         if self._waits():
             self._guesses[self._index()] = guess
-            self._write(self._asking())
+            self._write(self._prompt())
             self._poll()
 
     def _voted(self, voter: int, vote: int) -> None:
         """Count a vote of the class; each voter's last vote counts until the answer is shown."""
         if self._waits():
             self._votes.setdefault(self._index(), {})[voter] = vote - 1
-            self._write(self._asking())
+            self._write(self._prompt())
 
     def _poll(self) -> None:
         """Open a vote while the stop waits for an answer, and close it otherwise."""
         if self._lecture is not None:
             self._lecture.poll(self._voted if self._waits() else None)
 
-    def _asking(self) -> str:
+    def _prompt(self) -> str:
         return GUESS if self._lecture is None else VOTING
 
     def _write(self, waiting: str) -> None:
@@ -201,8 +201,8 @@ class LessonFolder(Generic[Look]):
             guess, question = self._guesses.get(index), settled(stop.question, self._numbers())
             if guess is not None and question is None:
                 guess, waiting = None, COMPUTING
-            asked = with_votes(question or stop.question, self._votes.get(index, {}).values())
-            lines += [f"**{stop.question.text}**", *told(asked, guess, waiting)]
+            shown_question = with_votes(question or stop.question, self._votes.get(index, {}).values())
+            lines += [f"**{stop.question.text}**", *question_paragraphs(shown_question, guess, waiting)]
         text = self._filled("\n\n".join(lines), index)
         if text != self._text.content:
             self._text.content = text
@@ -247,7 +247,7 @@ def with_votes(question: Question, votes: Collection[int]) -> Question:
     return replace(question, choices=tuple(choices))
 
 
-def told(question: Question, guess: int | None, waiting: str) -> list[str]:
+def question_paragraphs(question: Question, guess: int | None, waiting: str) -> list[str]:
     """Return paragraphs of markdown: the choices, and the answer to a guess, or ``waiting`` before it.
 
     Args:

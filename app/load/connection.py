@@ -17,7 +17,7 @@ from websockets.sync.client import connect
 from app.window.stepper import MARKS
 
 PATIENCE_S = 30.0
-ASKED = "packetmesh.ask("
+DRAWN_QUERY = "packetmesh.ask("
 """Start of the script by which the server asks whether everything is drawn."""
 DRAWN = "Say that all is drawn"
 """Label of the command that answers it."""
@@ -60,7 +60,7 @@ class Connection:
         self._marks: dict[str, str] = {}
         self.current = ""
         """The step that is shown."""
-        self.heard_s: dict[str, float] = {}
+        self.shown_s: dict[str, float] = {}
         """Time when each step was last shown, and when ``surface`` was last up to date."""
         self.lost = False
         """Whether the server closed the connection."""
@@ -75,13 +75,13 @@ class Connection:
         self._socket.close()
         self._reader.join()
 
-    def say(self, message: messages.Message) -> None:
+    def send(self, message: messages.Message) -> None:
         self._socket.send(msgspec.msgpack.encode(message.as_serializable_dict()))
 
     def stand(self, position: tuple[float, float, float]) -> None:
         """Report a view turned by the user."""
         up, ahead = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
-        self.say(
+        self.send(
             messages.ViewerCameraMessage(
                 (1.0, 0.0, 0.0, 0.0), position, 0.9, 0.01, 100.0, 600, 900, ahead, up
             )
@@ -90,7 +90,7 @@ class Connection:
     def set(self, label: str, value: object, which: int = 0) -> None:
         """Set the control with this label, or number ``which`` of several."""
         wait_for(lambda: len(self.uuids.get(label, ())) > which)
-        self.say(messages.GuiUpdateMessage(self.uuids[label][which], {"value": value}))
+        self.send(messages.GuiUpdateMessage(self.uuids[label][which], {"value": value}))
 
     def value(self, label: str) -> object:
         return self.values[self.uuids[label][0]]
@@ -127,33 +127,33 @@ class Connection:
 
     def _take_control(self, uuid: str, message: dict[str, object]) -> None:
         props = message.get("props")
-        told = props or message.get("updates") or {}
-        assert isinstance(told, dict)
+        properties = props or message.get("updates") or {}
+        assert isinstance(properties, dict)
         if message["type"] == "NotificationShowMessage":
-            self.notices.append(f"{told['title']}: {told['body']}")
-        if props is not None and told.get("label"):
-            self.uuids.setdefault(told["label"], []).append(uuid)
-            if told["label"] == DRAWN:
+            self.notices.append(f"{properties['title']}: {properties['body']}")
+        if props is not None and properties.get("label"):
+            self.uuids.setdefault(properties["label"], []).append(uuid)
+            if properties["label"] == DRAWN:
                 self._drawn.add(uuid)
-        if "_markdown" in told:
-            self.texts[uuid] = told["_markdown"]
-        if "content" in told:
-            self._take_html(told["content"])
-        if "options" in told and uuid in self.uuids.get("Steps", ()):
-            self.steps = tuple(told["options"])
-        value = message.get("value", told.get("value"))
+        if "_markdown" in properties:
+            self.texts[uuid] = properties["_markdown"]
+        if "content" in properties:
+            self._take_html(properties["content"])
+        if "options" in properties and uuid in self.uuids.get("Steps", ()):
+            self.steps = tuple(properties["options"])
+        value = message.get("value", properties.get("value"))
         if value is not None:
             self.values[uuid] = value
 
     def _take_html(self, content: str) -> None:
         """Read which step is shown; answer the question whether everything is drawn."""
-        if ASKED in content:
+        if DRAWN_QUERY in content:
             for uuid in self._drawn:
-                self.say(messages.CommandTriggerMessage(uuid))
+                self.send(messages.CommandTriggerMessage(uuid))
         current = _CURRENT.search(content)
         if current is not None and self.steps:
             self.current = self.steps[int(current[1]) - 1]
-            self.heard_s[self.current] = time.monotonic()
+            self.shown_s[self.current] = time.monotonic()
             self._marks = {self.steps[int(number) - 1]: mark for number, mark in _MARK.findall(content)}
             if self.mark("Surface") == MARKS["fresh"]:
-                self.heard_s["surface"] = time.monotonic()
+                self.shown_s["surface"] = time.monotonic()

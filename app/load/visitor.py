@@ -77,8 +77,8 @@ class Visitor:
         while not self._leaving.wait(self._rng.exponential(THINKING_S)):
             if page.lost:
                 raise ConnectionError("the server ended the connection")
-            if not first and (first := "surface" in page.heard_s):
-                self.diary.first_mesh_s = page.heard_s["surface"] - started_s
+            if not first and (first := "surface" in page.shown_s):
+                self.diary.first_mesh_s = page.shown_s["surface"] - started_s
             self._look_for_mesh(page)
             if first and self._dragged_s is None and self._rng.random() < MESH_SHARE:
                 self._click(page, "Surface")
@@ -89,10 +89,10 @@ class Visitor:
     def _click(self, page: Connection, step: str) -> None:
         if page.current == step:
             return
-        asked_s = time.monotonic()
+        clicked_s = time.monotonic()
         page.go(step)
         wait_for(lambda: page.current == step, LONGEST_S)
-        self.diary.answers_s.append(page.heard_s[step] - asked_s)
+        self.diary.answers_s.append(page.shown_s[step] - clicked_s)
 
     def _drag(self, page: Connection) -> None:
         for radius_mm in np.sort(self._rng.uniform(*RADIUS_MM, MOVES)):
@@ -104,6 +104,6 @@ class Visitor:
         """Record the time of the last drag's surface if it has come."""
         if self._dragged_s is None or page.mark("Surface") != MARKS["fresh"]:
             return
-        if page.heard_s["surface"] > self._dragged_s:
-            self.diary.meshes_s.append(page.heard_s["surface"] - self._dragged_s)
+        if page.shown_s["surface"] > self._dragged_s:
+            self.diary.meshes_s.append(page.shown_s["surface"] - self._dragged_s)
             self._dragged_s = None

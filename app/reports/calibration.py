@@ -44,7 +44,7 @@ def write_calibration_report(report: CameraReport, trust: Trust, path: Path) -> 
     if trust.outliers:
         proposed = Markup("").join(Markup("<li>{}</li>").format(one.reason) for one in trust.outliers)
         body += Markup("<h2>Images that one may leave out</h2><ul>{}</ul>").format(proposed)
-    figures = _all(report, trust)
+    figures = _all_figures(report, trust)
     body += Markup("<h2>Pictures</h2>") + _places(len(figures))
     missing = [(name, one.reason) for name, one in report.detections.items() if not one.found]
     if missing:
@@ -63,7 +63,7 @@ def _made_of(report: CameraReport) -> str:
     )
 
 
-def _all(report: CameraReport, trust: Trust) -> list[go.Figure]:
+def _all_figures(report: CameraReport, trust: Trust) -> list[go.Figure]:
     found = report.calibration
     size_px, views = found.size_px, found.views
     figures = [

@@ -52,10 +52,10 @@ def _sections(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[Marku
         metrics["preset"],
         before["no_hit_ray_share"],
         after["no_hit_ray_share"],
-        _kept(metrics["measured"]),
+        _use_sentences(metrics["measured"]),
         _agreeing(metrics["measured"]),
     )
-    yield from _must_be_known(metrics)
+    yield from _doubts(metrics)
     yield from _surfaces(result, before, after)
     yield from _truth(metrics)
     yield from _nodes(result, metrics)
@@ -70,7 +70,7 @@ def _sections(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[Marku
     ).format(metrics["peak_memory_bytes"] / 1e6)
 
 
-def _kept(measured: dict[str, float]) -> Markup:
+def _use_sentences(measured: dict[str, float]) -> Markup:
     """Return two sentences on the use of the measurements."""
     return Markup(
         " Of the measured pixels, the outlier filter keeps <b>{kept_share:.2%}</b>; the surface lies within "
@@ -88,7 +88,7 @@ def _agreeing(measured: dict[str, float]) -> Markup:
     return Markup(" Of what two cameras both measured, <b>{:.1%}</b> is within 2 %.").format(share)
 
 
-def _must_be_known(metrics: dict[str, Any]) -> Iterator[Markup]:
+def _doubts(metrics: dict[str, Any]) -> Iterator[Markup]:
     """Yield doubts about the images, and about nodes with no pose or an uncertain one."""
     for note in metrics.get("import", {"notes": ()})["notes"]:
         yield Markup('<p class="lead">{}.</p>').format(note)

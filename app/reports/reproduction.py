@@ -27,15 +27,15 @@ def write_reproduction_report(verdicts: Sequence[Verdict], path: Path) -> None:
         '<p class="note">Shares run from 0 to 1, lengths are in metres; intervals are 95 %: by '
         "bootstrap, of the mean over frames or of the median over rooms, and by Student's t over independent "
         "runs of the network.</p>{}"
-    ).format(_counted(thesis), Markup("").join(map(_section, thesis)))
+    ).format(_verdict_counts(thesis), Markup("").join(map(_section, thesis)))
     if ours:
         body += Markup('<h1>Ours, beyond the thesis</h1><p class="lead">{}</p>{}').format(
-            _counted(ours), Markup("").join(map(_section, ours))
+            _verdict_counts(ours), Markup("").join(map(_section, ours))
         )
     write_page(path, "PacketMesh: the thesis, computed again", body)
 
 
-def _counted(verdicts: Sequence[Verdict]) -> str:
+def _verdict_counts(verdicts: Sequence[Verdict]) -> str:
     """Return the number of claims with each verdict."""
     counts = Counter(verdict.verdict for verdict in verdicts)
     parts = (f"{count} {word}" for word in VERDICTS if (count := counts[word]))

@@ -44,9 +44,8 @@ window.packetmeshAddress = (() => {
       say();
     },
 
-    // Show this query in the address: as a new entry of the browser's history if `place`, else in place of
-    // the
-    // current entry. It is ignored while a newer query of the page has not reached the server.
+    // Show this query in the address: as a new entry of the browser's history if `place`, else in the current
+    // entry. It is ignored while a newer query of the page has not reached the server.
     show(text, place) {
       if (unsaid !== null) return;
       const [own, others] = split();

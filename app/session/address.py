@@ -119,7 +119,7 @@ class Address:
         start: Place,
         screens: Sequence[str],
         keys: Sequence[str],
-        on_ask: Callable[[Place, list[str]], None],
+        on_place: Callable[[Place, list[str]], None],
     ) -> None:
         """Add the hidden controls to the page.
 
@@ -129,9 +129,9 @@ class Address:
             start: the place of an empty address.
             screens: titles of the screens.
             keys: keys that the screens add.
-            on_ask: called with the place of a new address and the error sentences of its wrong parts.
+            on_place: called with the place of a new address and the error sentences of its wrong parts.
         """
-        self._uploads, self._start, self._on_ask = uploads, start, on_ask
+        self._uploads, self._start, self._on_place = uploads, start, on_place
         self._screens, self._keys = screens, keys
         self._sources: dict[str, Source] = {name: Demo(name) for name in DEMO_SCENES}
         self._sources[name_of(start.spec.source)] = start.spec.source
@@ -141,9 +141,9 @@ class Address:
         name = uuid.uuid4().hex
         own = ["scene", "preset", "set", "screen", *keys]
         with add_hidden(ui, name, page_call("beginAddress", name, own)):
-            self._field = ui.when_changed(ui.gui.add_text("Address", ""), self._hear)
-            self._saying = ui.gui.add_html(Markup(""))
-        self._timer = ui.debounce(WAIT_S, self._say)
+            self._field = ui.when_changed(ui.gui.add_text("Address", ""), self._on_message)
+            self._message = ui.gui.add_html(Markup(""))
+        self._timer = ui.debounce(WAIT_S, self._send)
 
     def show(self, place: Place) -> None:
         """Update the address to this place; wait until the page has sent its first address."""
@@ -157,27 +157,26 @@ class Address:
         """Stop updating the address: the browser is gone."""
         self._timer.cancel()
 
-    def _hear(self) -> None:
+    def _on_message(self) -> None:
         text = self._field.value.partition(" ")[2]
         begins, self._text = not self._text, text or " "
         try:
             if (text or not begins) and text != self._place.text():
-                self._on_ask(*self._read(text))
+                self._on_place(*self._read(text))
         finally:  # replaces the parts that could not be followed
             self._timer.restart()
 
     def _read(self, text: str) -> tuple[Place, list[str]]:
-        asked = dict(parse_qsl(text)).get("scene", "")
-        upload = self._uploads.find(asked)
-        sources = self._sources if upload is None else self._sources | {asked: upload}
+        scene = dict(parse_qsl(text)).get("scene", "")
+        upload = self._uploads.find(scene)
+        sources = self._sources if upload is None else self._sources | {scene: upload}
         return place_of(text, self._start, self._screens, sources, self._keys)
 
-    def _say(self) -> None:
-        """Send the page its address, even if the page asked for this one: its address may have changed
-        since."""
+    def _send(self) -> None:
+        """Send the page its address, even one that the page requested: it may have changed since."""
         place, text = self._place, self._place.text()
         before, wrong = self._read(self._text)
         new = not wrong and place.is_beside(before)
         self._text = text
         self._count += 1
-        self._saying.content = page_call("showAddress", text, new, mark=self._count)
+        self._message.content = page_call("showAddress", text, new, mark=self._count)

@@ -29,7 +29,7 @@ from app.window.page import page_call
 from app.window.ui import Count, Ui
 from pipeline.types import ByteArray
 
-SAID = re.compile(r"\d+ (?:(follow)|(roam)|vote ([123]))")
+STUDENT_MESSAGE = re.compile(r"\d+ (?:(follow)|(roam)|vote ([123]))")
 """A message of a student's page: its number, which makes equal messages differ, and its content."""
 UNREACHED = Markup(
     "<b>No other machine reaches this address.</b> Stop the lecture and start it again with "
@@ -47,9 +47,9 @@ class _Seat:
     follows: bool = True
     vote: int = 0
     """The vote, 1 to 3; 0 for none."""
-    say: Callable[..., None] = lambda *_: None
+    call: Callable[..., None] = lambda *_: None
     """Calls a function of the seat's page by name, with these arguments."""
-    tell: Callable[[Markdown], None] = lambda _: None
+    show_size: Callable[[Markdown], None] = lambda _: None
     """Shows the teacher the number of students, in markdown."""
     leave: Callable[[], None] = lambda: None
     """Stops updating the teacher's address."""
@@ -161,8 +161,8 @@ class Lecture:
         """Add the teacher's own controls."""
         client = seat.client
         with client.gui.add_folder("Lecture", order=-1.0):
-            told = Gui(client.gui).add_markdown(Markdown(""))
-            seat.tell = partial(setattr, told, "content")
+            size_text = Gui(client.gui).add_markdown(Markdown(""))
+            seat.show_size = partial(setattr, size_text, "content")
             steer = client.gui.add_checkbox(
                 "The class may steer",
                 self._all_steer,
@@ -194,9 +194,9 @@ class Lecture:
     def _count(self) -> None:
         following = sum(seat.follows for seat in self._seats.values() if not seat.teaches)
         size = self.class_size
-        told = Markdown("**{}** in the class, **{}** of them follow your view.").format(size, following)
+        sentence = Markdown("**{}** in the class, **{}** of them follow your view.").format(size, following)
         for seat in self._present():
-            seat.tell(told if size else Markdown("**Nobody is in the class yet.**"))
+            seat.show_size(sentence if size else Markdown("**Nobody is in the class yet.**"))
 
     def _add_chip(self, seat: _Seat) -> None:
         """Add the bar with a student's messages, and receive what the student's page sends."""
@@ -207,14 +207,14 @@ class Lecture:
             html = ui.gui.add_html(Markup(""))
         marks = itertools.count()
 
-        def say(function: str, *arguments: object) -> None:
+        def call(function: str, *arguments: object) -> None:
             html.content = page_call(function, *arguments, mark=next(marks))
 
-        def hear() -> None:
-            heard = SAID.fullmatch(field.value)
-            if heard is None:
+        def on_message() -> None:
+            message = STUDENT_MESSAGE.fullmatch(field.value)
+            if message is None:
                 return
-            follow, _, vote = heard.groups()
+            follow, _, vote = message.groups()
             if vote is not None:
                 self._vote(seat, int(vote))
                 return
@@ -224,8 +224,8 @@ class Lecture:
             self._show(seat)
             self._count()
 
-        seat.say = say
-        ui.when_changed(field, hear)
+        seat.call = call
+        ui.when_changed(field, on_message)
         self._show(seat)
 
     def _own_ui(self, client: viser.ClientHandle) -> Ui:
@@ -239,7 +239,7 @@ class Lecture:
             "asks": self._count_vote is not None,
             "vote": seat.vote,
         }
-        seat.say("showSeat", state)
+        seat.call("showSeat", state)
 
     def _vote(self, seat: _Seat, vote: int) -> None:
         if self._count_vote is not None:
@@ -258,7 +258,7 @@ class Lecture:
         """Show a student that the control just used belongs to the teacher."""
         seat = self._seats.get(number)
         if seat is not None:
-            seat.say("refuse")
+            seat.call("refuse")
 
 
 def _turn_as(leader: viser.ClientHandle, client: viser.ClientHandle) -> None:

@@ -56,8 +56,8 @@ class Places:
 
     def _now(self) -> Place:
         session = self._session
-        said = {key: part.place() for key, part in self._parts().items()}
-        added = tuple((key, text) for key, text in said.items() if text)
+        texts = {key: part.place() for key, part in self._parts().items()}
+        added = tuple((key, text) for key, text in texts.items() if text)
         return Place(session.spec, session.current.title, added)
 
     def _parts(self) -> dict[str, InAddress]:
@@ -80,18 +80,18 @@ class Places:
             more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
             session.notify("Not all of the address can be followed", f"{wrong[0].rstrip('.')}{more}.")
 
-    def _take(self, asked: Mapping[str, str], spec: Spec) -> list[str]:
+    def _take(self, added: Mapping[str, str], spec: Spec) -> list[str]:
         """Apply lesson stops first, then the parts that differ from them. Returns the error sentences."""
         session, wrong = self._session, list[str]()
         parts = self._parts()
-        stops = sorted((key for key in parts if key.startswith(STOP)), key=lambda key: key in asked)
-        stopped = any(key in asked for key in stops)
-        others = [key for key in parts if key not in stops and (key in asked or not stopped)]
+        stops = sorted((key for key in parts if key.startswith(STOP)), key=lambda key: key in added)
+        stopped = any(key in added for key in stops)
+        others = [key for key in parts if key not in stops and (key in added or not stopped)]
         for keys in (stops, others):
             for key in keys:
                 try:
-                    if parts[key].place() != asked.get(key, ""):
-                        parts[key].take(asked.get(key, ""))
+                    if parts[key].place() != added.get(key, ""):
+                        parts[key].take(added.get(key, ""))
                 except InputError as error:
                     wrong.append(str(error))
             if keys is stops and spec.config != self._start.spec.config:
@@ -99,6 +99,6 @@ class Places:
         return wrong
 
 
-def _with(spec: Spec, asked: Spec) -> Spec:
-    """Return ``spec`` with the source, preset and settings of ``asked``."""
-    return replace(spec, source=asked.source, preset=asked.preset, config=asked.config)
+def _with(spec: Spec, other: Spec) -> Spec:
+    """Return ``spec`` with the source, preset and settings of ``other``."""
+    return replace(spec, source=other.source, preset=other.preset, config=other.config)

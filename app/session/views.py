@@ -32,7 +32,7 @@ class Views:
         self._framed_s = -ECHO_S
         self._turned: dict[str, View] = {}
         """By kind: the view that the user has turned to."""
-        self._asked: View | None = None
+        self._requested: View | None = None
         """The view that the address asks for, until the results of the address have been computed."""
 
     def frame(self, look: Callable[[], str], keep: bool) -> None:
@@ -54,18 +54,18 @@ class Views:
         if moved and not keep:
             self._turned.pop(kind, None)
         self._framed, self._before, self._framed_s = after, before, self._clock()
-        wanted = self._turned.get(kind) if self._asked is None else self._asked
-        if wanted is not None:
-            turn(self._client, wanted[1], wanted[0])
+        view = self._turned.get(kind) if self._requested is None else self._requested
+        if view is not None:
+            turn(self._client, view[1], view[0])
 
     def settle(self) -> None:
         """Treat the address's view as one turned by the user, now that all its results have been computed."""
-        if self._asked is not None:
-            self._turned[self._kind], self._asked = self._asked, None
+        if self._requested is not None:
+            self._turned[self._kind], self._requested = self._requested, None
 
     def place(self) -> str:
         """Return the view that the user has turned to as text; empty for the app's own view."""
-        view = self._asked
+        view = self._requested
         if view is None and (self._by_hand() or self._kind in self._turned):
             view = self._now()
         return "" if view is None else ",".join(f"{value:.3f}" for value in view.ravel())
@@ -81,14 +81,14 @@ class Views:
         except ValueError:
             view = np.zeros(1)
         if not place:
-            self._asked = None
+            self._requested = None
             if self._by_hand() or self._turned.pop(self._kind, None) is not None:
                 turn(self._client, self._framed[1], self._framed[0])
             return
         if view.shape != (6,) or not np.all(np.abs(view) < FARTHEST_M) or np.allclose(view[:3], view[3:]):
             raise InputError("The address has a camera that is not two places, x,y,z,x,y,z in metres")
-        self._asked = view.reshape(2, 3)
-        turn(self._client, self._asked[1], self._asked[0])
+        self._requested = view.reshape(2, 3)
+        turn(self._client, self._requested[1], self._requested[0])
 
     def _now(self) -> View:
         camera = self._client.camera
@@ -96,7 +96,7 @@ class Views:
 
     def _by_hand(self) -> bool:
         """Whether the view differs from the one the app turned to and from the one before that turn."""
-        if self._clock() - self._framed_s < ECHO_S or self._asked is not None:
+        if self._clock() - self._framed_s < ECHO_S or self._requested is not None:
             return False
         now = self._now()
         return not (_alike(now, self._framed) or _alike(now, self._before))

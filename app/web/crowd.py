@@ -41,7 +41,7 @@ class Visitor:
     """Whether its page has sent anything yet."""
     began_s: float = 0.0
     """Start of its session on this process's monotonic clock, seconds."""
-    told: bool = False
+    shows_waiting: bool = False
     """Whether the browser shows that it waits."""
 
 
@@ -96,9 +96,9 @@ class Crowd:
             except Exception:  # the failure may concern only this one
                 logger.exception("a session could not begin")
         with self._lock:
-            waiting = [one for one in self._waiting.values() if not one.told]
+            waiting = [one for one in self._waiting.values() if not one.shows_waiting]
         for one in waiting:
-            one.told = True
+            one.shows_waiting = True
             one.wait()
 
     def _next(self) -> Visitor | None:

@@ -78,19 +78,19 @@ class Gate:
         """Called with the number of a browser whose use of a shared control was refused."""
         self.on_too_much: Callable[[int, str], None] = lambda *_: None
         """Called with the number of a browser that uploads too much, and a sentence about it."""
-        private.listen(server, self._hear)
+        private.listen(server, self._on_message)
         server.on_client_disconnect(lambda client: self._guests.pop(client.client_id, None))
 
     def shows_page(self, number: int) -> bool:
         """Whether a browser has sent something that only a shown page sends."""
         return number in self._guests and self._guests[number].shows_page
 
-    async def _hear(self, number: int, message: Any, go_on: Callable[[], Awaitable[None]]) -> None:
+    async def _on_message(self, number: int, message: Any, go_on: Callable[[], Awaitable[None]]) -> None:
         guest = self._guests.setdefault(number, _Guest())
         if not isinstance(message, messages.FileTransferPart) and not _within_rate(guest):
             self.dropped[FLOOD] += 1
             return
-        rule = RULES.get(type(message), _nothing)
+        rule = RULES.get(type(message), _judge_unknown)
         verdict = rule(self, number, message)
         if verdict is Verdict.PASSES:
             guest.shows_page |= not isinstance(message, messages.ViewerCameraMessage)
@@ -123,11 +123,11 @@ class Gate:
         if verdict is Verdict.FORGED:
             return verdict
         if (touched := self._touch(number, found)) is not Verdict.PASSES:
-            private.tell_value(self._server, number, handle)
+            private.send_value(self._server, number, handle)
             self.on_refused(number)
             return touched
         if not private.is_live(handle):
-            private.tell_value(self._server, number, handle)
+            private.send_value(self._server, number, handle)
             return Verdict.LATE
         return verdict
 
@@ -236,11 +236,11 @@ class Gate:
         """Check a picture of the view that the server requested."""
         if not _is_name(message.render_uuid) or not isinstance(message.payload, bytes):
             return Verdict.FORGED
-        asked = private.is_asked_for_render(self._server, number)
-        return Verdict.PASSES if asked else Verdict.LATE
+        awaited = private.awaits_render(self._server, number)
+        return Verdict.PASSES if awaited else Verdict.LATE
 
 
-def _nothing(gate: Gate, number: int, message: Any) -> Verdict:
+def _judge_unknown(gate: Gate, number: int, message: Any) -> Verdict:
     return Verdict.FORGED
 
 
@@ -261,22 +261,22 @@ RULES: Mapping[type, Callable[[Gate, int, Any], Verdict]] = {
 """All messages that are allowed. The app has no forms, held buttons, draggable nodes or shared links."""
 
 
-def _ticked(handle: Any, value: object) -> Verdict:
+def _check_flag(handle: Any, value: object) -> Verdict:
     return Verdict.PASSES if isinstance(value, bool) else Verdict.FORGED
 
 
-def _pressed(handle: Any, value: object) -> Verdict:
+def _check_press(handle: Any, value: object) -> Verdict:
     return Verdict.PASSES if value is True else Verdict.FORGED
 
 
-def _written(handle: Any, value: object) -> Verdict:
+def _check_text(handle: Any, value: object) -> Verdict:
     """Check a line of text: no control characters, not too long."""
     if not isinstance(value, str) or any(category(letter) in ("Cc", "Cs") for letter in value[:MOST_TEXT]):
         return Verdict.FORGED
     return Verdict.PASSES if len(value) <= MOST_TEXT else Verdict.LATE
 
 
-def _chosen(handle: Any, value: object) -> Verdict:
+def _check_option(handle: Any, value: object) -> Verdict:
     """Check a chosen option; the list may have had other options when it was opened."""
     if not isinstance(value, str) or len(value) > MOST_TEXT:
         return Verdict.FORGED
@@ -285,22 +285,22 @@ def _chosen(handle: Any, value: object) -> Verdict:
     return Verdict.LATE
 
 
-def _counted(handle: Any, value: object) -> Verdict:
+def _check_number(handle: Any, value: object) -> Verdict:
     """Check a number: within the control's bounds, with no more decimals than it shows."""
-    return _number(handle, value, handle.value, handle.min, handle.max)
+    return _number_verdict(handle, value, handle.value, handle.min, handle.max)
 
 
-def _placed(handle: Any, value: object) -> Verdict:
+def _check_vector(handle: Any, value: object) -> Verdict:
     """Check each number of a vector in the same way."""
     count = len(handle.value)
     if not isinstance(value, tuple | list) or len(value) != count:
         return Verdict.FORGED
     least, most = (handle.min or (None,) * count), (handle.max or (None,) * count)
-    each = [_number(handle, *one) for one in zip(value, handle.value, least, most, strict=True)]
+    each = [_number_verdict(handle, *one) for one in zip(value, handle.value, least, most, strict=True)]
     return next((verdict for verdict in each if verdict is not Verdict.PASSES), Verdict.PASSES)
 
 
-def _number(handle: Any, value: Any, now: float, least: float | None, most: float | None) -> Verdict:
+def _number_verdict(handle: Any, value: Any, now: float, least: float | None, most: float | None) -> Verdict:
     if not _is_number(value) or (isinstance(now, int) and value != int(value)):
         return Verdict.FORGED
     digits = handle.precision
@@ -313,15 +313,15 @@ def _number(handle: Any, value: Any, now: float, least: float | None, most: floa
 
 
 VALUES: Mapping[type, Callable[[Any, object], Verdict]] = {
-    viser.GuiCheckboxHandle: _ticked,
-    viser.GuiButtonHandle: _pressed,
-    viser.GuiTextHandle: _written,
-    viser.GuiDropdownHandle: _chosen,
-    viser.GuiButtonGroupHandle: _chosen,
-    viser.GuiNumberHandle: _counted,
-    viser.GuiSliderHandle: _counted,
-    viser.GuiVector2Handle: _placed,
-    viser.GuiVector3Handle: _placed,
+    viser.GuiCheckboxHandle: _check_flag,
+    viser.GuiButtonHandle: _check_press,
+    viser.GuiTextHandle: _check_text,
+    viser.GuiDropdownHandle: _check_option,
+    viser.GuiButtonGroupHandle: _check_option,
+    viser.GuiNumberHandle: _check_number,
+    viser.GuiSliderHandle: _check_number,
+    viser.GuiVector2Handle: _check_vector,
+    viser.GuiVector3Handle: _check_vector,
 }
 """Checks of the values that a user can give a control; a browser cannot set other kinds of controls."""
 

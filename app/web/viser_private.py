@@ -61,7 +61,7 @@ def listen(server: viser.ViserServer, listener: Listener) -> None:
     shared = server._websock_server._handle_incoming_message
     own: dict[int, Callable[[int, Any], Awaitable[None]]] = {}
 
-    async def heard(number: Any, message: Any) -> None:
+    async def on_message(number: Any, message: Any) -> None:
         async def go_on() -> None:
             await shared(number, message)
             if number in own:
@@ -69,14 +69,14 @@ def listen(server: viser.ViserServer, listener: Listener) -> None:
 
         await listener(number, message, go_on)
 
-    async def heard_already(number: Any, message: Any) -> None:
-        """Do nothing: ``heard`` calls this browser's own handler too."""
+    async def ignore(number: Any, message: Any) -> None:
+        """Do nothing: ``on_message`` calls this browser's own handler too."""
 
     def connected(connection: Any) -> None:
         own[connection.client_id] = connection._handle_incoming_message
-        setattr(connection, "_handle_incoming_message", heard_already)  # noqa: B010
+        setattr(connection, "_handle_incoming_message", ignore)  # noqa: B010
 
-    setattr(server._websock_server, "_handle_incoming_message", heard)  # noqa: B010
+    setattr(server._websock_server, "_handle_incoming_message", on_message)  # noqa: B010
     server._websock_server.on_client_connect(connected)
     server._websock_server.on_client_disconnect(lambda connection: own.pop(connection.client_id, None))
 
@@ -136,14 +136,14 @@ def is_live(handle: Any) -> bool:
     return True
 
 
-def is_asked_for_render(server: viser.ViserServer, number: int) -> bool:
+def awaits_render(server: viser.ViserServer, number: int) -> bool:
     """Whether the server waits for a picture from a browser."""
     client = server._connected_clients.get(number)
     handlers = {} if client is None else client._websock_connection._incoming_handlers
     return bool(handlers.get(messages.GetRenderResponseMessage))
 
 
-def tell_value(server: viser.ViserServer, number: int, handle: Any) -> None:
+def send_value(server: viser.ViserServer, number: int, handle: Any) -> None:
     """Send a browser the control's value on the server."""
     client = server._connected_clients.get(number)
     if client is not None and not handle._impl.is_button:

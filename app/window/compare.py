@@ -107,13 +107,13 @@ class CompareArea:
         if not self._pictures:
             return
         left, right = (self._pictures[self._names[handle.value]] for handle in (self._left, self._right))
-        wanted = (id(left), id(right), float(self._split.value))
-        if wanted == self._drawn:
+        current = (id(left), id(right), float(self._split.value))
+        if current == self._drawn:
             return
-        if wanted[:2] != self._drawn[:2]:
+        if current[:2] != self._drawn[:2]:
             self._captions.content = captions_html(left, right)
-        self._drawn = wanted
-        self._image.image = split(left.rgb, right.rgb, wanted[2] / 100.0)
+        self._drawn = current
+        self._image.image = split(left.rgb, right.rgb, current[2] / 100.0)
 
 
 def place_text(left: str, right: str, percent: float) -> str:

@@ -78,7 +78,7 @@ class Awaited:
 
     def __init__(self, ui: Ui, handle: viser.GuiDropdownHandle[str], action: Callable[[], object]) -> None:
         """Keep the drop-down ``handle``; ``action`` is called after a change."""
-        self._ui, self._handle, self._action, self._asked = ui, handle, action, ""
+        self._ui, self._handle, self._action, self._requested = ui, handle, action, ""
         ui.when_changed(handle, self._picked)
 
     @property
@@ -87,41 +87,41 @@ class Awaited:
         return self._handle.value
 
     def _picked(self) -> None:
-        self._asked = ""
+        self._requested = ""
         self._action()
 
     def offer(self, names: tuple[str, ...], all_there: bool = True) -> None:
         """Set the names of the list. A name chosen or asked for before is selected if it is among them."""
-        chosen = self._asked or self.value
+        chosen = self._requested or self.value
         if names != self._handle.options:
             self._handle.options = names
         if chosen not in names:
             chosen = names[0]
-        elif chosen == self._asked:
-            self._asked = ""
+        elif chosen == self._requested:
+            self._requested = ""
         if chosen != self.value:
             self._handle.value = chosen
-        if all_there and self._asked:
-            unknown, self._asked = self._asked, ""
+        if all_there and self._requested:
+            unknown, self._requested = self._requested, ""
             self._ui.post(tell_unknown, unknown, names)
 
     def place(self) -> str:
         """Return the name chosen or asked for; empty for the first."""
-        return self._asked or ("" if self.value == self._handle.options[0] else self.value)
+        return self._requested or ("" if self.value == self._handle.options[0] else self.value)
 
     def take(self, place: str) -> None:
         """Choose a name, at once or as soon as the list has it."""
         name = place or self._handle.options[0]
-        self._asked = "" if name in self._handle.options else name
-        if not self._asked and name != self.value:
+        self._requested = "" if name in self._handle.options else name
+        if not self._requested and name != self.value:
             self._handle.value = name
             self._action()
 
 
-def tell_unknown(asked: str, names: Collection[str]) -> None:
+def tell_unknown(name: str, names: Collection[str]) -> None:
     """Report that an address names an entry that does not exist.
 
     Raises:
         InputError: always; the session shows it.
     """
-    raise InputError(f"The address has {asked[:40]}, which is not here; try one of {', '.join(names)}")
+    raise InputError(f"The address has {name[:40]}, which is not here; try one of {', '.join(names)}")

@@ -134,8 +134,7 @@
     before("bufferData", (target, data) => target === gl.ARRAY_BUFFER && uploaded(data?.length / 3));
   }
 
-  // The user's input may turn the view, so it ends the hold. Arrow keys on a slider do not reach viser's
-  // camera.
+  // The user's input may turn the view, so it ends the hold. Arrow keys on a slider never reach the camera.
   for (const kind of ["pointerdown", "pointerup", "wheel"])
     window.addEventListener(kind, () => { held = false; }, true);
   document.body.onkeydown = event => {
@@ -197,9 +196,8 @@
       until = performance.now() + HELD_MS;
     },
 
-    // Press a key once meshes with these vertex counts and all meshes still awaited are drawn. Without any,
-    // press
-    // it when the next frame is drawn if the view is or stays held, and else two frames later.
+    // Press a key once meshes with these vertex counts and all those still awaited are drawn. If there are
+    // none, press it when the next frame is drawn if the view is or stays held, and else two frames later.
     ask(vertices, hold) {
       watch();
       const question = ++asked;

@@ -15,7 +15,7 @@ from app.web.markup import Markup
 def stale_html(numbers: bool, picture: bool) -> Markup:
     """Return HTML that dims the panel's numbers or the 3-D picture, through the style sheet."""
     marks = {"packetmesh-old-numbers": numbers, "packetmesh-old-picture": picture}
-    found = (Markup('<i class="{}"></i>').format(mark) for mark, wanted in marks.items() if wanted)
+    found = (Markup('<i class="{}"></i>').format(mark) for mark, dimmed in marks.items() if dimmed)
     return Markup("").join(found)
 
 
@@ -33,7 +33,7 @@ def page_call(function: str, *arguments: object, mark: object = "") -> Markup:
         arguments: JSON values; the function gets the HTML element first, then these.
         mark: makes otherwise equal calls differ, because a page takes the same HTML only once.
     """
-    told = json.dumps(arguments, separators=(",", ":"))
+    encoded = json.dumps(arguments, separators=(",", ":"))
     return Markup('<i hidden data-packetmesh-call="{}" data-arguments="{}" data-mark="{}"></i>').format(
-        function, told, mark
+        function, encoded, mark
     )

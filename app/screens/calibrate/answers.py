@@ -31,8 +31,8 @@ class Answers:
         self._session, self._on_trust, self._on_depth = session, on_trust, on_depth
         self._trust: TrustView | None = None
         self._off: DepthErrorView | None = None
-        self._asked: tuple[Hashable, ...] = ()
-        self._asked_depth: tuple[Hashable, ...] = ()
+        self._requested_trust: tuple[Hashable, ...] = ()
+        self._requested_depth: tuple[Hashable, ...] = ()
         self._judging = False
 
     def trust_in(self, camera: CameraView) -> TrustView | None:
@@ -58,11 +58,11 @@ class Answers:
         if self._judging:
             return
         key = self._session.spec.key("calibrate")
-        if self._asked != (key, request):
-            self._asked, self._judging = (key, request), True
+        if self._requested_trust != (key, request):
+            self._requested_trust, self._judging = (key, request), True
             self._session.quick_job("calibrate.trust_job:trust_job", request, on_end=self._judged)
-        elif depth and self._asked_depth != (key, request.camera, view):
-            self._asked_depth = (key, request.camera, view)
+        elif depth and self._requested_depth != (key, request.camera, view):
+            self._requested_depth = (key, request.camera, view)
             job = "calibrate.depth_job:depth_job"
             self._session.quick_job(job, request.camera, view, on_end=self._compared)
 

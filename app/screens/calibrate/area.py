@@ -39,7 +39,7 @@ class PictureArea:
         ui.when_changed(self._split, self._draw)
 
     @property
-    def wanted(self) -> str:
+    def chosen_pair(self) -> str:
         """The chosen pair, one of ``PAIRS``."""
         return self._pair.value
 
@@ -57,7 +57,7 @@ class PictureArea:
 
     def place(self) -> str:
         """Return the pair by its pictures' names and the line in % for the address; empty for the start."""
-        pair = PAIRS[self.wanted]
+        pair = PAIRS[self.chosen_pair]
         now = (pair.left, pair.right, float(self._split.value))
         return "" if now == START else place_text(*now)
 
@@ -84,9 +84,9 @@ class PictureArea:
             self._pictures.get(name) or Picture(photo.rgb, f"{title.capitalize()}: {MISSING}")
             for name, title in zip((pair.left, pair.right), names, strict=True)
         )
-        wanted = (id(left.rgb), id(right.rgb), self._pair.value, float(self._split.value))
-        if wanted == self._drawn:
+        current = (id(left.rgb), id(right.rgb), self._pair.value, float(self._split.value))
+        if current == self._drawn:
             return
-        self._drawn = wanted
+        self._drawn = current
         self._captions.content = captions_html(left, right)
-        self._image.image = split(left.rgb, right.rgb, wanted[3] / 100.0)
+        self._image.image = split(left.rgb, right.rgb, current[3] / 100.0)

@@ -31,16 +31,16 @@ class DepthFolder:
             )
             self._note = gui.add_markdown(Markdown(""))
 
-    def load(self, told: BiasView | str | None) -> None:
+    def load(self, bias: BiasView | str | None) -> None:
         """Show a camera's bias; None is not computed yet, a text is the reason why there is none."""
-        found = told if isinstance(told, BiasView) else None
+        found = bias if isinstance(bias, BiasView) else None
         self._plot.visible = found is not None
         self._table.content = Markup("") if found is None else bias_table(found)
         if found is not None:
             self._plot.figure = bias_figure(found.curve)
             self._note.content = Markdown("{}.").format(found.note) if found.note else Markdown("")
         else:
-            self._note.content = Markdown.escape("Comparing depth with the board …" if told is None else told)
+            self._note.content = Markdown.escape("Comparing depth with the board …" if bias is None else bias)
 
 
 def bias_table(view: BiasView) -> Markup:

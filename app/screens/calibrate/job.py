@@ -26,7 +26,7 @@ def calibrate_job(store: Store, spec: Spec) -> Generator[Progress | CalibrationV
     yield view
     for index, camera in enumerate(view.cameras):
         done = CAMERAS_SHARE + (1.0 - CAMERAS_SHARE) * index / len(view.cameras)
-        told = yield from bias_of(store, views, found, camera.name, done)
-        view = replace(view, depth=view.depth | {camera.name: told if isinstance(told, str) else told.view})
+        bias = yield from bias_of(store, views, found, camera.name, done)
+        view = replace(view, depth=view.depth | {camera.name: bias if isinstance(bias, str) else bias.view})
         yield view
     return view

@@ -41,23 +41,24 @@ def map_picture(error_m: FloatArray, most_m: float, size_px: tuple[int, int], wh
     middle = error_m[error_m.shape[0] // 2, error_m.shape[1] // 2]
     worst = float(np.nanmax(error_m))
     labels = tuple(f"{1000.0 * value:.2g} mm" for value in np.linspace(0.0, most_m, 3))
-    told = f"{what} {1000.0 * middle:.2g} mm in the middle, {1000.0 * worst:.2g} mm at worst"
-    return Picture(rgb, told, ColorBar(DISTANCE_STOPS, labels))
+    caption = f"{what} {1000.0 * middle:.2g} mm in the middle, {1000.0 * worst:.2g} mm at worst"
+    return Picture(rgb, caption, ColorBar(DISTANCE_STOPS, labels))
 
 
 def coverage_picture(
-    told: Coverage, views: Sequence[FittedView], zoom: float, size_px: tuple[int, int]
+    coverage: Coverage, views: Sequence[FittedView], zoom: float, size_px: tuple[int, int]
 ) -> Picture:
     """Draw the number of points seen per cell; light grey for none."""
-    most = max(int(told.counts.max()), 1)
-    cells = ramp(told.counts.astype(float), float(most), DISTANCE_STOPS)
-    cells[told.counts == 0] = NO_POINTS
+    most = max(int(coverage.counts.max()), 1)
+    cells = ramp(coverage.counts.astype(float), float(most), DISTANCE_STOPS)
+    cells[coverage.counts == 0] = NO_POINTS
     rgb = cv2.resize(cells, size_px, interpolation=cv2.INTER_NEAREST)
     for view in views:
         _dots(rgb, view.points_px * zoom, SOURCE, 1)
     return Picture(
         rgb,
-        f"Points of all views, in {told.share:.0%} of the cells; grey: none, so the lens is guessed there",
+        f"Points of all views, in {coverage.share:.0%} of the cells; grey: none, "
+        "so the lens is guessed there",
         ColorBar(DISTANCE_STOPS, ("1", f"{most:,} points a cell")),
     )
 

@@ -37,7 +37,7 @@ class NoiseFolder:
         """
         self._on_replay, self._on_stop = on_replay, on_stop
         self._view: NoiseView | None = None
-        self._wanted: tuple[float, bool] | None = None
+        self._running: tuple[float, bool] | None = None
         """Noise and lens of the running replay."""
         gui = ui.gui
         self._resting = ui.debounce(REST_S, self._rested)
@@ -79,9 +79,9 @@ class NoiseFolder:
 
     def forget(self) -> None:
         """Remove the replay, which belongs to another camera or other views."""
-        if self._wanted is not None:
+        if self._running is not None:
             self._on_stop()
-        self._view = self._wanted = None
+        self._view = self._running = None
         self._dock.load(None)
         self._status.content = READY
 
@@ -91,7 +91,7 @@ class NoiseFolder:
 
     def load(self, view: NoiseView) -> None:
         """Show the trials so far; late ones of another replay are ignored."""
-        if not isinstance(view, NoiseView) or asked(view.request) != self._wanted or not view.trials:
+        if not isinstance(view, NoiseView) or setting_of(view.request) != self._running or not view.trials:
             return
         self._view = view
         self._dock.load(noise_sheet(view))
@@ -99,28 +99,28 @@ class NoiseFolder:
 
     def ended(self, view: NoiseView | None, request: NoiseRequest) -> None:
         """Handle the end of a replay; None if it was stopped or failed."""
-        if asked(request) != self._wanted:
+        if setting_of(request) != self._running:
             return
         if view is not None:
             self.load(view)
         elif self._view is None:
             self._status.content = STOPPED
-        self._wanted = None
+        self._running = None
 
     def _moved(self) -> None:
         """Stop the running replay at once; start when the slider is at rest."""
-        if self._wanted is not None:
+        if self._running is not None:
             self._on_stop()
         self._resting.restart()
 
     def _rested(self) -> None:
-        self._wanted, self._view = (float(self._sigma.value), self._through.value == OTHER), None
+        self._running, self._view = (float(self._sigma.value), self._through.value == OTHER), None
         self._status.content = Markdown("The first trials are coming …")
         self._dock.begin()
-        self._on_replay(*self._wanted)
+        self._on_replay(*self._running)
 
 
-def asked(request: NoiseRequest) -> tuple[float, bool]:
+def setting_of(request: NoiseRequest) -> tuple[float, bool]:
     """Return the part of a request that the controls set."""
     return request.sigma_px, request.other_lens
 
@@ -128,7 +128,7 @@ def asked(request: NoiseRequest) -> tuple[float, bool]:
 def noise_line(view: NoiseView) -> Markdown:
     """Return the experiment's result in some sentences."""
     whole = view.trials >= view.request.trials
-    told = Markdown(
+    result = Markdown(
         "**{}.** fx, fy, cx and cy are all within {:g} % of the truth in **{:.0f} %** of them. "
         "RMS {:.3f} px; noise alone leaves {:.3f} px at most."
     ).format(
@@ -139,6 +139,6 @@ def noise_line(view: NoiseView) -> Markdown:
         np.sqrt(2.0) * view.request.sigma_px,
     )
     if not view.halved:
-        return told
+        return result
     beyond = f"{view.beyond_noise} of {view.halved}"
-    return Markdown("{} Two halves of the views differ beyond noise in **{}** trials.").format(told, beyond)
+    return Markdown("{} Two halves of the views differ beyond noise in **{}** trials.").format(result, beyond)

@@ -71,12 +71,12 @@ def noise_job(
     true = camera.calibration
     exact = _seen(true, request.other_lens)
     empty = NoiseView(request, true.names, np.array([true.parameters[name] for name in true.names]))
-    trials, told_s = _Trials(), time.monotonic()
+    trials, reported_s = _Trials(), time.monotonic()
     for trial in range(request.trials):
         halves = request.sigma_px > 0.0 and trial % HALVED == 0
         _repeat(trials, true, _with_noise(exact, request.sigma_px, trial), halves)
-        if time.monotonic() - told_s > SHOW_S:
-            told_s = time.monotonic()
+        if time.monotonic() - reported_s > SHOW_S:
+            reported_s = time.monotonic()
             yield Progress(f"trial {trial + 1} of {request.trials}", (trial + 1) / request.trials)
             yield trials.view(empty)
     return trials.view(empty)

@@ -190,10 +190,10 @@ def strongest_sentence(pair: Pair) -> str:
             f"the views tell all numbers apart; the nearest to each other are {one} and {other}, at {size}."
         )
     way = "together" if pair.correlation > 0.0 else "against each other"
-    return f"{one} and {other} go {way} at {size}: {parted_by(pair)}."
+    return f"{one} and {other} go {way} at {size}: {separating_views(pair)}."
 
 
-def parted_by(pair: Pair) -> str:
+def separating_views(pair: Pair) -> str:
     """Return the kind of views that separates a pair of parameters."""
     names = (pair.first, pair.second)
     if all(name in (*FOCAL, DISTANCE) for name in names):

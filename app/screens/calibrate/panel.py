@@ -87,7 +87,7 @@ class CalibratePanel(Panel):
 
     def _build_folders(self) -> None:
         ui, session = self.ui, self.session
-        self._judge = TrustFolder(ui, self._ask)
+        self._judge = TrustFolder(ui, self._request_answers)
         self._parameters = ParameterFolder(ui)
         self._depth = DepthFolder(ui)
         self._rig = RigFolder(ui)
@@ -114,12 +114,12 @@ class CalibratePanel(Panel):
         if views is None and self._here and isinstance(self._source, Demo):
             folder = board_views_of(self._source.name)
             views = None if folder is None else views_in(folder)
-        self._want(views)
+        self._use_views(views)
 
     def _open_scene(self, name: str) -> None:
         self.session.want(replace(self.session.spec, source=Demo(name), views=None))
 
-    def _want(self, views: BoardViews | None) -> None:
+    def _use_views(self, views: BoardViews | None) -> None:
         if views is not None:
             self._lens.one_camera(not several(views))
             views = replace(views, lens=self._lens.lens, bent=self._lens.bent)
@@ -223,7 +223,7 @@ class CalibratePanel(Panel):
         if camera is not None:
             trust = self._answers.trust_in(camera)
             self._parameters.relate(None if trust is None else trust.together)
-            self._ask()
+            self._request_answers()
 
     def _pick(self, name: str) -> None:
         """Show another view."""
@@ -239,24 +239,24 @@ class CalibratePanel(Panel):
             return
         if not picture_of(camera, chosen).found:
             raise InputError(f"In view {chosen} no board was found, so it is left out already.")
-        self._want(replace(views, dropped=tuple(sorted(set(views.dropped) ^ {(camera.name, chosen)}))))
+        self._use_views(replace(views, dropped=tuple(sorted(set(views.dropped) ^ {(camera.name, chosen)}))))
 
     def _keep_all(self) -> None:
         if (views := self.session.spec.views) is not None:
-            self._want(replace(views, dropped=()))
+            self._use_views(replace(views, dropped=()))
 
     def _picked_lens(self) -> None:
         self._whole = {}
-        self._want(self.session.spec.views)
+        self._use_views(self.session.spec.views)
 
     # Requests besides the chain.
 
-    def _ask(self) -> None:
+    def _request_answers(self) -> None:
         """Request the verdict, and the depth of the chosen view if it is shown."""
         camera = self._shown()
         if camera is not None and camera.calibration is not None:
             request = self._judge.request(camera.name)
-            self._answers.ask(request, self._photographs.chosen, self._photographs.area.wanted == DEPTH)
+            self._answers.ask(request, self._photographs.chosen, self._photographs.area.chosen_pair == DEPTH)
 
     def _judged(self, view: TrustView | None) -> None:
         with self.ui.atomic():
@@ -281,13 +281,13 @@ class CalibratePanel(Panel):
     def _use_it(self) -> None:
         """Write the calibration that is shown, and let the chain use it."""
         self._uses += 1
-        self._use.say(WRITING)
+        self._use.show_status(WRITING)
         folder = str(self.session.new_folder() / f"calibration_{self._uses:02d}")
         self.session.quick_job("calibrate.use_job:use_job", folder, on_end=self._written)
 
     def _written(self, folder: str | None) -> None:
         if folder is None:
-            self._use.say("")
+            self._use.show_status("")
             return
         source: Any = self._source
         self._use.used(folder)
@@ -319,7 +319,7 @@ class CalibratePanel(Panel):
         self._look = look
         views = self.session.spec.views
         if views is not None:
-            self._want(replace(views, dropped=()))
+            self._use_views(replace(views, dropped=()))
         if self.session.results.fresh("calibrate", self.session.spec):
             self._show_look()
 
@@ -332,7 +332,7 @@ class CalibratePanel(Panel):
         self._show_camera()
         dropped = sorted(one for camera in self._whole.values() for one in left_out(camera, look.keep))
         if dropped:
-            self._want(replace(views, dropped=tuple(dropped)))
+            self._use_views(replace(views, dropped=tuple(dropped)))
         if look.noise_px is not None:
             self._noise.set(look.noise_px, look.other_lens)
         if look.used and not isinstance(self.session.spec.source, Calibrated):

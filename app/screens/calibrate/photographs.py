@@ -50,7 +50,7 @@ class Photographs:
         self._names: tuple[str, ...] = ()
         self.chosen = ""
         """Name of the view that is shown, or will be shown once it exists."""
-        self._asked = ""
+        self._requested = ""
         self._bars = Bars(ui, on_pick)
         self._row = ui.buttons(
             "View",
@@ -69,10 +69,10 @@ class Photographs:
             self._bars.show((), "")
             return
         self._names = tuple(one.name for one in camera.photographs)
-        asked, self._asked = self._asked, ""
+        requested, self._requested = self._requested, ""
         if self.chosen not in self._names:
-            if asked and self.chosen == asked:
-                self._ui.post(tell_unknown, asked, self._names)
+            if requested and self.chosen == requested:
+                self._ui.post(tell_unknown, requested, self._names)
             self.chosen = self._names[0]
         trust = self._answers.trust_in(camera)
         self._bars.show(bars_of(camera, () if trust is None else trust.outliers), self.chosen)
@@ -90,7 +90,7 @@ class Photographs:
 
     def take(self, place: str) -> None:
         """Show the view of this name, at once or as soon as it exists."""
-        self._asked = place
+        self._requested = place
         self._on_pick(place or next(iter(self._names), ""))
 
     def _go(self, count: int) -> None:
@@ -265,12 +265,12 @@ def bars_html(bars: tuple[Bar, ...], chosen: str) -> Markup:
 def _column(bar: Bar, most: float, chosen: bool) -> Markup:
     name = bar.name
     if bar.rms_px is None:
-        told, inside = f"View {name}: no board found", Markup('<b style="color: {}">✕</b>').format(css(LOSS))
+        label, inside = f"View {name}: no board found", Markup('<b style="color: {}">✕</b>').format(css(LOSS))
     else:
-        told = f"View {name}: {bar.rms_px:.3f} px"
+        label = f"View {name}: {bar.rms_px:.3f} px"
         if bar.unseen_rms_px is not None and not bar.dropped:
-            told += f", {bar.unseen_rms_px:.3f} px by a lens that has not seen it"
-        told += ", dropped" if bar.dropped else ", out of line" if bar.suspect else ""
+            label += f", {bar.unseen_rms_px:.3f} px by a lens that has not seen it"
+        label += ", dropped" if bar.dropped else ", out of line" if bar.suspect else ""
         color = css(SOURCE) if chosen else css(LOSS) if bar.suspect else css(BRAND)
         tall = max(LEAST_PX, round(HEIGHT_PX * bar.rms_px / most))
         faint = "opacity: 0.3;" if bar.dropped else ""
@@ -292,4 +292,4 @@ def _column(bar: Bar, most: float, chosen: bool) -> Markup:
     return Markup(
         '<button type="button" data-packetmesh-pick="{}" title="{}" aria-label="{}" aria-pressed="{}" '
         'style="{}">{}</button>'
-    ).format(name, told, told, pressed, look, inside)
+    ).format(name, label, label, pressed, look, inside)

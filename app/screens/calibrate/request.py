@@ -50,8 +50,8 @@ def several(views: BoardViews) -> bool:
 def true_parameters(views: BoardViews, camera: str) -> dict[str, float]:
     """Return fx, fy, cx, cy, k1 and so on of a rendered camera; empty for real ones."""
     try:
-        told = json.loads(Path(views.folder, TRUTH).read_text(encoding="utf-8"))
-        true = told["cameras"][camera]
+        record = json.loads(Path(views.folder, TRUTH).read_text(encoding="utf-8"))
+        true = record["cameras"][camera]
         places = {name: float(true[name]) for name in ("fx", "fy", "cx", "cy")}
         lens = zip(("k1", "k2", "p1", "p2", "k3"), true["distortion"], strict=False)
         return places | {name: float(value) for name, value in lens}

@@ -57,11 +57,11 @@ def rig_table(rig: RigView) -> Markup:
 
 def rig_line(rig: RigView) -> Markdown:
     """Return a sentence on the fit of the whole rig and on held-out moments."""
-    told = f"RMS over all cameras {rig.rms_px:.3f} px"
+    rms_text = f"RMS over all cameras {rig.rms_px:.3f} px"
     if rig.held_out_rms_px is None:
-        return Markdown("{}; there are too few shared moments to hold some out.").format(told)
+        return Markdown("{}; there are too few shared moments to hold some out.").format(rms_text)
     moved = [one.held_out_position_m for one in rig.cameras[1:] if one.held_out_position_m is not None]
     return Markdown(
         "{}, {:.3f} px in moments that were held out; without a quarter of the "
         "moments no camera moves by more than {:.2f} mm."
-    ).format(told, rig.held_out_rms_px, 1000.0 * max(moved, default=0.0))
+    ).format(rms_text, rig.held_out_rms_px, 1000.0 * max(moved, default=0.0))

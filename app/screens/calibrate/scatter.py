@@ -74,14 +74,14 @@ def errors_html(view: NoiseView, cell: Cell | None) -> Markup:
     lines = [Markup("").join(Markup('<th style="{}">{}</th>').format(pad, head) for head in ("", *heads))]
     for name in view.names:
         digits, unit = (2, "px") if name in UNITS else (4, "")
-        told = [number(view.rmse(name), digits, unit), number(view.predicted(name), digits, unit)]
+        values = [number(view.rmse(name), digits, unit), number(view.predicted(name), digits, unit)]
         off = None if cell is None else cell.error(name, view.true(name))
-        told += (
+        values += (
             []
             if cell is None
             else ["–" if off is None else f"{off:+.{digits}f} {unit}".strip().replace("-", "−")]
         )
-        cells = Markup("").join(Markup('<td style="{}">{}</td>').format(pad, one) for one in told)
+        cells = Markup("").join(Markup('<td style="{}">{}</td>').format(pad, one) for one in values)
         lines.append(
             Markup('<td style="{}">{}</td>{}').format(pad, term(name, MEANING.get(name, name)), cells)
         )
@@ -153,9 +153,9 @@ def _add_dots(
     y: FloatArray,
     marker: dict[str, object],
     names: tuple[str, str],
-    told: str,
+    label: str,
 ) -> None:
-    hover = f"{told}<br>{names[0]} %{{x:.5g}}<br>{names[1]} %{{y:.5g}}<extra></extra>"
+    hover = f"{label}<br>{names[0]} %{{x:.5g}}<br>{names[1]} %{{y:.5g}}<extra></extra>"
     figure.add_scatter(x=x, y=y, mode="markers", marker=marker, hovertemplate=hover)
 
 

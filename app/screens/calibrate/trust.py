@@ -23,11 +23,11 @@ CURVES = {"distortion": "How far the lens moves a point", "left": "What it leave
 class TrustFolder:
     """Range and accuracy, the camera's errors there, and two curves of its lens."""
 
-    def __init__(self, ui: Ui, on_ask: Callable[[], None]) -> None:
-        """Add the folder; ``on_ask`` is called when the camera is to be judged again."""
+    def __init__(self, ui: Ui, on_change: Callable[[], None]) -> None:
+        """Add the folder; ``on_change`` is called when the camera is to be judged again."""
         self._view: TrustView | None = None
         self._own_m = OWN_M
-        self._resting = ui.debounce(REST_S, on_ask)
+        self._resting = ui.debounce(REST_S, on_change)
         gui = ui.gui
         with gui.add_folder("Good enough for what?", expand_by_default=False):
             gui.add_markdown(

@@ -37,12 +37,12 @@ def trust_job(store: Store, spec: Spec, request: TrustRequest) -> Generator[Prog
 
     def judge() -> Generator[Progress, None, TrustView]:
         yield Progress(f"trust in {camera.name}", 0.5)
-        return _judged(camera, request, known.board, len(known.cameras) == 1 and not views.bent)
+        return _trust_view(camera, request, known.board, len(known.cameras) == 1 and not views.bent)
 
     return (yield from store.remember(("trust", views, request), judge))
 
 
-def _judged(camera: CameraView, request: TrustRequest, board: Board, may_bend: bool) -> TrustView:
+def _trust_view(camera: CameraView, request: TrustRequest, board: Board, may_bend: bool) -> TrustView:
     """Return the verdict; ``may_bend``: a bent board has not been tried yet."""
     lens = camera.calibration
     assert lens is not None
@@ -84,11 +84,11 @@ def _judged(camera: CameraView, request: TrustRequest, board: Board, may_bend: b
 def _lines(trust: Trust, lens: Calibration, may_bend: bool) -> Iterator[str]:
     """Yield the verdict and the advice, as the screen shows them."""
     judged, halves, following = trust.verdict, trust.halves, trust.following
-    asked = f"{1000.0 * judged.accuracy_m:g} mm at {judged.range_m:g} m"
+    target = f"{1000.0 * judged.accuracy_m:g} mm at {judged.range_m:g} m"
     most = 1000.0 * judged.error_of_most_m
     reached = f"within {most:.2g} mm" if np.isfinite(most) else "nowhere, as the lens folds back,"
     yield (
-        f"{'Good enough' if judged.passed else 'Not good enough'} for {asked}: a point is placed that well "
+        f"{'Good enough' if judged.passed else 'Not good enough'} for {target}: a point is placed that well "
         f"over {100.0 * judged.share:.0f} % of the image, and {reached} over 95 % of it."
     )
     if halves is not None and halves.beyond_noise and not judged.passed:

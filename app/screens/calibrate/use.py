@@ -34,7 +34,7 @@ class UseRow:
         """Show the row if there is a calibration to use."""
         self._row.visible = visible
 
-    def say(self, sentence: str) -> None:
+    def show_status(self, sentence: str) -> None:
         """Show a status sentence."""
         self._text.content = Markdown.escape(sentence)
 

@@ -43,7 +43,7 @@ class HideFolder:
             gui.add_markdown(TEXT)
             self._add_brush(ui)
             gui.add_button(BUTTON, icon=viser.Icon.ERASER, hint="It takes some seconds.").on_click(
-                lambda _: ui.post(self._ask)
+                lambda _: ui.post(self._request)
             )
             self._status = gui.add_markdown(Markdown(""))
             self._area = CompareArea(ui, FILLS, "hidden", "ours", visible=False)
@@ -85,13 +85,13 @@ class HideFolder:
         else:
             self._paint((*self.discs, disc))
 
-    def ask(self, request: HideRequest) -> None:
+    def set(self, request: HideRequest) -> None:
         """Paint the discs and press the button."""
         last = request.discs[-1]
         self._x.value, self._y.value = round(100.0 * last.x_share), round(100.0 * last.y_share)
         self._size.value = round(100.0 * last.size_share)
         self._paint(request.discs)
-        self._ask()
+        self._request()
 
     def clear(self) -> None:
         """Remove all discs and the filled depth."""
@@ -133,7 +133,7 @@ class HideFolder:
         if self._cloud is not None:
             self._drawing.draw(self._cloud, self._T_world_camera, discs)
 
-    def _ask(self) -> None:
+    def _request(self) -> None:
         """Request the filling of the discs; without any, of the one that the sliders set."""
         if not self.discs:
             self._add()

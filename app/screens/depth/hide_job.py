@@ -42,7 +42,7 @@ def hide_job(store: Store, spec: Spec, request: HideRequest) -> Generator[Progre
     hidden = hidden_pixels(frame.depth, request.discs)
     rest = DepthMap(np.where(hidden, np.float32(np.nan), frame.depth.z_m))
     filled_by = partial(
-        believed, node.network.depth, rest, frame.rgb, disparity=node.alignment.disparity, hidden=hidden
+        accepted_depth, node.network.depth, rest, frame.rgb, disparity=node.alignment.disparity, hidden=hidden
     )
     ways: dict[str, Callable[[], DepthMap]] = {
         "ours": partial(filled_by, spec.config.depth),
@@ -79,7 +79,7 @@ def hidden_pixels(sensor: DepthMap, discs: Sequence[Disc]) -> BoolArray:
     return hidden
 
 
-def believed(
+def accepted_depth(
     inferred: DepthMap,
     rest: DepthMap,
     rgb: ByteArray,

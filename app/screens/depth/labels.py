@@ -44,12 +44,12 @@ FILLS = {
     "joint-bilateral": "joint bilateral fill",
 }
 """The hidden part: as measured, hidden, and filled by each method."""
-AS_IT_SAYS = "as the file says"
+AS_IN_FILE = "as the file says"
 
 
-def _told(literal: object) -> dict[str, Any]:
+def _choices(literal: object) -> dict[str, Any]:
     """Return the choices of a network's property; None takes it from the network's file."""
-    return {AS_IT_SAYS: None, **{name: name for name in get_args(literal)}}
+    return {AS_IN_FILE: None, **{name: name for name in get_args(literal)}}
 
 
-NETWORK_PRESETS, NETWORK_KINDS, NORMALISATIONS = map(_told, (NetworkPreset, ModelKind, Normalisation))
+NETWORK_PRESETS, NETWORK_KINDS, NORMALISATIONS = map(_choices, (NetworkPreset, ModelKind, Normalisation))

@@ -73,7 +73,7 @@ def numbers(scene: SceneView, index: int, node: DepthNode) -> Numbers:
         "flying": judged.flying_share,
         "out_of_reach": judged.out_of_reach_share,
     }
-    told = {name: number(share, 1, "%", 100.0) for name, share in shares.items()}
+    values = {name: number(share, 1, "%", 100.0) for name, share in shares.items()}
     errors = {"median": node.residuals.median_m, "rms": node.residuals.rms_m}
-    told |= {name: number(error_m, 1, "cm", 100.0) for name, error_m in errors.items()}
-    return {SCENE: f"{scene.title}, {node.name}", **told}
+    values |= {name: number(error_m, 1, "cm", 100.0) for name, error_m in errors.items()}
+    return {SCENE: f"{scene.title}, {node.name}", **values}

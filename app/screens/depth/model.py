@@ -7,7 +7,7 @@ from pathlib import Path
 
 import viser
 
-from app.screens.depth.labels import AS_IT_SAYS, NETWORK_KINDS, NETWORK_PRESETS, NORMALISATIONS
+from app.screens.depth.labels import AS_IN_FILE, NETWORK_KINDS, NETWORK_PRESETS, NORMALISATIONS
 from app.screens.depth.view import ModelChoice, ModelView
 from app.web.markup import Markdown, Markup
 from app.web.uploads import OWN, keep_upload
@@ -91,10 +91,10 @@ class ModelFolder:
         if name is None:
             name = self._add(Path(str(config.model)).name, str(config.model))
         self._model.value = name
-        self._preset.value = config.preset or AS_IT_SAYS
-        self._kind.value = config.model_kind or AS_IT_SAYS
+        self._preset.value = config.preset or AS_IN_FILE
+        self._kind.value = config.model_kind or AS_IN_FILE
         self._size.value = (float(config.input_width_px or 0), float(config.input_height_px or 0))
-        self._normalisation.value = config.normalisation or AS_IT_SAYS
+        self._normalisation.value = config.normalisation or AS_IN_FILE
         self._advanced.visible = config.model is not None
 
     def load(self, view: ModelView | None) -> None:
@@ -107,7 +107,7 @@ class ModelFolder:
 
     def _picked(self) -> None:
         """Take another file with the input size and normalisation of the file itself."""
-        self._size.value, self._normalisation.value = (0.0, 0.0), AS_IT_SAYS
+        self._size.value, self._normalisation.value = (0.0, 0.0), AS_IN_FILE
         self._chosen()
 
     def _chosen(self) -> None:

@@ -82,7 +82,7 @@ class DepthPanel(Panel):
             gui.add_markdown(shipped_markdown(WORTH.read_text("utf-8")))
             self._controls.append(self._fields(CONFIDENCE_CONTROLS))
             self._confidence_table = gui.add_html(Markup(""))
-        self._hide = HideFolder(self.ui, self._ask_to_hide)
+        self._hide = HideFolder(self.ui, self._request_filling)
         self._model = ModelFolder(self.ui, session.folder, self._choose_model)
         with gui.add_folder("Advanced", expand_by_default=False):
             self._drawn = gui.add_dropdown(
@@ -191,7 +191,7 @@ class DepthPanel(Panel):
             assert isinstance(node.sensor, SeenSample)
             self._hide.show(node.sensor, scene.nodes[index].T_world_camera)
 
-    def _ask_to_hide(self, request: HideRequest) -> None:
+    def _request_filling(self, request: HideRequest) -> None:
         session, spec, shown = self.session, self.session.spec, self._shown()
         if shown is None or not session.results.fresh("depth", spec):
             self._hide.load(None)
@@ -260,4 +260,4 @@ class DepthPanel(Panel):
             return
         self._look = None
         if look.hide is not None:
-            self._hide.ask(look.hide)
+            self._hide.set(look.hide)

@@ -52,12 +52,12 @@ class Board:
         """Show the error of every lane at one of its steps."""
         if self._view is not None:
             seen = list(zip(self._view.lanes, rows, strict=True))
-            said = [{**score(lane, row), "lens": _bytes(lane.steps[row].lens)} for lane, row in seen]
-            self._tell(self._state, kind="state", lanes=said)
+            scores = [{**score(lane, row), "lens": _bytes(lane.steps[row].lens)} for lane, row in seen]
+            self._send(self._state, kind="state", lanes=scores)
 
     def _send_setup(self) -> None:
         lanes = () if self._view is None else self._view.lanes
-        self._tell(
+        self._send(
             self._setup,
             kind="setup",
             visible=self._visible and bool(lanes),
@@ -67,8 +67,8 @@ class Board:
             scale=scale("truth" if self._view is None else self._view.reference),
         )
 
-    def _tell(self, handle: Any, **what: Any) -> None:
-        handle.content = page_call("board", {"dock": self._name, **what})
+    def _send(self, handle: Any, **fields: Any) -> None:
+        handle.content = page_call("board", {"dock": self._name, **fields})
 
 
 def _head(mark: str, lane: RaceLane) -> dict[str, str]:

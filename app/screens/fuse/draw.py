@@ -113,8 +113,7 @@ class RaceDrawing:
     def add_gizmo(
         self, start: Start, on_drag: Callable[[Start, bool], None]
     ) -> viser.TransformControlsHandle:
-        """Add a gizmo that moves the cloud of the first lane; ``on_drag`` gets the start and whether the drag
-        has ended."""
+        """Add a gizmo for the first lane's cloud; ``on_drag`` gets the start and whether the drag ended."""
         handle = self._scene.add_transform_controls(f"{self._below}/lane0/gizmo", scale=0.5, depth_test=False)
         place(handle, gizmo_pose(start, self._view.center_m))
 

@@ -93,12 +93,12 @@ ALIKE_M = 0.005
 
 def numbers(scene: str, race: Race, view: RaceView) -> Numbers:
     """Return the fields' values for a race; errors are from the reference position or the other cloud."""
-    told = dict.fromkeys(NUMBERS, UNKNOWN)
+    values = dict.fromkeys(NUMBERS, UNKNOWN)
     for place, lane in enumerate(view.lanes, 1):
-        told[f"end_{place}"] = number(lane.steps[-1].off_m, 2, "cm", 100.0)
-        told[f"iterations_{place}"] = str(lane.iterations)
-        told[f"time_{place}"] = number(lane.elapsed_s, 0, "ms", 1000.0)
-    told |= {
+        values[f"end_{place}"] = number(lane.steps[-1].off_m, 2, "cm", 100.0)
+        values[f"iterations_{place}"] = str(lane.iterations)
+        values[f"time_{place}"] = number(lane.elapsed_s, 0, "ms", 1000.0)
+    values |= {
         "begin": number(view.lanes[0].steps[0].off_m, 1, "cm", 100.0),
         "turn": f"{np.linalg.norm(race.start.turn_deg):.0f}°",
         "shift": number(float(np.linalg.norm(race.start.shift_cm)), 0, "cm"),
@@ -107,22 +107,22 @@ def numbers(scene: str, race: Race, view: RaceView) -> Numbers:
         "noise": number(race.noise_m, 0, "cm", 100.0),
     }
     ends_m = {lane.rival: lane.steps[-1].off_m for lane in view.lanes}
-    return {SCENE: scene, **told, **_verdicts(ends_m)}
+    return {SCENE: scene, **values, **_verdicts(ends_m)}
 
 
 def _verdicts(ends_m: Mapping[Rival, float]) -> dict[str, str]:
     """Return words: whether plane or weights help more, and how the methods without entropy compare."""
-    told = {}
+    words = {}
     plane_m, weights_m = ends_m.get(("icp", "plane")), ends_m.get(("ceicp-a", "point"))
     if plane_m is not None and weights_m is not None:
-        told["more"] = _which(weights_m, plane_m, ("weights", "alike", "plane"))
+        words["more"] = _which(weights_m, plane_m, ("weights", "alike", "plane"))
     own_m, others_m = (
         min((end_m for (method, _), end_m in ends_m.items() if method in methods), default=None)
         for methods in (("ceicp-n", "ceicp-a"), ("trimmed-icp", "ficp"))
     )
     if own_m is not None and others_m is not None:
-        told["others"] = _which(own_m, others_m, ("far", "close", "nearer"))
-    return told
+        words["others"] = _which(own_m, others_m, ("far", "close", "nearer"))
+    return words
 
 
 def _which(one_m: float, other_m: float, words: tuple[str, str, str]) -> str:

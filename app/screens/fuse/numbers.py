@@ -73,7 +73,7 @@ def race_table(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markup:
             "Stopped",
             "converged: it moves less than 0.1 mm and 0.1 mrad; stalled: no change of the error; limit: the "
             "most iterations allowed; degenerate: too few pairs to go on; lost: no pair within the gate.",
-            lambda x: _stopped(x.stop_reason),
+            lambda x: _stop_word(x.stop_reason),
         ),
         row(
             f"Start {word}",
@@ -110,7 +110,7 @@ def race_table(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markup:
     return table(rows, MARKS[: len(lanes)], [color_of(lane.rival) for lane in lanes])
 
 
-def _stopped(reason: str) -> str:
+def _stop_word(reason: str) -> str:
     """Return the reason of the stop in one word."""
     head = reason.partition(":")[0]
     return "lost" if reason.startswith("No point") else STOPS.get(head, head)
@@ -121,9 +121,9 @@ def places_table(view: FuseView) -> Markup:
     if not view.rows:
         return Markup("")
     rows = [_place_row(row) for row in view.rows]
-    said = [Markup("<b>The chain's own result.</b>{}").format(_agreeing(view)), *view.sentences]
+    lines = [Markup("<b>The chain's own result.</b>{}").format(_agreeing(view)), *view.sentences]
     return Markup("<div style='padding: 0 0.8em; font-size: 13px'>{}</div>").format(
-        Markup("<br>").join(said)
+        Markup("<br>").join(lines)
     ) + table(rows, ("iterations", "error before", "after"))
 
 

@@ -44,7 +44,7 @@ from app.window.controls import Controls
 from app.window.in_address import STOP, CallbackState, Picked
 from app.window.panel import Offers, Panel
 
-_Wanted: TypeAlias = tuple[tuple[Hashable, ...], Race]
+_RaceRequest: TypeAlias = tuple[tuple[Hashable, ...], Race]
 """The key of the clouds and the race of them."""
 
 
@@ -54,11 +54,11 @@ class FusePanel(Panel):
     title = "Fuse"
     step: ClassVar[Step | None] = "fuse"
     drawn_below = "/fuse"
-    _raced: _Wanted | None
+    _raced: _RaceRequest | None
     """The race that was submitted last."""
-    _arrived: _Wanted | None
+    _arrived: _RaceRequest | None
     """The race that is shown."""
-    _mapped: _Wanted | None
+    _mapped: _RaceRequest | None
     """The race whose capture range was submitted last."""
 
     def build(self) -> None:
@@ -213,7 +213,7 @@ class FusePanel(Panel):
     def _lesson_numbers(self) -> Numbers:
         """Return the numbers of the current race; empty while it is computed."""
         scene = self.session.results.view("scene")
-        if scene is None or self._view is None or self._wanted() != self._arrived:
+        if scene is None or self._view is None or self._request() != self._arrived:
             return {}
         return numbers(scene.title, self._setup.race, self._view)
 
@@ -249,16 +249,16 @@ class FusePanel(Panel):
         session = self.session
         if session.results.view("depth") is None or not session.results.fresh("fuse", session.spec):
             return True
-        wanted = self._wanted()
-        if wanted != self._raced:
-            if self._mapped not in (None, _anywhere(wanted)):
+        request = self._request()
+        if request != self._raced:
+            if self._mapped not in (None, _anywhere(request)):
                 self._capture.forget()
-            self._raced = wanted
-            ended = functools.partial(self._finished, wanted)
-            session.side_job("fuse.race_job:race_job", wanted[1], on_end=ended)
-        return wanted != self._arrived
+            self._raced = request
+            ended = functools.partial(self._finished, request)
+            session.side_job("fuse.race_job:race_job", request[1], on_end=ended)
+        return request != self._arrived
 
-    def _wanted(self) -> _Wanted:
+    def _request(self) -> _RaceRequest:
         return (self.session.spec.key("fuse"), self._setup.race)
 
     def _forget(self) -> None:
@@ -271,13 +271,13 @@ class FusePanel(Panel):
             self._table.content = self._rows.content = Markup("")
             self._capture.forget()
 
-    def _finished(self, wanted: _Wanted, view: RaceView | None) -> None:
-        if wanted != self._raced:
+    def _finished(self, request: _RaceRequest, view: RaceView | None) -> None:
+        if request != self._raced:
             return
         if view is None:
             self._raced = None
             return
-        self._arrived, self._drawn = wanted, wanted[1].start
+        self._arrived, self._drawn = request, request[1].start
         self._take_race(view)
 
     def _take_race(self, view: RaceView) -> None:
@@ -349,13 +349,13 @@ class FusePanel(Panel):
         if session.results.view("depth") is None:
             return
         self._capture.wait()
-        self._mapped = wanted = _anywhere(self._wanted())
-        ended = functools.partial(self._take_capture, wanted)
-        session.side_job("fuse.capture_job:capture_job", wanted[1], on_end=ended)
+        self._mapped = request = _anywhere(self._request())
+        ended = functools.partial(self._take_capture, request)
+        session.side_job("fuse.capture_job:capture_job", request[1], on_end=ended)
 
-    def _take_capture(self, wanted: _Wanted, view: CaptureView | None) -> None:
+    def _take_capture(self, request: _RaceRequest, view: CaptureView | None) -> None:
         with self.ui.atomic():
-            self._capture.load(view if wanted == _anywhere(self._wanted()) else None)
+            self._capture.load(view if request == _anywhere(self._request()) else None)
         self._start()
 
     # The 3-D view.
@@ -391,6 +391,6 @@ class FusePanel(Panel):
         self._result.place(before=self._shown.value == BEFORE)
 
 
-def _anywhere(wanted: _Wanted) -> _Wanted:
+def _anywhere(request: _RaceRequest) -> _RaceRequest:
     """Return the race without its start, on which its capture range does not depend."""
-    return (wanted[0], replace(wanted[1], start=Start()))
+    return (request[0], replace(request[1], start=Start()))

@@ -35,7 +35,7 @@ class RaceSetup:
         """Start without controls; the panel adds them in its own order."""
         self._ui, self._on_change = ui, on_change
         self._race = FIRST
-        self._asked = False
+        self._from_address = False
         """Whether the nodes are those of an address, although the scene may not be loaded yet."""
         self._slots: list[viser.GuiDropdownHandle[str]] = []
 
@@ -137,15 +137,15 @@ class RaceSetup:
         if tuple(names) != tuple(self._source.options):
             self._source.options = self._target.options = tuple(names)
             self._source.value, self._target.value = names[min(1, len(names) - 1)], names[0]
-            if self._asked:
+            if self._from_address:
                 self._show_nodes()
-        self._asked = False
+        self._from_address = False
         self._race = self._read(self._race)
 
     def choose(self, race: Race) -> None:
         """Show another race between its own nodes, now or when the scene's nodes are known."""
         self.write(race)
-        self._race, self._asked = race, True
+        self._race, self._from_address = race, True
         self._show_nodes()
 
     def _show_nodes(self) -> None:

@@ -132,10 +132,10 @@ class DeliveryDrawing:
         node = next(one for one in self._view.nodes if one.name == name)
         return self._places_m[node.row] if node.row >= 0 else node.T_world_camera[:3, 3]
 
-    # The state at a time.
+    # The state at the clock's time.
 
     def show(self, now_ns: int, shown_ns: int) -> None:
-        """Show the frames at a time; flights last at least ``shown_ns``, and losses stay that long."""
+        """Show the frames at ``now_ns``; flights last at least ``shown_ns``, and losses stay that long."""
         at = self._places_m
         points, colors = self._flights.packets(now_ns, shown_ns, at)
         lost_m, red = self._flights.losses(now_ns, shown_ns, at)

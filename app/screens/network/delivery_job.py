@@ -91,14 +91,14 @@ def sending_of(store: Store, spec: Spec) -> Generator[Progress, None, Sending]:
 
 def _send(spec: Spec) -> Generator[Progress, None, Sending]:
     yield Progress("sending the images", 0.02)
-    sent = _asked(spec)
+    sent = _sent_of(spec)
     return send(DeliverySpec(spec, sent.network, sent.coding, sent.moments, sent.down))
 
 
 def _delivered(store: Store, spec: Spec) -> Steps:
     started = time.perf_counter()
     sending = yield from sending_of(store, spec)
-    view = _first_view(sending, _asked(spec), time.perf_counter() - started)
+    view = _first_view(sending, _sent_of(spec), time.perf_counter() - started)
     yield view
     rebuilder, count = Rebuilder(sending), len(sending.times_ns)
     moments: list[MomentView] = []
@@ -120,7 +120,7 @@ def moment_of(
     return (yield from store.remember(("moment", spec.key("network"), index), compute))
 
 
-def _asked(spec: Spec) -> Sent:
+def _sent_of(spec: Spec) -> Sent:
     assert spec.sent is not None
     return spec.sent
 

@@ -186,9 +186,9 @@ def changes(before: DeliveryView, after: DeliveryView) -> str:
 
 def _network_changes(before: NetworkConfig, after: NetworkConfig) -> list[str]:
     """Return changed places and walls in words, and other settings as they are written."""
-    words, told = [], {"nodes.count", "nodes.places_m", "radio.walls_m", "radio.wall_db"}
+    words, described = [], {"nodes.count", "nodes.places_m", "radio.walls_m", "radio.wall_db"}
     if before.mac.kind != after.mac.kind:  # which brings its radio's power
-        told |= {f"energy.{state}_w" for state in ("tx", "rx", "idle", "sleep")}
+        described |= {f"energy.{state}_w" for state in ("tx", "rx", "idle", "sleep")}
     if before.nodes.places_m != after.nodes.places_m:
         words.append("radios moved" if after.nodes.places_m else "radios at their cameras again")
     walls = [
@@ -196,7 +196,7 @@ def _network_changes(before: NetworkConfig, after: NetworkConfig) -> list[str]:
     ]
     if walls[0] != walls[1]:
         words.append(f"a wall of {after.radio.wall_db:g} dB" if after.radio.walls_m else "no wall")
-    return words + [word for word in differences(after, before) if word.partition("=")[0] not in told]
+    return words + [word for word in differences(after, before) if word.partition("=")[0] not in described]
 
 
 def _shares(*shares: float | None) -> tuple[str, ...]:

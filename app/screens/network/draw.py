@@ -132,7 +132,7 @@ class NetworkDrawing:
         self._add_scale_bar()
 
     def show(self, now_ns: int, shown_ns: int) -> None:
-        """Show the state at a time.
+        """Show the state at ``now_ns``.
 
         Args:
             now_ns: simulated time.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from app.screens.network.delivery_draw import DeliveryDrawing
 from app.screens.network.delivery_view import DeliveryView, PacketView
 from app.screens.network.labels import PICK
-from app.screens.network.packets import Frames, told
+from app.screens.network.packets import Frames, packet_sentence
 from app.web.markup import Markdown
 from app.window.ui import Ui
 
@@ -70,6 +70,6 @@ class Inspector:
     def _light(self, story: Markdown, packet: PacketView | None) -> None:
         if packet is None or self._drawing is None:
             return
-        self._text.content = Markdown("{}\n\n{}").format(story, told(packet))
+        self._text.content = Markdown("{}\n\n{}").format(story, packet_sentence(packet))
         with self._ui.atomic():
             self._drawing.light(packet)

@@ -154,7 +154,7 @@ def numbers(scene: str, view: DeliveryView, frames: Frames) -> Numbers:
     if end is None or end.t_ns != view.times_ns[-1]:
         return {}
     best, total = view.lossless, max(1, view.total_bytes)
-    told = dict.fromkeys(NUMBERS, UNKNOWN) | _frame_numbers(view, frames)
+    values = dict.fromkeys(NUMBERS, UNKNOWN) | _frame_numbers(view, frames)
     shares = {
         "arrived": end.delivered_bytes / total,
         "color": float(np.mean([node.color_share for node in end.nodes])),
@@ -164,9 +164,9 @@ def numbers(scene: str, view: DeliveryView, frames: Frames) -> Numbers:
         "missed_lossless": None if best is None else best.no_hit_share,
         "f_score_lossless": None if best is None else best.f_score,
     }
-    told |= {name: number(share, 1, "%", 100.0) for name, share in shares.items()}
+    values |= {name: number(share, 1, "%", 100.0) for name, share in shares.items()}
     return {
-        **told,
+        **values,
         SCENE: scene,
         "cameras": str(len(view.nodes)),
         "megabytes": number(view.total_bytes, 2, "MB", 1e-6),

@@ -97,7 +97,7 @@ class Frames:
         return "arrived"
 
 
-def told(packet: PacketView) -> str:
+def packet_sentence(packet: PacketView) -> str:
     """Return a sentence on the part of an image in a packet."""
     parts = []
     for what, pixels in (("depth", packet.depth), ("colour", packet.color)):

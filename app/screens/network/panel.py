@@ -87,7 +87,7 @@ class NetworkPanel(Panel):
         self._resting = ui.debounce(REST_S, self._run)
         self._hand = ui.debounce(HAND_S, self._show_moment)
         self._look: NetworkLook | None = None
-        self._asked_ns: int | None = None
+        self._requested_ns: int | None = None
         """The moment that an address asks for, until its run is there."""
         self._text = gui.add_markdown(TEXT)
         self._difference = gui.add_markdown(Markdown(""))
@@ -223,13 +223,13 @@ class NetworkPanel(Panel):
         if preset.street:
             runs = setup.runs()
             self._labels = tuple(runs)
-            asked = replace(session.spec, networks=tuple(runs.values()), sent=None)
+            spec = replace(session.spec, networks=tuple(runs.values()), sent=None)
         else:
-            asked = replace(session.spec, networks=(), sent=setup.sent())
-        there = session.results.fresh("network", asked)
+            spec = replace(session.spec, networks=(), sent=setup.sent())
+        there = session.results.fresh("network", spec)
         if not there:
             self._status.content = RUNNING
-        session.want(asked)
+        session.want(spec)
         if there:
             self.on_view("network", session.results.view("network"))
 
@@ -292,20 +292,20 @@ class NetworkPanel(Panel):
 
     def _moment(self) -> str:
         """Return the simulated seconds for the address; empty for the clock's first time."""
-        if self._asked_ns is None and (self._drawing is None or self._dock.rest_ns == self._first_ns()):
+        if self._requested_ns is None and (self._drawing is None or self._dock.rest_ns == self._first_ns()):
             return ""
-        at_ns = self._dock.rest_ns if self._asked_ns is None else self._asked_ns
+        at_ns = self._dock.rest_ns if self._requested_ns is None else self._requested_ns
         return f"{at_ns / 1e9:.9f}".rstrip("0").rstrip(".")
 
     def _take_moment(self, text: str) -> None:
         if text and re.fullmatch(r"\d{1,7}(\.\d+)?", text) is None:
             raise InputError(f"The address has t={text[:20]}; try simulated seconds, such as 3.5")
-        self._asked_ns = round(1e9 * float(text)) if text else None
+        self._requested_ns = round(1e9 * float(text)) if text else None
         spec, delivery = self.session.spec, self._delivery
         streams = delivery is not None and delivery.sent == spec.sent
         if (streams or self.session.results.fresh("network", spec)) and self._drawing is not None:
-            self._dock.seek(self._first_ns() if self._asked_ns is None else self._asked_ns)
-            self._asked_ns = None
+            self._dock.seek(self._first_ns() if self._requested_ns is None else self._requested_ns)
+            self._requested_ns = None
 
     def _take_look(self, lesson: str, look: NetworkLook) -> None:
         """Send as a stop of a lesson sets; its place is shown when the frames are there."""
@@ -334,9 +334,9 @@ class NetworkPanel(Panel):
         look, self._look = self._look, None
         if look is not None:
             self._aim_at(look, run)
-        if self._asked_ns is not None:
-            self._dock.seek(self._asked_ns)
-            self._asked_ns = None
+        if self._requested_ns is not None:
+            self._dock.seek(self._requested_ns)
+            self._requested_ns = None
 
     def _aim_at(self, look: NetworkLook, run: NetworkView) -> None:
         t_ns, item = find(look.at, run, self._frames[0])

@@ -132,9 +132,9 @@ def _waits(events: Events, nodes: int, horizon_ns: int) -> Pieces:
     keys, first = np.unique(ended.packet.astype(np.int64) * nodes + ended.node, return_index=True)
     end_ns = np.full(len(entered), horizon_ns, np.int64)
     if len(keys):
-        wanted = entered.packet.astype(np.int64) * nodes + entered.node
-        at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-        found = keys[at] == wanted
+        entry_keys = entered.packet.astype(np.int64) * nodes + entered.node
+        at = np.minimum(np.searchsorted(keys, entry_keys), len(keys) - 1)
+        found = keys[at] == entry_keys
         end_ns[found] = ended.t_ns[first[at[found]]]
     waits = _pieces(entered, What.WAIT, end_ns)
     return waits.where(waits.end_ns > waits.start_ns)

@@ -48,7 +48,7 @@ class NetworkSetup:
         self._ways = ways(FIRST)
         self._own: dict[str, str] = {}
         """Values of the controls before the user changes them."""
-        self._wished: dict[str, str] = {}
+        self._pending: dict[str, str] = {}
         """Values for the nodes, which are known only after a delivery has come."""
         self._preset = gui.add_dropdown("Preset", list(TITLES), hint="Which network carries the images.")
         self._coding = gui.add_dropdown(
@@ -138,7 +138,7 @@ class NetworkSetup:
 
     def place(self) -> str:
         """Return the settings as text for the address."""
-        values, own = self._values() | self._wished, self._own | {"preset": FIRST}
+        values, own = self._values() | self._pending, self._own | {"preset": FIRST}
         return text_of({"preset": self.preset, **values}, own)
 
     def take_place(self, place: str) -> None:
@@ -147,18 +147,18 @@ class NetworkSetup:
         Raises:
             InputError: some of the text is unknown; all else is set.
         """
-        asked, wrong = values_of(place), list[InputError]()
-        preset = asked.pop("preset", FIRST)
+        values, wrong = values_of(place), list[InputError]()
+        preset = values.pop("preset", FIRST)
         self.reset()
         if preset in NETWORKS:
             self._preset.value = NETWORKS[preset].title
             self._load()
         else:
             wrong.append(InputError(f"The address has the network {preset[:40]}; try {', '.join(NETWORKS)}"))
-        self._wished = {name: asked.pop(name) for name in OF_NODES if name in asked}
-        self._text.value, self._beside_text.value = asked.pop("extra", ""), asked.pop("beside-extra", "")
+        self._pending = {name: values.pop(name) for name in OF_NODES if name in values}
+        self._text.value, self._beside_text.value = values.pop("extra", ""), values.pop("beside-extra", "")
         handles = self._handles()
-        for name, text in asked.items():
+        for name, text in values.items():
             try:
                 if name not in handles:
                     raise InputError(f"The address has {name[:40]} of a network, which is no control of it")
@@ -175,11 +175,11 @@ class NetworkSetup:
 
     def grant(self) -> bool:
         """Apply node settings that were requested before the nodes existed. Returns whether any were."""
-        wished, what_if = self._wished, self.what_if
-        if not wished or not what_if.in_room:
+        pending, what_if = self._pending, self.what_if
+        if not pending or not what_if.in_room:
             return False
-        self._wished, moved = {}, wished.pop("moved", "").split(",")
-        for name, text in wished.items():
+        self._pending, moved = {}, pending.pop("moved", "").split(",")
+        for name, text in pending.items():
             if text in what_if.handles[name].options:
                 what_if.handles[name].value = text
         for name, *place_m in zip(moved[::3], moved[1::3], moved[2::3], strict=False):
@@ -224,7 +224,7 @@ class NetworkSetup:
         self._retransmit.value = look.again and self._retransmit.value
         self._moments.value = MOMENTS
         self.what_if.forget()
-        self._wished = {"off": look.off} if look.off else {}
+        self._pending = {"off": look.off} if look.off else {}
         self.grant()
         self._extra = look.settings
         self._text.value = " ".join(look.settings)

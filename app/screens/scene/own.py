@@ -87,7 +87,7 @@ class OwnFolder:
             self._add_button("Recording …", RECORDINGS, self._keep_recording)
             self._notes = gui.add_markdown(Markdown(""))
 
-    def tell(self, notes: tuple[str, ...]) -> None:
+    def show_notes(self, notes: tuple[str, ...]) -> None:
         """Show the notes on a recording; none clears them."""
         self._notes.content = Markdown("\n").join(Markdown("- {}").format(note) for note in notes)
 
@@ -119,7 +119,7 @@ class OwnFolder:
 
     def _keep_recording(self, file: viser.UploadedFile) -> None:
         path = keep_upload(file, self._new_folder() / OWN, RECORDING_LIMIT_BYTES, INSTEAD)
-        self.tell(("Reading the recording …",))
+        self.show_notes(("Reading the recording …",))
         stem = re.sub(r"[^A-Za-z0-9._-]+", "-", Path(file.name).stem).strip(".-")[:40]
         self._on_recording(path, stem or "rig", self._depth_scale, int(self._frames.value))
 

@@ -147,9 +147,9 @@ class ScenePanel(Panel):
 
     def _use_recording(self, read: ReadRecording | None) -> None:
         if read is None:
-            self._own.tell(("Nothing could be used.",))
+            self._own.show_notes(("Nothing could be used.",))
             return
-        self._own.tell(read.notes)
+        self._own.show_notes(read.notes)
         self.session.want(dataclasses.replace(self.session.spec, source=read.source))
 
 

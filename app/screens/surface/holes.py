@@ -21,7 +21,7 @@ along the mesh, so it also has gaps that no camera looks into: a *hole* is a loo
 )
 NONE = "none"
 LISTED_HOLES, LISTED_RIMS = 30, 10
-ASKING = Markdown("Looking for the reason …")
+LOOKING = Markdown("Looking for the reason …")
 SILENT = Markdown(
     "No answer came, since something else was computed instead. Click the hole again to ask once more."
 )
@@ -41,17 +41,17 @@ class HolesFolder:
     def __init__(
         self,
         ui: Ui,
-        on_ask: Callable[[Which, int], None],
+        on_explain: Callable[[Which, int], None],
         on_fill: Callable[[float | None], None],
     ) -> None:
         """Add the folder.
 
         Args:
             ui: panel to add it to.
-            on_ask: called with a surface and the index of its hole to explain.
+            on_explain: called with a surface and the index of its hole to explain.
             on_fill: called with the length in metres of the longest hole to fill; None for none.
         """
-        self._on_ask, self._on_fill = on_ask, on_fill
+        self._on_explain, self._on_fill = on_explain, on_fill
         self._holes: dict[Which, tuple[HoleView, ...]] = {}
         self._alone: Which | None = None
         self._which: Which | None = None
@@ -189,8 +189,8 @@ class HolesFolder:
             self._why.content = self._invitation()
             return
         self._drawing.draw(self._shown[index], names[index].partition(":")[0], self._offset_m)
-        self._why.content = ASKING
-        self._on_ask(self._which, index)
+        self._why.content = LOOKING
+        self._on_explain(self._which, index)
 
     @property
     def _shown(self) -> tuple[HoleView, ...]:

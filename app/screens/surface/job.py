@@ -33,7 +33,7 @@ def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, N
     after = rolled.value
     rig, placement = yield from store.stages(spec, "rig", "placement")
     in_photographs = functools.partial(dressed, rig, placement)
-    view_after = _worn(after, in_photographs)
+    view_after = _textured_view(after, in_photographs)
     size_m = POINT_SHARE * clouds.r_F_m
     unused: dict[Which, UnusedView] = {"after": unused_view(clouds.fused, after, size_m)}
     view = SurfaceView(
@@ -42,7 +42,7 @@ def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, N
     yield view
     before, both = yield from store.stages(spec, "before", "clouds")
     unused["before"] = unused_view(both.sensor, before, size_m)
-    view_before = _worn(before, in_photographs)
+    view_before = _textured_view(before, in_photographs)
     view = replace(view, before=view_before, unused=unused)
     yield view
     truth_before, truth_after = yield from store.stage(spec, "truth")
@@ -62,7 +62,7 @@ def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, N
     )
 
 
-def _worn(surface: SurfaceResult, in_photographs: Callable[[Surface], Texture]) -> MeshView:
+def _textured_view(surface: SurfaceResult, in_photographs: Callable[[Surface], Texture]) -> MeshView:
     """Return a surface in photographs without its seams, with the triangle count of the ball's mesh."""
     closed = without_seams(surface)
     view = mesh_view(closed, None, in_photographs(closed))

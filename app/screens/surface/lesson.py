@@ -99,16 +99,16 @@ def numbers(scene: str, view: SurfaceView, baselines: Mapping[BaselineName, Base
     """Return the fields' values for the surfaces in a scene."""
     poisson = baselines.get("poisson")
     meshes = {"": view.after, "_before": view.before, "_poisson": None if poisson is None else poisson.mesh}
-    told: dict[str, str] = {SCENE: scene}
+    values: dict[str, str] = {SCENE: scene}
     for which, mesh in meshes.items():
-        told |= {f"{name}{which}": value for name, value in _measures(mesh).items()}
+        values |= {f"{name}{which}": value for name, value in _measures(mesh).items()}
     r_F_m, sigma_D_m, ball_m = view.spacing.r_F_m, view.spacing.sigma_D_m, view.radii_m[-1]
     lengths = {"r_f": r_F_m, "sigma_d": sigma_D_m, "ball": ball_m, "ball_width": 2.0 * ball_m}
     lengths |= {"cut_off": ball_m / 2.0**0.5, "thesis_ball": r_F_m + sigma_D_m}
     lengths |= {"largest_ball": r_F_m + 4.0 * sigma_D_m}
-    told |= {name: number(length_m, 0, "mm", 1000.0) for name, length_m in lengths.items()}
-    told["better"] = UNKNOWN if poisson is None else _better(view.after, poisson.mesh)
-    return {**told, "hole_area": number(view.after.quality.hole_area_m2, 3, "m²")}
+    values |= {name: number(length_m, 0, "mm", 1000.0) for name, length_m in lengths.items()}
+    values["better"] = UNKNOWN if poisson is None else _better(view.after, poisson.mesh)
+    return {**values, "hole_area": number(view.after.quality.hole_area_m2, 3, "m²")}
 
 
 def _better(ball: MeshView, poisson: MeshView) -> str:

@@ -45,7 +45,7 @@ class QuickLook:
         self._next: PaintRequest | None = None
         self._rolling = False
         self._detail = Detail()
-        self._asked_s: float | None = None
+        self._submitted_s: float | None = None
 
     @property
     def moving(self) -> bool:
@@ -69,7 +69,7 @@ class QuickLook:
         ready = session.results.fresh("fuse", session.spec)
         if ready and request is not None and not self._rolling and not self._acknowledgement.waiting:
             self._rolling, self._next = True, None
-            self._asked_s = time.monotonic()
+            self._submitted_s = time.monotonic()
             request = replace(request, most_points=self._detail.points)
             session.quick_job("surface.paint_job:paint_job", request, on_end=self._came)
 
@@ -81,9 +81,9 @@ class QuickLook:
             self._go_on()
 
     def _drawn(self) -> None:
-        if self._asked_s is not None:
-            self._detail.took(time.monotonic() - self._asked_s)
-            self._asked_s = None
+        if self._submitted_s is not None:
+            self._detail.took(time.monotonic() - self._submitted_s)
+            self._submitted_s = None
         self._on_drawn()
         self._go_on()
 

@@ -58,7 +58,7 @@ class RollingFolder:
         self._drawing: RollingDrawing | None = None
         self._drawn = 0
         self._waiting = self._here = False
-        self._asked: int | None = None
+        self._requested_step: int | None = None
         """Step of the walk that an address asks for, until it is played."""
         with ui.gui.add_folder("Watch the ball roll", expand_by_default=False):
             ui.gui.add_markdown(TEXT)
@@ -96,9 +96,9 @@ class RollingFolder:
 
     def place(self) -> str:
         """Return ``close-after-120`` for the address: kind, cloud and step; empty without a walk."""
-        if self._asked is None and self._view is None:
+        if self._requested_step is None and self._view is None:
             return ""
-        step = self._dock.rest_ns // COUNT_NS if self._asked is None else self._asked
+        step = self._dock.rest_ns // COUNT_NS if self._requested_step is None else self._requested_step
         return f"{WAYS[self._way.value]}-{CLOUDS[self._cloud.value]}-{step}"
 
     def take(self, place: str) -> None:
@@ -108,19 +108,20 @@ class RollingFolder:
             InputError: there is no such walk.
         """
         if not place:
-            self._asked = None
+            self._requested_step = None
             self._close()
             return
         found = re.fullmatch(r"(\w+)-(\w+)-(\d{1,9})", place)
         ways, clouds = ({value: name for name, value in names.items()} for names in (WAYS, CLOUDS))
         if found is None or found[1] not in ways or found[2] not in clouds:
             raise InputError(f"The address has ball={place[:30]}; try such as close-after-120")
-        self._way.value, self._cloud.value, self._asked = ways[found[1]], clouds[found[2]], int(found[3])
+        self._way.value, self._cloud.value = ways[found[1]], clouds[found[2]]
+        self._requested_step = int(found[3])
         self._request()
 
     def resume(self) -> None:
         """Request the walk that an address asked for, now that there is a surface."""
-        if self._asked is not None:
+        if self._requested_step is not None:
             self._request()
 
     def load(self, view: WalkView | None) -> None:
@@ -139,11 +140,11 @@ class RollingFolder:
             stops_ns = COUNT_NS * np.arange(view.steps + 1)
             self._dock.load(0, COUNT_NS * view.steps, stops_ns, [front_lane(view)], "step", run_s)
             self._dock.show(self._here)
-        if self._asked is not None:
-            self._dock.seek(COUNT_NS * self._asked)
+        if self._requested_step is not None:
+            self._dock.seek(COUNT_NS * self._requested_step)
         elif self._here:
             self._dock.play()
-        self._asked = None
+        self._requested_step = None
 
     def forget(self) -> None:
         """Remove the walk, whose cloud or radii are no longer the screen's."""

@@ -38,9 +38,9 @@ def sweep_figure(view: SweepView | None, below: str = WORK) -> go.Figure:
         template="plotly_white",
         margin={"l": 48, "r": 48, "t": 20, "b": 36},
         xaxis=_radius_axis(view),
-        yaxis={"title": _titled(("no hit", NO_HIT), ("≤ 1 cm, %", ACCURATE)), "range": [0, 104]},
-        yaxis2={"title": _titled((left, LEFT)), "rangemode": "tozero"},
-        yaxis3={"title": _titled((right, RIGHT)), "rangemode": "tozero", "showgrid": False},
+        yaxis={"title": _colored_title(("no hit", NO_HIT), ("≤ 1 cm, %", ACCURATE)), "range": [0, 104]},
+        yaxis2={"title": _colored_title((left, LEFT)), "rangemode": "tozero"},
+        yaxis3={"title": _colored_title((right, RIGHT)), "rangemode": "tozero", "showgrid": False},
         showlegend=False,
         font={"size": 11},
         hovermode="closest",
@@ -104,7 +104,8 @@ def sweep_sentence(view: SweepView) -> Markdown:
     if missed[-1] >= missed[best] + LEVEL_SHARE:
         parts.append(f"the widest, {_mm(last)}, misses {missed[-1]:.1%} again")
     if level < len(rows) - 1 and math.isfinite(start.accuracy_1cm):
-        parts.append(f"accuracy within 1 cm {_went(start.accuracy_1cm, last.accuracy_1cm)} up to {_mm(last)}")
+        change = _change_text(start.accuracy_1cm, last.accuracy_1cm)
+        parts.append(f"accuracy within 1 cm {change} up to {_mm(last)}")
     return Markdown("; ").join(parts) + Markdown(".")
 
 
@@ -112,7 +113,7 @@ def _mm(row: SweepPoint) -> str:
     return f"{1000 * row.radius_m:.0f} mm"
 
 
-def _went(first: float, last: float) -> str:
+def _change_text(first: float, last: float) -> str:
     """Return the change as text; rounded shares are compared, so that 93 % does not rise to 93 %."""
     before, after = round(100 * first), round(100 * last)
     if before == after:
@@ -120,7 +121,7 @@ def _went(first: float, last: float) -> str:
     return f"{'falls' if after < before else 'rises'} from {before} to {after} %"
 
 
-def _titled(*parts: tuple[str, str]) -> str:
+def _colored_title(*parts: tuple[str, str]) -> str:
     return ", ".join(f"<span style='color:{color}'>{text}</span>" for text, color in parts)
 
 
