@@ -1,1 +1,1 @@
-"""The camera network: nodes, radio, sink. Headless; knows neither the app nor the pipeline."""
+"""The camera network: nodes, radio, sink. It runs without a display and imports neither app nor pipeline."""

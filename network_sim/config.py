@@ -1,4 +1,4 @@
-"""One frozen config a part of the network: command line, controls, preset and record in one."""
+"""Frozen config dataclasses, one for each part of the network, from which all settings are generated."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ Keep = Literal["all", "images", "counters"]
 Scenario = Literal["collection", "street-grid"]
 
 MAX_PAYLOAD_BYTES: dict[MacKind, int] = {"ieee802154": 116, "ieee80211b": 2304}
-"""Largest payload of a frame: 127 B less 11 B of header and check sum, and IEEE 802.11's largest."""
+"""Largest payload of a frame: 127 B less 11 B of header and check sum, and the limit of IEEE 802.11."""
 
 
 @dataclass(frozen=True, slots=True)
 class LossConfig:
-    """Data frames that get lost on their link besides what the medium does to them (SPEC 6.5)."""
+    """Random losses of data frames on their link, in addition to those on the channel (SPEC 6.5)."""
 
     share: float = 0.0
-    """Share of the data frames that get lost on every link, those that are sent again included."""
+    """Share of the data frames that get lost on every link, retransmissions included."""
     burst_packets: float = 1.0
-    """Mean length of a run of lost frames (Gilbert-Elliott); 1 loses each frame by itself."""
+    """Mean length of a run of lost frames (Gilbert-Elliott); 1 makes the losses independent."""
 
     def __post_init__(self) -> None:
         share("loss.share", self.share)
@@ -55,7 +55,7 @@ class RadioConfig:
     reference_m: float = 1.0
     """Distance up to which log-distance is free space."""
     shadowing_db: float = 0.0
-    """Standard deviation of each pair's own constant gain or loss."""
+    """Standard deviation of the gain or loss that each pair of nodes has for the whole run."""
     nakagami_m: float | None = None
     """Shape of the fading drawn for each frame; 1 is Rayleigh, larger fades less, None is no fading."""
     range_m: float = 100.0
@@ -67,9 +67,9 @@ class RadioConfig:
     noise_dbm: float | None = None
     """Power of the noise; None receives everything above the threshold without bit errors."""
     walls_m: tuple[float, ...] = ()
-    """x and y of one end and of the other of each wall, in a row."""
+    """x and y of both ends of each wall, four numbers per wall."""
     wall_db: float = 10.0
-    """What a wall takes of the power over every link that crosses it."""
+    """Power lost at each wall that a link crosses."""
 
     def __post_init__(self) -> None:
         lengths = ("antenna_height_m", "range_m", "reference_m")
@@ -86,7 +86,7 @@ class RadioConfig:
 
 @dataclass(frozen=True, slots=True)
 class MacConfig:
-    """Who may send when (SPEC 6.1, 6.3)."""
+    """Medium access: who may send when (SPEC 6.1, 6.3)."""
 
     kind: MacKind = "ieee802154"
     """Unslotted IEEE 802.15.4, IEEE 802.11b DCF, a link of its own for every node (ideal), a serial line
@@ -124,7 +124,7 @@ class NodesConfig:
     spacing_m: float = 20.0
     """Distance to the sink (star) or between neighbours (line, grid; on average: random)."""
     places_m: tuple[float, ...] = ()
-    """x and y of every node and, last, of the sink, in a row; empty places them by the layout."""
+    """x and y of every node and, last, of the sink, two numbers per node; empty places them by the layout."""
     images: int = 1
     """Images of each node; 0 takes them until the horizon."""
     interval_s: float = 0.0
@@ -132,16 +132,16 @@ class NodesConfig:
     image_bytes: int = 921_615
     """Size of a colour image as encoded; a 640 x 480 PPM file by default."""
     depth_bytes: int = 0
-    """Size of the depth image that goes with it, and follows it as one image's bytes; 0 sends none."""
+    """Size of the depth image that is sent after each colour image, as part of it; 0 sends none."""
     bytes_by_node: tuple[int, ...] = ()
     """Size of each node's own image, depth included; empty gives every node both sizes above."""
     payload_bytes: int = 116
     """Bytes that a packet hands to the medium access."""
     header_bytes: int = 0
-    """How many of these are headers above it (fragment, UDP, IP)."""
+    """Bytes of the payload that are headers of higher layers (fragment, UDP, IP)."""
     buffer_packets: int = 200
-    """Packets that wait in a node; a relay drops what comes when it is full, a camera fills half of it at
-    most and keeps the rest of its images outside."""
+    """Packets that wait in a node; a full relay drops arriving packets, a camera fills at most half of the
+    buffer and keeps its other fragments outside."""
     retransmit: bool = True
     """Fragments that were given up are sent again until the sink has the image."""
     deadline_s: float | None = None
@@ -177,7 +177,7 @@ class NodesConfig:
             )
 
     def size_bytes(self, node: int) -> int:
-        """Size of a node's image, with the depth that goes with it."""
+        """Return the bytes of one image of a node, depth image included."""
         return self.bytes_by_node[node] if self.bytes_by_node else self.image_bytes + self.depth_bytes
 
 
@@ -186,17 +186,17 @@ class UplinkConfig:
     """Cellular hop from the sink to the cloud."""
 
     rate_bps: float | None = None
-    """Rate; None ends the way at the sink."""
+    """Rate; None means that there is no uplink, and images go no farther than the sink."""
     latency_s: float = 0.05
-    """Time that a packet travels after it was sent."""
+    """Propagation time of a packet after its last bit was sent."""
     loss: float = 0.0
     """Share of packets that get lost."""
     trace: str | None = None
-    """File of a recorded link, as for the nodes, which replaces rate, latency and loss."""
+    """File of a recorded link, as for the nodes; it replaces rate, latency and loss."""
 
     @property
     def exists(self) -> bool:
-        """Whether packets go on from the sink to the cloud."""
+        """Whether the sink forwards packets to the cloud."""
         return self.rate_bps is not None or self.trace is not None
 
     def __post_init__(self) -> None:
@@ -227,7 +227,7 @@ class SchemeConfig:
     sample_s: float = 2.0
     """Time between images of a vehicle."""
     buffer_images: int = 200
-    """Images that a vehicle keeps; the oldest goes first."""
+    """Images that a vehicle keeps; a full buffer drops the oldest."""
     image_bytes: int = 1000
     """Size of an image."""
     tag_bytes: int = 40
@@ -297,11 +297,11 @@ class EnergyConfig:
     sleep_w: float = 0.00006
     """Radio while it sleeps."""
     platform_w: float = 2.7
-    """The rest of the node while it is awake."""
+    """Computer and camera of the node while it is awake."""
     platform_sleep_w: float = 0.1
-    """The rest of the node while it sleeps."""
+    """Computer and camera of the node while it sleeps."""
     battery_j: float | None = None
-    """Energy of a full battery, for the lifetime; None has no end."""
+    """Energy of a full battery, for the lifetime; None is unlimited."""
 
     def __post_init__(self) -> None:
         for key in ("tx_w", "rx_w", "idle_w", "sleep_w", "platform_w", "platform_sleep_w"):
@@ -311,10 +311,10 @@ class EnergyConfig:
 
 @dataclass(frozen=True, slots=True)
 class RunConfig:
-    """How long, from which seed, and what is remembered."""
+    """Duration, seed and recorded events of a run."""
 
     horizon_s: float = 3600.0
-    """Simulated time at which the run ends, if it has not finished before."""
+    """Simulated time at which the run stops, if it has not finished before."""
     warmup_s: float = 0.0
     """Time at the start that the metrics leave out."""
     seed: int = 0
@@ -335,10 +335,10 @@ class RunConfig:
 
 @dataclass(frozen=True, slots=True)
 class NetworkConfig:
-    """Everything that a simulation depends on."""
+    """All settings of a simulation."""
 
     scenario: Scenario = "collection"
-    """Nodes that stand still around one sink (collection), or vehicles on a street grid (street-grid)."""
+    """Fixed nodes around one sink (collection), or vehicles on a street grid (street-grid)."""
     radio: RadioConfig = field(default_factory=RadioConfig)
     mac: MacConfig = field(default_factory=MacConfig)
     loss: LossConfig = field(default_factory=LossConfig)

@@ -1,4 +1,4 @@
-"""Whole configurations by name: what the thesis describes, and networks as people build them."""
+"""Named network configurations: those of the thesis, a greenhouse and an office."""
 
 from __future__ import annotations
 
@@ -63,4 +63,4 @@ PRESETS: dict[str, NetworkConfig] = {
         run=RunConfig(horizon_s=600.0),
     ),
 }
-"""What SPEC 6.1 and 6.2 describe, and two more: lossy radio over several hops, and a fast one over one."""
+"""The scenarios of SPEC 6.1 and 6.2, a lossy multi-hop network, and a fast single-hop network."""

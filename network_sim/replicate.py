@@ -1,4 +1,4 @@
-"""Runs with independent seeds, 95 % intervals, and sweeps over any setting (SPEC 6.2)."""
+"""Replicated runs with independent seeds, 95 % confidence intervals, and parameter sweeps (SPEC 6.2)."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ from packetmesh.settings import with_settings
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A metric over independent runs."""
+    """Mean and confidence interval of a metric over independent runs."""
 
     mean: float
     ci95: float | None
-    """Half of the 95 % interval, by Student's t; None for a single run."""
+    """Half-width of the 95 % confidence interval (Student's t); None for a single run."""
     unit: str
     definition: str
     values: tuple[float, ...]
-    """One for each run that has it, in the order of their seeds."""
+    """The metric's value in each run that has it, in the order of the seeds."""
 
 
 Estimates = Mapping[str, Estimate]
 
 
 def measured(config: NetworkConfig) -> dict[str, Metric]:
-    """The metrics of one run."""
+    """Simulate one run and return its metrics."""
     return metrics(simulate(config))
 
 
 def replications(config: NetworkConfig, count: int) -> list[NetworkConfig]:
-    """``config`` with the seeds ``run.seed``, ``run.seed + 1``, ...
+    """Return ``count`` copies of ``config`` with the seeds ``run.seed``, ``run.seed + 1``, ...
 
     Raises:
-        InputError: fewer than one.
+        InputError: ``count`` is below 1.
     """
     if count < 1:
         raise InputError(f"replications is {count}; try at least 1")
@@ -53,7 +53,7 @@ def replications(config: NetworkConfig, count: int) -> list[NetworkConfig]:
 def iterate_runs(
     configs: Sequence[NetworkConfig], scheduler: str | None = None
 ) -> Generator[Progress, None, list[dict[str, Metric]]]:
-    """The metrics of every config, in their order."""
+    """Simulate every config in parallel; returns their metrics in the same order."""
     answers: dict[int, dict[str, Metric]] = {}
     for index, answer in run_batch(measured, configs, scheduler):
         answers[index] = answer
@@ -64,14 +64,14 @@ def iterate_runs(
 def iterate_sweep(
     config: NetworkConfig, key: str, values: Sequence[str], count: int, scheduler: str | None = None
 ) -> Generator[Progress, None, dict[str, Estimates]]:
-    """Estimates for each value of a setting, such as ``"scheme.k"``, from ``count`` runs with equal seeds."""
+    """Estimate the metrics for each value of a setting such as ``"scheme.k"``; all values share seeds."""
     cases = [with_settings(config, [f"{key}={value}"]) for value in values]
     runs = yield from iterate_runs([run for case in cases for run in replications(case, count)], scheduler)
     return {value: estimates_of(runs[i * count : (i + 1) * count]) for i, value in enumerate(values)}
 
 
 def estimates_of(runs: Sequence[Mapping[str, Metric]]) -> dict[str, Estimate]:
-    """Every metric that some run has; a run without it (no image arrived, say) does not count for it."""
+    """Estimate each metric over the runs that have it (the image delay needs an image that arrived)."""
     names = dict.fromkeys(name for run in runs for name in run)
     estimates = {}
     for name in names:
@@ -83,7 +83,7 @@ def estimates_of(runs: Sequence[Mapping[str, Metric]]) -> dict[str, Estimate]:
 
 
 def t_interval(values: Iterable[float], confidence: float = 0.95) -> tuple[float, float | None]:
-    """Mean and half of its interval by Student's t; no interval for a single value."""
+    """Return the mean and the half-width of its Student's t interval (None for a single value)."""
     numbers = np.fromiter(values, float)
     if len(numbers) < 2:
         return float(numbers.mean()), None

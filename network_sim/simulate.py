@@ -1,4 +1,4 @@
-"""One run, from a config to a trace that conserves its packets."""
+"""Simulation of one run: config in, trace out, with the conservation of packets checked."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from network_sim.types import to_ns
 from packetmesh.progress import Progress, drain
 
 REPORTS = 100
-"""Reports of progress in a run."""
+"""Number of progress reports in a run."""
 
 
 def simulate(config: NetworkConfig) -> NetworkTrace:
-    """The fold of ``iterate_simulation``; the same config gives the same trace to the byte.
+    """Simulate one run of the network; the same config gives the same trace to the byte.
 
     Args:
         config: topology, radio, medium access, images, and how long the run takes.
 
     Returns:
-        The trace: events with times in nanoseconds, counters, and the nodes' places in metres.
+        The trace: events with times in nanoseconds, counters, and the nodes' positions in metres.
 
     Raises:
         InternalError: the trace contradicts itself.
@@ -42,14 +42,14 @@ def simulate(config: NetworkConfig) -> NetworkTrace:
 
 
 def iterate_simulation(config: NetworkConfig) -> Generator[Progress, None, NetworkTrace]:
-    """One run of the network, with a report of progress about every hundredth of it.
+    """Simulate one run of the network and report progress about a hundred times.
 
     Args:
         config: topology, radio, medium access, images, and how long the run takes.
 
     Returns:
-        The trace, in which every packet is received, dropped or in flight. It ends at the horizon, or when
-        every image of a collection has arrived or was given up.
+        The trace, in which every packet is received, dropped or in flight. The run stops at the horizon, or
+        as soon as every image of a collection has arrived or was given up.
 
     Raises:
         InternalError: the trace contradicts itself.
@@ -97,7 +97,7 @@ def _recorder(config: NetworkConfig, nodes: int) -> Recorder:
 
 
 def _run(env: simpy.Environment, config: NetworkConfig) -> Generator[float, None, None]:
-    """Run to the horizon in a hundred steps; yields the share that is done."""
+    """Run to the horizon in ``REPORTS`` steps; yields the share of the run that is done."""
     horizon_ns = to_ns(config.run.horizon_s)
     for step in range(1, REPORTS + 1):
         until_ns = horizon_ns * step // REPORTS

@@ -1,7 +1,7 @@
-"""Packets, the kinds of events, and the causes of losses; times in nanoseconds.
+"""Types of packets, events and loss causes, and conversions to and from integer nanoseconds.
 
-Integers keep the order of events exact: two backoffs that end in the same slot end at the same instant, and
-the same seed gives the same trace to the byte.
+Integer times keep the order of events exact: two backoffs that expire in the same slot expire at the same
+instant, and the same seed gives the same trace to the byte.
 """
 
 from __future__ import annotations
@@ -11,22 +11,22 @@ from typing import NamedTuple
 
 NS_PER_S = 1_000_000_000
 BEGIN_WITHIN_NS = 10_000_000
-"""Nodes that send from the start begin at random within this time. An exchange of IEEE 802.15.4 takes whole
-backoff periods: if all began at once, they would stay synchronised for ever."""
+"""Nodes begin to send at a random time within this span. An exchange of IEEE 802.15.4 takes whole backoff
+periods: nodes that began at the same instant would stay synchronised for ever."""
 
 
 def to_ns(seconds: float) -> int:
-    """The nearest whole nanosecond."""
+    """Convert seconds to the nearest whole nanosecond."""
     return round(seconds * NS_PER_S)
 
 
 def to_s(nanoseconds: int) -> float:
-    """Seconds of a number of nanoseconds."""
+    """Convert nanoseconds to seconds."""
     return nanoseconds / NS_PER_S
 
 
 class PacketKind(IntEnum):
-    """What a packet carries."""
+    """Kind of a packet, by its content."""
 
     IMAGE = 0
     """A fragment of an image, or a whole small one."""
@@ -39,7 +39,7 @@ class PacketKind(IntEnum):
 
 
 class EventKind(IntEnum):
-    """What an event of the trace records."""
+    """Kind of an event in the trace."""
 
     CAPTURE = 0
     """A camera took an image: ``size_bytes`` as encoded."""
@@ -48,11 +48,11 @@ class EventKind(IntEnum):
     AIR = 2
     """A frame was on the air from ``t_ns`` for ``duration_ns``, sent by ``node`` to ``peer``."""
     ACK = 3
-    """The same for an acknowledgement, RTS or CTS: a frame without payload."""
+    """Like AIR, for an acknowledgement, RTS or CTS: a frame without payload."""
     LOSS = 4
-    """An attempt failed at its end, for ``cause``; another may follow."""
+    """A transmission attempt failed, for ``cause``; a retry may follow. ``t_ns`` is the attempt's end."""
     DELIVER = 5
-    """A packet has reached ``peer``, the next node on its way; ``t_ns`` is when its frame ended."""
+    """A packet has reached ``peer``, the next node on its route; ``t_ns`` is the end of its frame."""
     DROP = 6
     """``node`` dropped a packet, for ``cause``."""
     ARRIVE = 7
@@ -68,7 +68,7 @@ class EventKind(IntEnum):
     LEAVE = 12
     """A vehicle left the range of the access point ``peer``."""
     RECEIVE = 13
-    """A packet has reached its last node; ``node`` is its source, ``peer`` that node."""
+    """A packet has reached its destination ``peer``; ``node`` is its source."""
 
 
 class Cause(IntEnum):
@@ -98,13 +98,13 @@ class Cause(IntEnum):
     ACK_LOST = 11
     """The frame arrived, its acknowledgement did not."""
     LINK = 12
-    """Lost on the link, by a share that was set or a recording."""
+    """Lost on the link, by the configured loss share or by a recorded link."""
 
 
 class Packet(NamedTuple):
-    """A packet, which nodes pass from one to the next.
+    """A packet that nodes forward from one to the next.
 
-    A named tuple, as millions of them are made: a frozen dataclass takes four times as long.
+    It is a named tuple because a run creates millions of them: a frozen dataclass takes four times as long.
     """
 
     id: int
@@ -117,7 +117,7 @@ class Packet(NamedTuple):
     image: int = -1
     first_byte: int = 0
     byte_count: int = 0
-    """Which bytes of its image it carries."""
+    """The packet carries bytes [first_byte, first_byte + byte_count) of its image."""
 
 
 class Delivery(NamedTuple):
@@ -125,8 +125,8 @@ class Delivery(NamedTuple):
 
     ok: bool
     cause: Cause
-    """Why it was not delivered; ``NONE`` if it was."""
+    """Why the packet was not delivered; ``NONE`` if it was."""
     attempts: int
-    """Frames sent for it."""
+    """Number of frames sent for the packet."""
     under_way: bool = False
-    """It was sent and is on its way; whether it arrives is reported later."""
+    """True if the packet is still on its way; the medium access reports later whether it arrived."""

@@ -6,8 +6,8 @@
     result = pm.reconstruct(rig, pm.PRESETS["packetmesh"])
     pm.write_mesh("room.glb", result.after)
 
-Lengths are in metres, times in seconds, angles in radians. A name's module is imported at its first use, so
-that ``import packetmesh`` itself imports no numpy.
+Lengths are in metres, times in seconds, angles in radians. Each name's module is imported at its first use,
+so that ``import packetmesh`` does not import numpy.
 """
 
 from importlib import import_module
@@ -145,7 +145,7 @@ def __dir__() -> list[str]:
     return __all__
 
 
-if not TYPE_CHECKING:  # a checker would take any name for one that this gives
+if not TYPE_CHECKING:  # type checkers would accept every name if they saw this function
 
     def __getattr__(name: str) -> object:
         if name not in _PLACES:

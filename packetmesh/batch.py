@@ -1,4 +1,4 @@
-"""Many independent tasks: on this machine's cores, or on a Dask cluster with the same functions."""
+"""Parallel execution of independent tasks, on this machine's cores or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 from packetmesh.errors import InputError, PacketMeshError
 
 THREAD_LIMITS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
-"""What libraries read when they are imported."""
+"""Environment variables from which libraries read their number of threads when they are imported."""
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
@@ -28,18 +28,18 @@ def run_batch(
     processes: int | None = None,
     killed: Callable[[Task], Answer] | None = None,
 ) -> Iterator[tuple[int, Answer]]:
-    """Each task's index and answer, in the order of completion.
+    """Call ``function`` with each task; yields each task's index and answer, in the order of completion.
 
-    Only a few tasks are handed out ahead of those that run. Closing the iterator, or an error in a task,
-    drops what has not begun and waits for what has; an interrupt from the terminal ends that too.
+    Only a few more tasks are submitted than can run. When the iterator is closed or a task raises an error,
+    waiting tasks are dropped and running ones are completed; Ctrl-C in the terminal stops these too.
 
     Args:
-        function: importable by its name, as other processes call it.
-        tasks: what it is called with, one by one.
-        scheduler: address of a Dask scheduler; None takes processes on this machine.
-        processes: how many of them at most, one for each core by default; a single one is this process.
-        killed: answers for a task whose process was killed, alone as well as beside others; the other tasks
-            go on. Without it that is an error.
+        function: importable by name, because other processes call it.
+        tasks: arguments of ``function``, one per call.
+        scheduler: address of a Dask scheduler; None uses processes on this machine.
+        processes: largest number of processes, by default one per core; 1 runs the tasks in this process.
+        killed: returns the answer for a task whose process was killed even when it ran alone; the other
+            tasks continue. Without it a killed process is an error.
 
     Raises:
         InputError: the scheduler cannot be reached, or ``distributed`` is not installed.
@@ -73,7 +73,7 @@ def run_batch(
 
 
 def _alone(function: Callable[[Task], Answer], task: Task, killed: Callable[[Task], Answer] | None) -> Answer:
-    """The answer of one that ran when a process was killed, in a process of its own."""
+    """Run a task again, alone in a new process, after a process was killed; returns its answer."""
     with process_pool(1) as pool:
         try:
             return pool.submit(function, task).result()
@@ -83,15 +83,15 @@ def _alone(function: Callable[[Task], Answer], task: Task, killed: Callable[[Tas
 
 
 def process_pool(processes: int, begin: Callable[..., None] | None = None, *given: Any) -> Executor:
-    """New processes that share the cores; libraries whose threads wait for work by spinning get no more, if
-    the program's own file does not import them: a new process imports that first.
+    """Start processes that share the cores: each limits the threads of its libraries to its share of
+    the cores, except those that the program's main file imports, because a new process imports that first.
 
-    They end silently at an interrupt, unless this process ignores interrupts (nohup): then they do, too.
+    At Ctrl-C they exit silently, unless this process ignores interrupts (nohup): then they ignore them too.
 
     Args:
-        processes: how many.
-        begin: importable by its name; called with ``given`` when a process starts.
-        given: its arguments.
+        processes: number of processes.
+        begin: importable by name; called with ``given`` when a process starts.
+        given: arguments of ``begin``.
     """
     heeded = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
     threads = max(1, (os.cpu_count() or 1) // processes)
@@ -105,8 +105,8 @@ def process_pool(processes: int, begin: Callable[..., None] | None = None, *give
 
 class _Pool(ProcessPoolExecutor):
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """When a process is killed while another starts, Python (3.11 to 3.13) does not end the new one, and
-        waits for it for ever."""
+        """Terminate all processes of a broken pool, then shut down: when a process is killed while another
+        starts, Python (3.11 to 3.13) would wait for the new one for ever."""
         if self._broken:
             for process in list((self._processes or {}).values()):
                 process.terminate()
@@ -114,7 +114,7 @@ class _Pool(ProcessPoolExecutor):
 
 
 def _begin(heeded: bool, threads: int, pickled: bytes) -> None:
-    """What is pickled imports the libraries that look at the number of threads, so it waits for it."""
+    """Set up a new process; unpickling imports libraries that read the thread limits, so it comes last."""
     signal.signal(signal.SIGINT, signal.SIG_DFL if heeded else signal.SIG_IGN)
     for name in THREAD_LIMITS:
         os.environ.setdefault(name, str(threads))
@@ -130,14 +130,14 @@ def _completed(
     running: dict[Future[Answer], tuple[int, Task]],
     most: Callable[[], int],
 ) -> Iterator[Future[Answer]]:
-    """What is done, as it comes, while at most ``most()`` tasks are in the pool.
+    """Yield each future when it is done, while at most ``most()`` tasks are in the pool.
 
     Args:
-        pool: where they run.
-        function: what does them.
-        waiting: indices and tasks not handed out yet, which are taken from here.
-        running: those that are, from which the caller takes each that is done.
-        most: how many there may be.
+        pool: runs the tasks.
+        function: called with each task.
+        waiting: indices and tasks that are not submitted yet; submitted ones are removed.
+        running: submitted tasks by future; the caller removes each one that is done.
+        most: returns how many tasks may be in the pool.
     """
     while True:
         while waiting and len(running) < most():

@@ -1,13 +1,13 @@
-"""Errors with a message for people: one sentence that names the thing, its value and what to try."""
+"""Errors whose messages users see: one sentence that names the thing, its value and what to try."""
 
 MOST_LETTERS = 1000
-"""Of a message, which may quote a file."""
+"""Longest message, in characters; a message may quote a file."""
 
 
 class PacketMeshError(Exception):
-    """Base of the errors that the app and the command line show as their message, without a stack trace.
+    """Base of the errors of which the app and the command line show only the message, without a stack trace.
 
-    The message is one line that can be printed, whatever it quotes of a file.
+    The message is cut to ``MOST_LETTERS`` and kept to one printable line, because it may quote a file.
     """
 
     def __init__(self, sentence: str) -> None:
@@ -22,4 +22,4 @@ class InputError(PacketMeshError):
 
 
 class ReconstructionError(PacketMeshError):
-    """The input was readable, but a stage could not produce a result from it."""
+    """A stage could not produce a result from readable input."""

@@ -1,4 +1,4 @@
-"""Files: atomic output, strict JSON, and reading with a limit of size."""
+"""File access: atomic writing, strict JSON, and reading with a size limit."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ MAX_IMAGE_PIXELS = 25_000_000
 MAX_GEOMETRY_BYTES = 1_000_000_000
 """Largest cloud or mesh file that is read."""
 MAX_UNPACKED_BYTES = 1 << 30
-"""Of all files in an archive."""
+"""Largest total size of the files in an archive, unpacked."""
 BROKEN_ZIP = (
     zipfile.BadZipFile,
-    NotImplementedError,  # compressed in a way that Python does not know
+    NotImplementedError,  # unknown compression method
     RuntimeError,  # encrypted
     EOFError,
     OSError,
     ValueError,
     zlib.error,
 )
-"""What reading a damaged ZIP raises."""
+"""Errors that reading a damaged ZIP raises."""
 
 
 _UNFINISHED = re.compile(r"\..*-[0-9a-f]{8}(\..*)?")
-"""The names of what ``atomic_path`` gives."""
+"""Names of the temporary files of ``atomic_path``."""
 _LEAVES = re.compile(r"^[/\\]|^[A-Za-z]:|(^|[/\\])\.\.([/\\]|$)|\0")
-"""What in a name leads out of a folder, on any system."""
+"""Parts of a name that lead out of a folder, on any system."""
 
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A temporary sibling of ``path`` to write to, renamed to ``path`` if the body succeeds.
+    """Give a temporary sibling of ``path`` to write to, and rename it to ``path`` if the body succeeds.
 
-    The sibling has the same suffix, so that libraries choose the same format. A missing folder is made.
+    The sibling has the same suffix, so that libraries choose the same format. A missing folder is created.
     If the body raises, no partial file remains and an older ``path`` is unchanged.
 
     Raises:
@@ -64,12 +64,12 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror or error}); {remedy(error)}") from None
     finally:
-        with suppress(OSError):  # its folder does not exist, so neither does it
+        with suppress(OSError):  # its folder does not exist, so neither does the sibling
             sibling.unlink(missing_ok=True)
 
 
 def path_below(folder: Path, *names: str) -> Path:
-    """Join names that a browser, an archive or a file gave under a folder.
+    """Join a folder with names that come from a browser, an archive or a file.
 
     Raises:
         InputError: a name is empty or absolute, or has ``..``, a drive or a null character.
@@ -84,17 +84,17 @@ def path_below(folder: Path, *names: str) -> Path:
 
 
 def delete_unfinished(folder: Path) -> None:
-    """Delete the temporary siblings that killed processes left in a folder that nobody else writes to."""
+    """Delete temporary siblings left by killed processes, in a folder to which no other process writes."""
     for path in folder.glob(".*"):
         if path.is_file() and _UNFINISHED.fullmatch(path.name):
             path.unlink(missing_ok=True)
 
 
 def writable_folder(path: str | os.PathLike[str]) -> Path:
-    """``path``, made if it is missing and tried with a probe file, so that a long run fails early.
+    """Create a folder if it is missing, and test it with a probe file, so that a long run fails early.
 
     Raises:
-        InputError: it cannot be made or written.
+        InputError: the folder cannot be created or written.
     """
     folder = Path(path)
     with atomic_path(folder / "probe"):
@@ -110,7 +110,7 @@ def write_json(path: Path, value: Any) -> None:
 
 
 def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """A CSV file with a line for each row; columns are the keys of all rows, in the order they come in."""
+    """Write a CSV file with a line per row; its columns are the keys of all rows, in order of appearance."""
     columns = list(dict.fromkeys(key for row in rows for key in row))
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, columns, lineterminator="\n")
@@ -119,18 +119,18 @@ def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def file_trouble(error: OSError) -> str:
-    """One sentence on a file that could not be written or read."""
+    """Return a sentence about a file that could not be written or read."""
     return f"{error.filename or 'A file'} cannot be used ({error.strerror or error}); {remedy(error)}"
 
 
 def remedy(error: OSError) -> str:
-    """What to try when a file cannot be written."""
+    """Return what to try when a file cannot be written."""
     full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
     return "delete something there, as the disk is full" if full else "try another folder"
 
 
 def finite(value: Any) -> Any:
-    """``value`` with records and arrays as plain lists and non-finite numbers as None."""
+    """Return ``value`` with tuples and arrays as plain lists and non-finite numbers as None."""
     if isinstance(value, dict):
         return {str(key): finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -143,11 +143,11 @@ def finite(value: Any) -> Any:
 
 
 def read_bytes(path: str | os.PathLike[str], max_bytes: int, what: str) -> bytes:
-    """The content of a file.
+    """Return the content of a file.
 
     Args:
         path: the file.
-        max_bytes: largest size that is read.
+        max_bytes: largest size that is accepted.
         what: kind of the file, for the error messages (``"depth image"``).
 
     Raises:
@@ -171,7 +171,7 @@ def read_bytes(path: str | os.PathLike[str], max_bytes: int, what: str) -> bytes
 
 
 def read_text(path: str | os.PathLike[str], what: str, max_bytes: int | None = None) -> str:
-    """The content of a UTF-8 text file of at most ``max_bytes``; None takes ``MAX_TEXT_BYTES``.
+    """Return the content of a UTF-8 text file of at most ``max_bytes`` (None means ``MAX_TEXT_BYTES``).
 
     Raises:
         InputError: as for ``read_bytes``, or it is not UTF-8 text.
@@ -183,7 +183,7 @@ def read_text(path: str | os.PathLike[str], what: str, max_bytes: int | None = N
 
 
 def unpacked(archive: zipfile.ZipFile, item: zipfile.ZipInfo) -> bytes:
-    """A file in a ZIP, of which no more is unpacked than the archive says: ``ZipFile.read`` would unpack all.
+    """Unpack a file in a ZIP up to its declared size only; ``ZipFile.read`` would unpack all of it.
 
     Raises:
         Exception: one of ``BROKEN_ZIP``.
@@ -193,16 +193,16 @@ def unpacked(archive: zipfile.ZipFile, item: zipfile.ZipInfo) -> bytes:
 
 
 def read_json(path: str | os.PathLike[str], what: str) -> dict[str, Any]:
-    """The object in a JSON file of at most ``MAX_TEXT_BYTES``.
+    """Return the object in a JSON file of at most ``MAX_TEXT_BYTES``.
 
     Raises:
-        InputError: as for ``read_text``, or it is no JSON, nested too deeply, or no object.
+        InputError: as for ``read_text``, or the text is not JSON, too deeply nested, or not an object.
     """
     return json_object(read_text(path, what), path, what)
 
 
 def json_object(text: str, path: str | os.PathLike[str], what: str) -> dict[str, Any]:
-    """The object that the text of a file is; raises as ``read_json``."""
+    """Parse the text of a file as a JSON object; raises as ``read_json``."""
     try:
         value = json.loads(text)
     except (ValueError, RecursionError) as error:

@@ -1,4 +1,4 @@
-"""Memory of this process: its peak, a limit on what it may take further, and what it gives back."""
+"""Memory of this process: its peak, a limit on further allocations, and the return of free memory."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ import psutil
 
 
 def peak_memory_bytes() -> int:
-    """Largest resident memory of this process so far.
+    """Return the largest resident memory of this process so far.
 
-    On Linux read from /proc, because there the resource usage of a process starts at its parent's.
+    On Linux it is read from /proc, because resource usage there starts from the parent process's peak.
     """
     if sys.platform == "win32":
         return int(psutil.Process().memory_info().peak_wset)
@@ -31,9 +31,9 @@ def peak_memory_bytes() -> int:
 
 @contextmanager
 def at_most_further(size_bytes: int) -> Iterator[None]:
-    """Let the process take no more than so much memory beside what it has; more is a MemoryError.
+    """Limit what the process may allocate in addition to its present memory; more raises a MemoryError.
 
-    It counts addresses, which threads that run meanwhile share. Windows knows no such limit.
+    The limit is on address space, shared by all threads. Windows has no such limit: nothing happens there.
     """
     if sys.platform == "win32":
         yield
@@ -43,7 +43,7 @@ def at_most_further(size_bytes: int) -> Iterator[None]:
     def limit_to(sizes_bytes: list[int]) -> None:
         most = resource.getrlimit(resource.RLIMIT_AS)[1]
         known = [size for size in (*sizes_bytes, most) if size != resource.RLIM_INFINITY]
-        with suppress(ValueError, OSError):  # a system that knows no such limit
+        with suppress(ValueError, OSError):  # a system without such a limit
             resource.setrlimit(resource.RLIMIT_AS, (min(known, default=resource.RLIM_INFINITY), most))
 
     mine = psutil.Process().memory_info().vms + size_bytes
@@ -63,18 +63,18 @@ def at_most_further(size_bytes: int) -> Iterator[None]:
 
 
 _limits_bytes: list[int] = []
-"""What the process could take before the first who limits it, then what each of them lets it take."""
+"""Limit of the process before any call of ``at_most_further``, then the limit of each running call."""
 _limits_change = threading.Lock()
 
 
 def share_arenas(count: int = 2) -> None:
-    """Have all threads allocate from a few places, where one each leaves many half empty; glibc only."""
+    """Make all threads allocate from ``count`` arenas: one per thread leaves many half empty; glibc only."""
     with suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).mallopt(_M_ARENA_MAX, count)
 
 
 def give_back_memory() -> None:
-    """Return what is free to the system; glibc only."""
+    """Return free memory to the system; glibc only."""
     with suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)
 

@@ -1,4 +1,4 @@
-"""Progress of a long computation, and the fold over a generator of steps."""
+"""Progress reports of a long computation, and running a generator of steps to its end."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """One report of a running computation; its generator yields it between units of work.
+    """One progress report, yielded by the computation's generator between units of work.
 
     The consumer draws a bar, logs a line, or closes the generator, which cancels the computation.
     """
 
     stage: str
-    """Name of the stage, in words for people (``"depth inference"``)."""
+    """Name of the stage, readable for users (``"depth inference"``)."""
     fraction: float
     """Share of the whole computation that is done, 0 to 1."""
 
@@ -26,14 +26,14 @@ class Progress:
 def drain(
     steps: Generator[Step, None, Result], on_step: Callable[[Step], object] = lambda step: None
 ) -> Result:
-    """Run a generator to its end.
+    """Run a generator to its end and return its result.
 
     Args:
-        steps: any ``iterate_...`` function's generator.
+        steps: generator of any ``iterate_...`` function.
         on_step: called with each step it yields.
 
     Returns:
-        What the generator returns.
+        The generator's return value.
 
     >>> import packetmesh as pm
     >>> config = pm.with_settings(pm.NETWORK_PRESETS["thesis-link"], ["nodes.image_bytes=2000"])
@@ -54,8 +54,8 @@ def drain(
 def part(
     steps: Generator[Progress, None, Result], stage: str, begin: float, end: float, detail: bool = False
 ) -> Generator[Progress, None, Result]:
-    """The same computation as a stage of a longer one, which goes from ``begin`` to ``end`` of it; in
-    ``detail``, each report says after that stage what it said before.
+    """Run a computation as a stage of a longer one and rescale its progress from 0..1 to ``begin``..``end``.
+    With ``detail``, reports append the computation's own stage name to ``stage``.
     """
     while True:
         try:

@@ -1,4 +1,4 @@
-"""Configs as text: preset names, ``key=value`` settings and the ``config.json`` beside every result."""
+"""Configs as text: preset names, ``key=value`` settings and the ``config.json`` next to every result."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ Config = TypeVar("Config")
 
 
 def config_named(preset: str, presets: Mapping[str, Config]) -> Config:
-    """The preset of that name, or the config saved in that JSON file.
+    """Return the preset of this name, or the config saved in this JSON file.
 
     Raises:
-        InputError: neither a preset nor a readable config.
+        InputError: the name is neither a preset nor a readable config.
     """
     if preset in presets:
         return presets[preset]
@@ -40,11 +40,11 @@ def config_named(preset: str, presets: Mapping[str, Config]) -> Config:
 
 
 def with_settings(config: Config, changes: Iterable[str]) -> Config:
-    """``config`` with settings such as ``"depth.alignment=median"`` applied.
+    """Return ``config`` with settings such as ``"depth.alignment=median"`` applied.
 
     Raises:
-        InputError: an unknown key (the message offers the nearest known ones) or a value that the key does
-            not take.
+        InputError: an unknown key (the message offers the nearest known ones) or a value that is invalid for
+            its key.
 
     >>> import packetmesh as pm
     >>> config = pm.with_settings(pm.PRESETS["packetmesh"], ["surface.max_points=5000"])
@@ -62,9 +62,9 @@ def with_settings(config: Config, changes: Iterable[str]) -> Config:
 
 
 def settings(config: Any, prefix: str = "") -> dict[str, str]:
-    """Dotted key and value of every field of ``config``, as text that ``with_settings`` parses.
+    """Return the dotted key and value of every field of ``config``, as text that ``with_settings`` parses.
 
-    ``prefix`` is what the keys begin with, for a config within another.
+    ``prefix`` is put before every key, for a config within another.
     """
     text: dict[str, str] = {}
     for field in dataclasses.fields(config):
@@ -81,18 +81,18 @@ def settings(config: Any, prefix: str = "") -> dict[str, str]:
 
 
 def key_of(change: str) -> str:
-    """The key of ``key=value``."""
+    """Return the key of ``key=value``."""
     return change.partition("=")[0].strip()
 
 
 def differences(config: Config, base: Config) -> list[str]:
-    """The settings of ``config`` that differ from ``base``, as ``key=value``."""
+    """Return the settings of ``config`` that differ from ``base``, as ``key=value``."""
     before = settings(base)
     return [f"{key}={value}" for key, value in settings(config).items() if before[key] != value]
 
 
 def _replaced(config: Any, values: dict[str, str], known: list[str], prefix: str = "") -> Any:
-    """``config`` with ``values``, whose keys lack ``prefix``; ``known`` are all keys of the whole config."""
+    """Return ``config`` with ``values``, whose keys lack ``prefix``; ``known`` are all keys of the config."""
     hints = typing.get_type_hints(type(config))
     changes: dict[str, Any] = {}
     for key in {key.partition(".")[0] for key in values}:
@@ -109,7 +109,7 @@ def _replaced(config: Any, values: dict[str, str], known: list[str], prefix: str
 
 
 def _unknown(key: str, known: list[str]) -> InputError:
-    """The error for an unknown key; it offers the known ones nearest to the whole key or its last part."""
+    """Return the error for an unknown key; it offers known keys similar to the key or its last part."""
     last = key.rpartition(".")[2]
     near = [name for name in known if name.rpartition(".")[2] == last]
     near += [name for name in difflib.get_close_matches(key, known, n=3) if name not in near]
@@ -122,7 +122,7 @@ def _unknown(key: str, known: list[str]) -> InputError:
 
 
 def _parsed(hint: Any, text: str, key: str) -> Any:
-    """``text`` as a value of the type ``hint``."""
+    """Parse ``text`` as a value of type ``hint``."""
     if typing.get_origin(hint) is Literal:
         if text not in typing.get_args(hint):
             raise InputError(f"{key}={text} is not possible; try one of {', '.join(typing.get_args(hint))}")

@@ -1,4 +1,4 @@
-"""Help for a config: the docstring and the unit of every setting."""
+"""Help for a config: docstring and unit of every setting."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ UNITS = {
     "images": "images",
     "per_h": "1/h",
 }
-"""Unit by the last part of a setting's name."""
+"""Unit of a setting, by the last part of its name."""
 
 UNITLESS = {"nakagami_m"}
-"""Names that end like a unit but have none."""
+"""Names that have no unit although they end in one of these parts."""
 
 
 class Setting(NamedTuple):
@@ -39,16 +39,16 @@ class Setting(NamedTuple):
 
     key: str
     value: str
-    """As text that ``with_settings`` parses."""
+    """Text that ``with_settings`` parses."""
     unit: str
     """Empty for a choice, a name or a number without a unit."""
     doc: str
 
 
 def describe(config: Any, prefix: str = "") -> list[Setting]:
-    """Every setting of ``config`` with its value, unit and meaning, in the order of its fields.
+    """Return every setting of ``config`` with its value, unit and meaning, in the order of its fields.
 
-    ``prefix`` is what the keys begin with, for a config within another.
+    ``prefix`` is put before every key, for a config within another.
     """
     rows: list[Setting] = []
     kind: type = type(config)
@@ -63,7 +63,7 @@ def describe(config: Any, prefix: str = "") -> list[Setting]:
 
 
 def unit_of(key: str) -> str:
-    """The unit that a setting's name ends in: metres for ``radio.range_m``; empty without one."""
+    """Return the unit in which a setting's name ends (``m`` for ``radio.range_m``); empty without one."""
     name = key.rpartition(".")[2]
     if name in UNITLESS or "_" not in name:
         return ""
@@ -72,7 +72,7 @@ def unit_of(key: str) -> str:
 
 @functools.cache
 def field_docs(kind: type) -> dict[str, str]:
-    """The docstrings under the fields of a dataclass, each as one line; read from its source."""
+    """Read the docstrings under a dataclass's fields from its source, each as one line."""
     definition = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
     assert isinstance(definition, ast.ClassDef)
     docs = {}

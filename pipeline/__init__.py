@@ -1,1 +1,1 @@
-"""From RGB-D images to a surface: arrays in, frozen records out; knows neither the app nor the network."""
+"""Reconstruction from RGB-D images to a surface: arrays in, frozen records out; independent of the app."""

@@ -1,4 +1,4 @@
-"""One frozen config a stage: it is the command line, the sliders, the preset and the record."""
+"""Frozen config dataclasses, one per stage: source of the command line, sliders, presets and records."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Literal
 from packetmesh.errors import InputError
 
 Pattern = Literal["circles", "circles-asymmetric", "chessboard", "charuco"]
-"""What is printed on a calibration board."""
+"""Pattern that is printed on a calibration board."""
 Lens = Literal["thesis", "brown", "rational", "fisheye"]
-"""Distortion that a camera may have: k1, k2 (SPEC 1.1); also p1, p2, k3; also k4 to k6; or a fisheye's."""
+"""Distortion of a camera: k1, k2 (SPEC 1.1); also p1, p2, k3; also k4 to k6; or a fisheye's."""
 OutlierMode = Literal["thesis", "depth_normalised", "robust", "flying"]
 AlignmentMode = Literal["none", "median", "affine_depth", "affine_inverse", "local"]
 ModelKind = Literal["metric", "relative", "inverse"]
@@ -35,14 +35,14 @@ METHODS = {
     "fast-robust-icp": "fast_robust.FastRobustIcp",
 }
 """Every registration method by name, and its class below ``pipeline.registration``: a new method is a file
-with such a class and a line here. Classes are named, not imported, so that reading settings stays fast."""
+with such a class and a line here. The classes are not imported, so that reading settings stays fast."""
 if TYPE_CHECKING:
     Method = str
 else:
     Method = Literal[tuple(METHODS)]
 Metric = Literal["point", "plane"]
 Baseline = Literal["poisson", "alpha"]
-"""A stage that makes a surface of the same points by another method."""
+"""Another method that makes a surface of the same points, for comparison."""
 Direction = Literal["q2p", "p2q", "both"]
 FusionMode = Literal["union", "fill"]
 Fill = Literal["auto", "completion", "network"]
@@ -65,11 +65,11 @@ class AcquisitionConfig:
     """Depth image to filtered point cloud (SPEC 2)."""
 
     outlier_mode: OutlierMode = "flying"
-    """flying: what hangs between two surfaces or alone, by the sensor's noise. The others judge a point's
-    mean neighbour distance: against mu + t sigma of the cloud (thesis), the same after division by depth
-    (depth_normalised), or median + 3 robust sigma (robust)."""
+    """flying removes points between two surfaces or alone, by the sensor's noise. Others compare a point's
+    mean neighbour distance with mu + t sigma of the cloud (thesis), with the same after division by depth
+    (depth_normalised), or with median + 3 robust sigma (robust)."""
     outlier_neighbours: int = 4
-    """Neighbours N whose mean distance is judged (eq. 3.5); the flying mode does not use it."""
+    """Neighbours N over which the mean distance is taken (eq. 3.5); the flying mode does not use it."""
     outlier_t: float = 1.0
     """Threshold t in sigmas (eq. 3.6); the robust and the flying mode do not use it."""
     average: bool = True
@@ -84,35 +84,35 @@ class DepthConfig:
     """RGB image to metric depth (SPEC 3)."""
 
     model: str | None = None
-    """ONNX file of the depth network; None takes the one that ships."""
+    """ONNX file of the depth network; None uses the network that comes with PacketMesh."""
     preset: NetworkPreset | None = None
-    """How that network wants its image and what it gives; None takes what the file says of itself."""
+    """Input and output convention of that network; None reads it from the file."""
     model_kind: ModelKind | None = None
-    """What the network gives: metres, depth up to scale, or disparity up to scale and shift; None takes
-    what the preset or the file says."""
+    """Output of the network: metres, depth up to scale, or disparity up to scale and shift; None takes the
+    value of the preset or the file."""
     input_width_px: int | None = None
-    """Width of the images that the network gets, where its file leaves it free; None takes what the preset
-    or the file says."""
+    """Width of the network's input images, if its file does not fix it; None takes the value of the preset
+    or the file."""
     input_height_px: int | None = None
-    """Height of them; it belongs to the width."""
+    """Height of the network's input images; set both or neither."""
     normalisation: Normalisation | None = None
-    """What the network's pixel values are: with ImageNet's mean and deviation, from 0 to 1 (unit) or to 255
-    (bytes); None takes what the preset or the file says."""
+    """Scaling of the network's input: by ImageNet's mean and deviation, from 0 to 1 (unit) or to 255 (bytes);
+    None takes the value of the preset or the file."""
     crop: bool = False
     """Infer on the thesis's 304 x 228 centre crop instead of the whole image."""
     alignment: AlignmentMode = "local"
     """How inferred depth is made metric against the sensor (SPEC 3.5)."""
     fill: Fill = "auto"
-    """What fills the sensor's holes: depth completed from colours and measured depth together, or the
-    colour network's aligned depth; auto completes unless a network of one's own is named."""
+    """Depth for the sensor's holes: completed from colours and measured depth together (completion), or the
+    colour network's aligned depth (network); auto is network if a model is named, else completion."""
     reach: float = 0.1
-    """How far from measured pixels inferred depth counts, as a share of the image's diagonal."""
+    """Largest distance of inferred depth from measured pixels, as a share of the image's diagonal."""
     least_confidence: float = 0.5
-    """Inferred depth that is believed less does not count, 0 to 1: what is more likely wrong than right makes
-    skirts from objects to what stands behind them (``python -m lab.training.least_confidence``)."""
+    """Least confidence, 0 to 1, of inferred depth that is used: depth more likely wrong than right forms
+    skirts from objects to the surfaces behind them (``python -m lab.training.least_confidence``)."""
 
     def of_network(self) -> DepthConfig:
-        """Only the settings of the network itself, which is all that its inference depends on."""
+        """Return the config with only the network's own settings, on which its inference depends."""
         plain = DepthConfig()
         return replace(
             self,
@@ -124,7 +124,7 @@ class DepthConfig:
 
     @property
     def completes(self) -> bool:
-        """Whether the sensor's holes are filled by completion."""
+        """Whether completion fills the sensor's holes."""
         return self.fill == "completion" or (self.fill == "auto" and self.model is None)
 
     def __post_init__(self) -> None:
@@ -160,19 +160,19 @@ class RegistrationConfig:
     """Smallest weight scale of CEICP-A; None takes 0.6 times the target's median spacing, or its median
     depth noise where that is larger."""
     sigma_decay: float = 0.85
-    """Factor rho by which CEICP-A's scale shrinks an iteration."""
+    """Factor rho by which CEICP-A's scale shrinks in each iteration."""
     trim: float = 0.9
     """Share of the closest pairs that trimmed-icp and hicp keep."""
     unit: Literal["mm", "m"] = "mm"
     """Unit in which ceicp-literal measures; its weights depend on it."""
     hue_weight_m: float = 0.3
-    """Radius of the circle on which hicp lays the hues beside x, y and z; a half turn is worth twice that."""
+    """Radius of the circle on which hicp places hues as extra coordinates; opposite ones are 2 radii away."""
     max_iterations: int = 100
     max_points: int = 10_000
     """Points drawn from each cloud for matching."""
     seed: int = 0
     start: Literal["given", "global"] = "given"
-    """given: from the believed pose; global: from a pose found by matching features first."""
+    """given: start from the given poses; global: from a pose found by matching features first."""
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -195,15 +195,15 @@ class RegistrationConfig:
 
 @dataclass(frozen=True, slots=True)
 class FusionConfig:
-    """Two clouds to one (SPEC 4.9)."""
+    """Fusion of two clouds to one (SPEC 4.9)."""
 
     mode: FusionMode = "fill"
     """union: all points of both; fill: inferred points only where the sensor has none."""
     align_nodes_with: NodePoints = "sensor"
-    """Which points register one node to another."""
+    """Points by which nodes are registered to one another."""
     register_inferred: bool = False
-    """Move each node's inferred cloud rigidly onto its sensor cloud, as the thesis does; without it
-    the pixel-wise alignment of the depth stage stands, which SPEC 3.5 measures to be better."""
+    """Move each node's inferred cloud rigidly onto its sensor cloud, as the thesis does; without it the
+    cloud keeps the depth stage's pixel-wise alignment, which is more accurate (SPEC 3.5)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,10 +215,10 @@ class SurfaceConfig:
     radii_m: tuple[float, ...] = ()
     """Ball radii of the manual rule."""
     max_points: int = 50_000
-    """The clouds are voxel-averaged to about this many points before the ball rolls, or to the fewer that
-    voxels of twice the sensors' noise leave."""
+    """The clouds are averaged over voxels that leave about this many points, or fewer if such voxels would
+    be smaller than twice the sensors' noise."""
     smoothing_passes: int = 2
-    """How often every thinned point is moved onto the plane of its neighbours; 0 leaves the noise in."""
+    """How many times every averaged point is moved onto the plane of its neighbours; 0 keeps the noise."""
 
     def __post_init__(self) -> None:
         _at_least("surface.max_points", self.max_points, 3)
@@ -233,14 +233,14 @@ class SurfaceConfig:
 
 @dataclass(frozen=True, slots=True)
 class PipelineConfig:
-    """Everything the way from images to a surface can be told."""
+    """All settings of the reconstruction."""
 
     acquisition: AcquisitionConfig = field(default_factory=AcquisitionConfig)
     depth: DepthConfig = field(default_factory=DepthConfig)
     inferred_registration: RegistrationConfig = field(default_factory=RegistrationConfig)
-    """Inferred cloud on sensor cloud within a node, if ``fusion.register_inferred``."""
+    """Registers the inferred cloud to the sensor cloud of a node, if ``fusion.register_inferred``."""
     node_registration: RegistrationConfig = field(default_factory=RegistrationConfig)
-    """Node on node."""
+    """Registers nodes to one another."""
     fusion: FusionConfig = field(default_factory=FusionConfig)
     surface: SurfaceConfig = field(default_factory=SurfaceConfig)
 
@@ -256,4 +256,4 @@ PRESETS: dict[str, PipelineConfig] = {
         surface=SurfaceConfig(radius_rule="thesis", max_points=30_000, smoothing_passes=0),
     ),
 }
-"""The two ways through the chain: ours (the default) and the thesis's own."""
+"""Settings by name: ours (the default) and those of the thesis."""

@@ -1,7 +1,7 @@
-"""From a rig's cameras through a network to a surface: what the sink can rebuild at each moment (SPEC 6.5).
+"""Delivery of a rig's images through a network, and the surface from what has arrived so far (SPEC 6.5).
 
-Every node sends its own colour and depth image, encoded for real. At each moment the sink decodes exactly
-the bytes that have arrived by then, and the usual chain makes of them what it can.
+Every node sends its own encoded colour and depth image. At each moment the sink decodes exactly the
+bytes that have arrived by then, and the usual chain reconstructs what it can from them.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from pipeline.types import RgbdFrame, Rig
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """A rig's images sent through a network."""
+    """Result of sending a rig's images through a network."""
 
     sending: Sending
     moments: tuple[Moment, ...]
     last: Reconstruction | None
-    """Of what had arrived in the end; None where that was too little."""
+    """Reconstruction of all that arrived; None if that was too little."""
     lossless: Reconstruction
-    """Of the images as they were taken."""
+    """Reconstruction of the images before coding."""
 
 
 def deliver(
@@ -49,16 +49,16 @@ def deliver(
 
     Args:
         rig: one to six camera nodes with colour and depth images, intrinsics and believed poses.
-        network: any that collects images from nodes that stand still.
+        network: any network that collects images from fixed nodes.
         coding: how images become bytes: a name of ``pipeline.delivery.CODINGS``.
-        moments: how often, after equal shares of the bytes that ever arrive, the scene is rebuilt.
+        moments: number of moments at which the scene is rebuilt, after equal shares of the bytes that arrive.
         config: settings of the reconstruction.
 
     Returns:
-        The moments by time, with surfaces in metres, times in seconds and energies in joules.
+        The moments in order of time, with surfaces in metres, times in seconds and energies in joules.
 
     Raises:
-        InputError: the rig, the network or the coding cannot be used; the message says why.
+        InputError: the rig, the network or the coding cannot be used; the message gives the reason.
 
     >>> import packetmesh as pm
     >>> rig = pm.Rig("one node", pm.load_demo("office").frames[:1])
@@ -73,14 +73,14 @@ def deliver(
 
 
 def iterate_delivery(spec: DeliverySpec, processes: int = 1) -> Generator[Moment, None, Delivery]:
-    """The same for any source, moment by moment.
+    """Run ``deliver`` for any source; yields each moment.
 
     Args:
-        spec: the source, the network, the coding, and how many moments.
-        processes: how many rebuild moments at the same time; the results are the same.
+        spec: the source, the network, the coding, and the number of moments.
+        processes: number of moments that are rebuilt in parallel; it does not change the results.
 
     Yields:
-        The moments by time; closing the generator cancels the others.
+        The moments in order of time; closing the generator cancels those not yet rebuilt.
 
     Raises:
         InputError: the rig, the network or the coding cannot be used; the message says why.
@@ -109,7 +109,7 @@ def _moments(sending: Sending, processes: int) -> Iterator[Moment]:
 
 
 _there: Rebuilder
-"""Of a process that rebuilds moments."""
+"""The ``Rebuilder`` of a worker process."""
 
 
 def _start(sending: Sending) -> None:
@@ -122,7 +122,7 @@ def _moment_there(index: int) -> Moment:
 
 
 def _last(sending: Sending, lossless: Reconstruction) -> Reconstruction | None:
-    """The whole chain on what has arrived in the end."""
+    """Run the whole chain on all that arrived."""
     frames = frames_at_sink(sending, received_at(sending, int(sending.times_ns[-1])))
     if all(_same(*both) for both in zip(frames, sending.rig.frames, strict=True)):
         return lossless

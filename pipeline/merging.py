@@ -1,4 +1,4 @@
-"""The clouds of all nodes as one, thinned and with normals, ready for the ball."""
+"""Merging the clouds of all nodes into one, thinned and with normals, from which the surface is made."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from pipeline.surface.voxel import in_cubes_of, voxel_average, voxel_for_count
 from pipeline.types import FloatArray, IntArray, PointCloud, PointSource, RgbdFrame
 
 NOISE_VOXELS = 2.0
-"""Least edge of a voxel over the median noise of what is averaged: finer ones only copy the noise."""
+"""Least voxel edge over the median noise of the averaged points: smaller voxels only reproduce the noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,25 +29,25 @@ class FusedCloud:
 
     fused: PointCloud
     voxel_m: float
-    """Edge of the voxels it was averaged over."""
+    """Edge of the voxels over which the points were averaged."""
     r_F_m: float
     """Mean nearest-neighbour distance."""
     sigma_D_m: float
-    """Its standard deviation."""
+    """Standard deviation of the nearest-neighbour distance."""
     measured: int | None
-    """Its first points that are those of the sensors alone, untouched by any guess; None if all are mixed."""
+    """Number of measured points, which come first and are free of inferred ones; None if they are mixed."""
 
 
 @dataclass(frozen=True, slots=True)
 class MergedClouds:
-    """The fused cloud and, thinned alike, what the sensors alone measured."""
+    """The fused cloud and, thinned in the same way, the measured points alone."""
 
     sensor: PointCloud
     fused: PointCloud
     r_F_m: float
     """Mean nearest-neighbour distance of the fused cloud."""
     sigma_D_m: float
-    """Its standard deviation."""
+    """Standard deviation of the nearest-neighbour distance."""
 
 
 def merge_fused(
@@ -58,17 +58,17 @@ def merge_fused(
     max_points: int,
     smoothing_passes: int,
 ) -> FusedCloud:
-    """The fused cloud of all nodes.
+    """Merge the clouds of all nodes into one.
 
     Args:
         frames: the nodes' images.
-        nodes: their clouds.
+        nodes: their clouds, each in its node's frame.
         T_world_camera: (4, 4) registered pose of each node.
-        mode: ``fill`` drops inferred points that another node's sensor can judge, and those beside
+        mode: ``fill`` drops inferred points that another node's sensor can judge, and those close to
             measured ones, so that no measurement is averaged with a guess.
-        max_points: it is averaged over the voxels that leave about so many points, fewer where the sensors'
-            noise deserves no more.
-        smoothing_passes: how often every point is moved onto the plane of its neighbours.
+        max_points: the voxels are chosen to leave about this many points, or fewer if they would be too small
+            for the sensors' noise.
+        smoothing_passes: how many times every point is moved onto the plane of its neighbours.
     """
     beside = threads("merging", 2)
     joint = [node.fused for node in nodes]
@@ -93,21 +93,20 @@ def merge_fused(
 
 
 def noise_m(nodes: Sequence[NodeClouds]) -> float:
-    """The median standard deviation of what the sensors measured along their rays."""
+    """Return the median standard deviation of the measured points along their rays."""
     return float(np.median(np.concatenate([node.sensor.sigma_m for node in nodes])))
 
 
 def guessed_alone(sensors: PointCloud, whole: PointCloud, voxel_m: float) -> IntArray:
-    """The rows of ``whole`` that were inferred and are in voxels where nothing was measured.
+    """Return the rows of ``whole`` that were inferred and whose voxel contains no measured point.
 
-    At the rim of a hole, a voxel and the planes that smooth it would mix both: the surface there would come
-    loose from what was measured, by as much as the guess is off. So the measured points are thinned and
-    smoothed as without any guess, and of the rest only these come to them; while they are smoothed, they may
-    follow measured ones.
+    At the rim of a hole, averaging and smoothing would mix both kinds, and an error of the inferred points
+    would detach the surface from the measured points. So measured points are thinned and smoothed alone,
+    then these inferred points are added; their own smoothing may use measured points.
 
     Args:
         sensors: the measured points, thinned to ``voxel_m``.
-        whole: those and the inferred ones, thinned alike.
+        whole: the measured and the inferred points, thinned in the same way.
     """
     guessed = np.flatnonzero(whole.source == PointSource.INFERRED)
     return guessed[~in_cubes_of(sensors.points_m, whole.points_m[guessed], voxel_m)]
@@ -116,12 +115,12 @@ def guessed_alone(sensors: PointCloud, whole: PointCloud, voxel_m: float) -> Int
 def merge(
     clouds: Sequence[PointCloud], T_world_camera: Sequence[FloatArray], voxel_m: float, smoothing_passes: int
 ) -> PointCloud:
-    """Clouds in their nodes' frames as one in the world frame: averaged, with normals, smoothed."""
+    """Merge clouds from their nodes' frames into one in the world frame: averaged, with normals, smoothed."""
     return smooth(thinned(clouds, T_world_camera, voxel_m), smoothing_passes)
 
 
 def thinned(clouds: Sequence[PointCloud], T_world_camera: Sequence[FloatArray], voxel_m: float) -> PointCloud:
-    """The same before it is smoothed."""
+    """Merge like ``merge``, without smoothing."""
     thin = [
         replace(estimate_normals(voxel_average(cloud, voxel_m), np.zeros(3)), pixels=None) for cloud in clouds
     ]
@@ -132,10 +131,10 @@ def thinned(clouds: Sequence[PointCloud], T_world_camera: Sequence[FloatArray], 
 def without_guesses_in_view(
     frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds], T_world_camera: Sequence[FloatArray], index: int
 ) -> PointCloud:
-    """One node's fused cloud, in its own frame, without inferred points that another sensor can judge, and
-    without pixels.
+    """Return one node's fused cloud, in its own frame, without inferred points that another sensor can judge,
+    and without pixels.
 
-    What one node had to infer, another may have measured: an inferred point stands only where it is
+    Another node may have measured what one node had to infer: an inferred point is kept only if it is
     hidden from every other node's sensor.
     """
     cloud = nodes[index].fused
@@ -150,5 +149,5 @@ def without_guesses_in_view(
 
 
 def _placed(clouds: Sequence[PointCloud], T_world_camera: Sequence[FloatArray]) -> list[PointCloud]:
-    """Clouds in their own frames, moved to the world frame."""
+    """Move clouds from their own frames to the world frame."""
     return [cloud.transformed(pose) for cloud, pose in zip(clouds, T_world_camera, strict=True)]

@@ -1,4 +1,4 @@
-"""What each node sees and infers."""
+"""Clouds of each node: measured, inferred and fused."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from pipeline.registration import fuse, register
 from pipeline.types import DepthMap, PointCloud, PointSource, RegistrationResult, RgbdFrame
 
 COLOR_REACH_PX = 8
-"""How far from a pixel that has arrived a filled-in colour still shows what is there."""
+"""Largest distance from a pixel that has arrived at which a filled-in colour is used."""
 
 
 @dataclass(frozen=True, slots=True)
 class InferredDepth:
-    """The depth network's answer to one colour image, before it is made metric."""
+    """Output of the depth network for one colour image, before it is made metric."""
 
     depth: DepthMap
     disparity: bool
@@ -32,7 +32,7 @@ class InferredDepth:
 
 @dataclass(frozen=True, slots=True)
 class NodeClouds:
-    """What one node's images give, in its own camera frame."""
+    """Clouds and depth from one node's images, in its own camera frame."""
 
     name: str
     sensor: PointCloud
@@ -40,9 +40,9 @@ class NodeClouds:
     network: InferredDepth
     alignment: AlignmentResult
     judged: JudgedDepth
-    """The aligned depth that is believed in the sensor's holes, and with what confidence."""
+    """Aligned depth accepted in the sensor's holes, with its confidence."""
     inferred: PointCloud
-    """The believed depth, or in ``union`` mode all of it, as in the thesis."""
+    """Points of the accepted depth; in ``union`` mode of all inferred depth, as in the thesis."""
     inferred_registration: RegistrationResult | None
     fused: PointCloud
 
@@ -56,7 +56,7 @@ def infer_depth(network: DepthNetwork, frame: RgbdFrame, crop: bool = False) -> 
 
 
 def nothing_inferred(frame: RgbdFrame) -> InferredDepth:
-    """Instead of the network's answer where no colour has arrived to infer from."""
+    """Return an ``InferredDepth`` without depth, for a frame of which no colour has arrived."""
     unknown = np.full(frame.depth.z_m.shape, np.nan, np.float32)
     return InferredDepth(DepthMap(unknown, kind="relative"), disparity=False, provider="none", elapsed_s=0.0)
 
@@ -69,16 +69,16 @@ def prepare_node(
     mode: FusionMode,
     registration: RegistrationConfig | None = None,
 ) -> NodeClouds:
-    """One node's sensor cloud, inferred cloud and their fusion, in the node's camera frame.
+    """Compute one node's sensor cloud, inferred cloud and their fusion, in the node's camera frame.
 
     Args:
         frame: the node's images.
-        inferred: what the depth network gives for its colour image.
-        acquired: its measured depth, and which of its points are outliers.
-        depth: how inferred depth is made metric, and how much of it is believed.
-        mode: ``fill`` lets inferred points in only at pixels that the sensor has not measured.
+        inferred: output of the depth network for its colour image.
+        acquired: its measured depth, with the outliers marked.
+        depth: settings of alignment and of the confidence that is required.
+        mode: ``fill`` uses inferred points only at pixels that the sensor has not measured.
         registration: moves the inferred cloud rigidly onto the sensor cloud, as the thesis does; None
-            leaves its points where their pixels are.
+            does not move it.
     """
     filtered = acquired.cloud(frame)
     sensor = filtered.kept
@@ -115,35 +115,35 @@ def _measured_only(
     alignment: AlignmentResult,
     judged: JudgedDepth,
 ) -> NodeClouds:
-    """A node to whose sensor cloud there is nothing to add."""
+    """Return the clouds of a node without inferred points."""
     labelled = replace(sensor, source=np.full(len(sensor), PointSource.SENSOR, np.uint8))
     nothing = labelled.select(np.zeros(len(sensor), bool))
     return NodeClouds(frame.name, sensor, filtered, inferred, alignment, judged, nothing, None, labelled)
 
 
 def _guide(frame: RgbdFrame) -> DepthMap:
-    """What inferred depth is brought to: measured depth, and the coarse depth that arrived."""
+    """Return the depth for aligning inferred depth: measured, elsewhere the coarse depth that arrived."""
     if frame.coarse is None:
         return frame.depth
     return DepthMap(np.where(frame.depth.valid, frame.depth.z_m, frame.coarse.z_m))
 
 
 def _completes(guide: DepthMap, inferred: InferredDepth, config: DepthConfig) -> bool:
-    """Whether there are colours and depth to complete from."""
+    """Return whether holes are to be completed and there are colours and depth to complete from."""
     return config.completes and inferred.provider != "none" and bool(guide.valid.any())
 
 
 def _aligned(inferred: InferredDepth, guide: DepthMap, config: DepthConfig) -> AlignmentResult:
-    """Inferred depth made metric; none where nothing could be inferred."""
+    """Align the inferred depth to metric depth; without any, return an unaligned result."""
     if inferred.provider == "none":
         return AlignmentResult(DepthMap(inferred.depth.z_m), config.alignment, {}, float("nan"), 0.0)
     return align_depth(inferred.depth, guide, config.alignment, inferred.disparity)
 
 
 def _guesses(frame: RgbdFrame, inferred: DepthMap) -> DepthMap:
-    """Depth where nothing was measured: the coarse depth that arrived, else the inferred one.
+    """Return depth for unmeasured pixels: the coarse depth that arrived, else the inferred depth.
 
-    Depth inferred from a filled-in colour counts only near pixels whose colour has arrived.
+    Depth inferred from a filled-in colour is used only near pixels whose colour has arrived.
     """
     z_m = inferred.z_m
     if frame.rgb_known is not None:

@@ -1,4 +1,4 @@
-"""The whole way, from a rig's images to a surface before and after fusion."""
+"""The whole reconstruction, from a rig's images to a surface before and after fusion."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ from pipeline.types import Rig, SurfaceResult
 
 @dataclass(frozen=True, slots=True)
 class Reconstruction:
-    """Everything the chain finds out about a rig."""
+    """All results of the chain for one rig."""
 
     spec: Spec
     rig: Rig
     nodes: tuple[NodeClouds, ...]
     placement: Placement
     clouds: MergedClouds
-    """As the ball meets them, world frame."""
+    """Clouds from which the surfaces are made, world frame."""
     before: SurfaceResult
     """The surface of the sensor cloud alone."""
     after: SurfaceResult
     """The surface of the fused cloud."""
     truth_before: dict[str, float] | None
-    """Comparison of the surface before fusion with the ground truth, where there is one."""
+    """Comparison of the surface before fusion with the ground truth; None without truth."""
     truth_after: dict[str, float] | None
     timings_s: dict[str, float]
-    """Of each stage, when it was computed."""
+    """Time of each stage, measured when it was computed."""
 
     @property
     def kept(self) -> Kept:
-        """What became of the measurements."""
+        """Shares of the measurements that are kept and represented by the surfaces."""
         before, after = self.before.quality, self.after.quality
         return Kept(
             kept_share=float(np.mean(np.concatenate([node.filtered.keep for node in self.nodes]))),
@@ -58,10 +58,10 @@ def reconstruct(rig: Rig, config: PipelineConfig = PRESETS["packetmesh"]) -> Rec
 
     Args:
         rig: one to six camera nodes with colour and depth images, intrinsics and believed poses.
-        config: all settings; ``PRESETS["thesis"]`` goes the thesis's own way.
+        config: all settings; ``PRESETS["thesis"]`` reconstructs as the thesis does.
 
     Raises:
-        PacketMeshError: a stage cannot work with what it was given; the message says why.
+        PacketMeshError: a stage cannot work with its input; the message says why.
 
     >>> import packetmesh as pm
     >>> rig = pm.Rig("one node", pm.load_demo("office").frames[:1])
@@ -73,11 +73,11 @@ def reconstruct(rig: Rig, config: PipelineConfig = PRESETS["packetmesh"]) -> Rec
 
 
 def iterate_reconstruction(spec: Spec, cache: Cache | None = None) -> Steps[Reconstruction]:
-    """The same for any source, with a report between stages; closing the generator cancels the rest.
+    """Run the chain for any source, with a report between stages; closing the generator cancels it.
 
     Args:
         spec: source and settings.
-        cache: where results of stages are kept; None keeps them for this run only.
+        cache: stores results of stages; None stores them for this run only.
 
     Raises:
         PacketMeshError: as ``reconstruct``.

@@ -1,6 +1,6 @@
-"""Where a rig comes from: every source has a title, loads its rig, and knows its command-line arguments.
+"""Sources of rigs: each has a title, loads its rig, and knows its command-line arguments.
 
-Reading images needs large libraries, so they are imported when a source is loaded and not before.
+Reading images needs large libraries, so they are imported only when a source is loaded.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 
 
 class Source(Protocol):
-    """Anything that gives a rig; equal sources give equal rigs, so results are cached by them."""
+    """A source that gives a rig; equal sources give equal rigs, so results are cached by source."""
 
     @property
     def title(self) -> str:
-        """What to call it."""
+        """Name to display."""
         ...
 
     def load(self) -> Rig:
-        """The images, with the truth where it is known.
+        """Return the images, with the truth if it is known.
 
         Raises:
             InputError: a file is missing or cannot be used.
@@ -32,13 +32,13 @@ class Source(Protocol):
         ...
 
     def arguments(self) -> list[str]:
-        """The options of ``packetmesh reconstruct`` that name it."""
+        """Return the options of ``packetmesh reconstruct`` that name the source."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Demo:
-    """A demo scene that ships."""
+    """A demo scene that comes with PacketMesh."""
 
     name: str
 
@@ -50,7 +50,7 @@ class Demo:
         return self.load_with(None)
 
     def load_with(self, calibration: str | None) -> Rig:
-        """The rig with a calibration's folder laid over it."""
+        """Load the rig, with calibration files from a folder instead of its own."""
         from pipeline.io.demos import load_demo
 
         return load_demo(self.name, calibration)
@@ -65,7 +65,7 @@ class RigFolder:
 
     path: str
     depth_scale: float | None = None
-    """Depth units in one metre; without it whole numbers are millimetres, floating-point ones metres."""
+    """Depth units in one metre; by default whole numbers are millimetres, floating-point ones metres."""
 
     @property
     def title(self) -> str:
@@ -75,7 +75,7 @@ class RigFolder:
         return self.load_with(None)
 
     def load_with(self, calibration: str | None) -> Rig:
-        """The rig with a calibration's folder laid over it."""
+        """Load the rig, with calibration files from a folder instead of its own."""
         from pipeline.io.rigs import load_rig
 
         return load_rig(self.path, calibration, self.depth_scale)
@@ -92,9 +92,9 @@ class ImagePair:
     depth: str
     intrinsics: str
     depth_scale: float | None = None
-    """Depth units in one metre; without it whole numbers are millimetres, floating-point ones metres."""
+    """Depth units in one metre; by default whole numbers are millimetres, floating-point ones metres."""
     depth_intrinsics: str | None = None
-    """Of the depth camera, if the depth image is not registered to the colour image; then with extrinsics."""
+    """Intrinsics of the depth camera if the depth image is not registered to colour; needs ``extrinsics``."""
     extrinsics: str | None = None
 
     @property
@@ -106,7 +106,7 @@ class ImagePair:
         return self.load_with(None)
 
     def load_with(self, calibration: str | None) -> Rig:
-        """The pair with the node_00 of a calibration's folder laid over it."""
+        """Load the pair, with files from node_00 of a calibration's folder instead of its own."""
         from pipeline.io.calibrations import calibration_files
         from pipeline.io.rigs import load_frame
 
@@ -116,7 +116,7 @@ class ImagePair:
         return Rig(self.title, (load_frame(self.color, self.depth, depth_scale=self.depth_scale, **files),))
 
     def _files(self) -> NodeFiles:
-        """Beside the images."""
+        """Return the calibration files given with the images."""
         files: NodeFiles = {"intrinsics": self.intrinsics}
         if self.depth_intrinsics is not None:
             files["depth_intrinsics"] = self.depth_intrinsics
@@ -133,7 +133,7 @@ class ImagePair:
 
 @dataclass(frozen=True, slots=True)
 class Calibrated:
-    """Another source with a calibration laid over it."""
+    """Another source, with calibration files from a folder instead of its own."""
 
     source: Demo | RigFolder | ImagePair
     folder: str
@@ -152,7 +152,7 @@ class Calibrated:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedRig:
-    """A rig that is in memory already; it equals only itself."""
+    """A rig that is already in memory; it equals only itself."""
 
     rig: Rig
 
@@ -172,4 +172,4 @@ def _depth_scale_argument(depth_scale: float | None) -> list[str]:
 
 
 FileSource: TypeAlias = Demo | RigFolder | ImagePair | Calibrated
-"""The sources that a command line can name."""
+"""Sources that can be given on the command line."""

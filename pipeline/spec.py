@@ -1,6 +1,6 @@
-"""What a person asks of the chain, and what each of its stages depends on.
+"""Specification of a reconstruction, and what the result of each of its stages depends on.
 
-Nothing here computes or imports what does, so that a program that only shows results stays light.
+This module neither computes nor imports large libraries, so that a program that only shows results is light.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ StageName = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Spec:
-    """Everything that decides what the chain computes."""
+    """Everything that determines the result of the chain."""
 
     source: Source
     preset: str = "packetmesh"
-    """The preset that ``config`` started from; it decides nothing but the command line."""
+    """The preset from which ``config`` started; it only affects the command line."""
     config: PipelineConfig = field(default_factory=PipelineConfig)
 
     def with_preset(self, preset: str) -> Self:
-        """The same with a preset's config."""
+        """Return the spec with a preset's config."""
         return replace(self, preset=preset, config=PRESETS[preset])
 
     def command(self, out: str = "runs/from-app") -> str:
-        """The command line that computes the same."""
+        """Return the command line that computes the same result."""
         words = ["packetmesh", "reconstruct", *self.source.arguments(), "--preset", self.preset]
         changed = differences(self.config, PRESETS.get(self.preset, PipelineConfig()))
         if changed:
@@ -54,12 +54,12 @@ class Spec:
 
 @dataclass(frozen=True, slots=True)
 class Needs:
-    """What the result of a stage depends on."""
+    """Dependencies of a stage's result."""
 
     settings: Callable[[Spec], tuple[Any, ...]]
-    """The part of the spec that it takes."""
+    """Returns the part of the spec that the stage uses."""
     after: tuple[StageName, ...] = ()
-    """The stages whose results it takes."""
+    """Stages whose results it uses."""
 
 
 NEEDS: dict[StageName, Needs] = {
@@ -92,20 +92,20 @@ NEEDS: dict[StageName, Needs] = {
     "poisson": Needs(lambda spec: (), ("rig", "placement", "fused")),
     "alpha": Needs(lambda spec: (spec.config.surface,), ("rig", "placement", "fused")),
 }
-"""All stages; ``pipeline.stages`` has what they do."""
+"""Dependencies of all stages; ``pipeline.stages`` has their functions."""
 REBUILD: tuple[StageName, ...] = ("rig", "inferred", "outliers", "nodes", "placement", "fused", "after")
-"""The stages from the images to the surface, in their order."""
+"""Stages from the images to the surface, in their order."""
 CHAIN: tuple[StageName, ...] = (*REBUILD[:-1], "clouds", "after", "before", "truth")
-"""The stages of a reconstruction, which compares it with what was measured and true; the others are baselines
-beside it."""
+"""Stages of a reconstruction, including comparison with measurements and truth; the other stages are
+baselines."""
 SIDE_BY_SIDE: frozenset[tuple[StageName, StageName]] = frozenset({("after", "before")})
-"""Stages that follow each other in the chain, do not wait for each other and take about as long. Network and
-outlier filter beside each other would save less than .1 s, and take 0.2 GB more with three nodes
+"""Consecutive stages that run in parallel: they do not need each other and take about as long. Running the
+network parallel to the outlier filter would save less than .1 s and take 0.2 GB more with three nodes
 (``packetmesh bench --only chain``).
 """
 
 
 def key(spec: Spec, stage: StageName) -> tuple[Hashable, ...]:
-    """The name of a stage with all that its result depends on; equal keys mean equal results."""
+    """Return the stage's name with everything its result depends on; equal keys mean equal results."""
     needs = NEEDS[stage]
     return (stage, *needs.settings(spec), *(key(spec, earlier) for earlier in needs.after))

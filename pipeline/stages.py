@@ -1,8 +1,8 @@
-"""The chain: every stage is a function of its own part of the settings and of the results before it.
+"""Stages of the chain: each is a function of its own settings and of the results of earlier stages.
 
-``pipeline.spec`` says what each depends on, ``STAGES`` what each does, and ``run`` goes down both. A
-cache keeps results by ``spec.key``; the command line passes none, the app its store. Whoever needs one
-result only (a screen, a moment of a delivery) asks for that stage.
+``pipeline.spec`` has the dependencies of each stage, ``STAGES`` its function, and ``run`` follows both. A
+cache stores results by ``spec.key``: the app passes its store, the command line none. A caller that needs
+a single result (a screen, a moment of a delivery) requests that stage.
 """
 
 from __future__ import annotations
@@ -51,45 +51,45 @@ from pipeline.types import DepthMap, PointCloud, Rig, Surface, SurfaceResult, Te
 
 Result = TypeVar("Result")
 _NODES_AT_A_TIME = 3
-"""Of three on two cores, the last would else work alone; more would need more memory."""
+"""Nodes in parallel: with two on two cores, the last of three would run alone; more need more memory."""
 Steps = Generator[Progress, None, Result]
 
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """The result of a stage, and the time it took when it was computed, without the stages before it."""
+    """The result of a stage, and the time it took to compute, without the stages before it."""
 
     value: Any
     elapsed_s: float
-    """Two stages side by side take longer than each alone, and less than one after the other."""
+    """Two parallel stages each take longer than alone; together they take less than one after the other."""
 
 
 class Cache(Protocol):
-    """Keeps results of stages."""
+    """Stores results of stages."""
 
     def remember(self, key: tuple[Hashable, ...], compute: Callable[[], Steps[Done]]) -> Steps[Done]:
-        """The result for ``key``, computed only if it is not there; ``key[0]`` names the stage."""
+        """Return the result for ``key``, computing it if it is not stored; ``key[0]`` names the stage."""
         ...
 
 
 class RunCache:
-    """Keeps what one run computes, in memory."""
+    """Stores the results of one run in memory."""
 
     def __init__(self) -> None:
         self._results: dict[tuple[Hashable, ...], Done] = {}
 
     def remember(self, key: tuple[Hashable, ...], compute: Callable[[], Steps[Done]]) -> Steps[Done]:
-        """As ``Cache.remember``."""
+        """Return the result for ``key`` as ``Cache.remember`` does."""
         if key not in self._results:
             self._results[key] = yield from compute()
         return self._results[key]
 
 
 def compute(spec: Spec, stage: StageName, cache: Cache) -> Steps[Done]:
-    """The result of one stage, with whatever has to be computed before it.
+    """Compute the result of one stage, and before it all results that it needs.
 
     Raises:
-        PacketMeshError: a stage cannot work with what it was given; the message says why.
+        PacketMeshError: a stage cannot work with its input; the message says why.
     """
 
     def work() -> Steps[Done]:
@@ -105,7 +105,7 @@ def compute(spec: Spec, stage: StageName, cache: Cache) -> Steps[Done]:
 def run(
     spec: Spec, cache: Cache | None = None, stages: Iterable[StageName] = CHAIN
 ) -> Steps[dict[StageName, Done]]:
-    """All results of the chain, or those of some stages; two that do not wait for each other side by side.
+    """Compute all results of the chain, or those of some stages; independent stages may run in parallel.
 
     Raises:
         PacketMeshError: as ``compute``.
@@ -113,7 +113,7 @@ def run(
     cache = cache or RunCache()
     results: dict[StageName, Done] = {}
     names = list(stages)
-    for stage, following in zip(names, [*names[1:], None], strict=False):  # of no stages, none follows
+    for stage, following in zip(names, [*names[1:], None], strict=False):  # stages may be empty
         if stage in results:
             continue
         if following and (stage, following) in SIDE_BY_SIDE and _ready(following, results):
@@ -129,7 +129,7 @@ def run(
 
 
 def _ready(stage: StageName, results: dict[StageName, Done]) -> bool:
-    """Whether all that a stage needs is there, so that no other thread computes it at the same time."""
+    """Return whether all inputs of a stage are computed, so that two threads do not compute the same."""
     return results.keys() >= set(NEEDS[stage].after)
 
 
@@ -137,13 +137,13 @@ def _ready(stage: StageName, results: dict[StageName, Done]) -> bool:
 
 
 def open_rig(source: Source) -> Steps[Rig]:
-    """The images and, where it is known, the truth."""
+    """Load the images and, if it is known, the truth."""
     yield Progress(f"loading {source.title}", 0.0)
     return source.load()
 
 
 def infer_depths(depth: DepthConfig, rig: Rig) -> Steps[tuple[InferredDepth, ...]]:
-    """The depth network's answer to every node's colour image."""
+    """Run the depth network on every node's colour image."""
     yield Progress("loading the depth network", 0.05)
     network = DepthNetwork.of(depth)
     inferred = []
@@ -155,7 +155,7 @@ def infer_depths(depth: DepthConfig, rig: Rig) -> Steps[tuple[InferredDepth, ...
 
 
 def acquired_depths(acquisition: AcquisitionConfig, rig: Rig) -> Steps[tuple[Acquired, ...]]:
-    """Every node's measured depth and its outliers; colour has no say in it."""
+    """Filter every node's measured depth for outliers; colour is not used."""
     work = [partial(acquire, frame, acquisition) for frame in rig.frames]
     return (yield from _side_by_side(work, rig, "outliers of", 0.2, 0.3))
 
@@ -168,7 +168,7 @@ def prepare_nodes(
     inferred: tuple[InferredDepth, ...],
     acquired: tuple[Acquired, ...],
 ) -> Steps[tuple[NodeClouds, ...]]:
-    """The clouds of every node."""
+    """Compute the clouds of every node."""
     parts = zip(rig.frames, inferred, acquired, strict=True)
     work = [partial(prepare_node, *part, depth, mode, registration) for part in parts]
     return (yield from _side_by_side(work, rig, "clouds of", 0.3, 0.45))
@@ -177,7 +177,7 @@ def prepare_nodes(
 def _side_by_side(
     work: Sequence[Callable[[], Result]], rig: Rig, what: str, begin: float, end: float
 ) -> Steps[tuple[Result, ...]]:
-    """What each node's work gives, a few at a time: most of it leaves Python's lock to the others."""
+    """Run one job per node, a few in parallel (jobs mostly release Python's lock); returns their results."""
     results = []
     begun = [threads("nodes", _NODES_AT_A_TIME).submit(part) for part in work]
     try:
@@ -193,7 +193,7 @@ def _side_by_side(
 def register_nodes(
     config: RegistrationConfig, align_with: NodePoints, rig: Rig, nodes: tuple[NodeClouds, ...]
 ) -> Steps[Placement]:
-    """Where the nodes stand."""
+    """Register the nodes to one another."""
     yield Progress("registering the nodes", 0.45)
     return place_nodes(rig.frames, nodes, config, align_with)
 
@@ -206,7 +206,7 @@ def fused_cloud(
     nodes: tuple[NodeClouds, ...],
     placement: Placement,
 ) -> Steps[FusedCloud]:
-    """The cloud that the ball rolls over."""
+    """Merge the nodes' clouds into the one from which the surface is made."""
     yield Progress("merging the clouds", 0.6)
     return merge_fused(
         placement.placed(rig.frames),
@@ -221,7 +221,7 @@ def fused_cloud(
 def both_clouds(
     smoothing_passes: int, nodes: tuple[NodeClouds, ...], placement: Placement, fused: FusedCloud
 ) -> Steps[MergedClouds]:
-    """The same beside the sensors' own points, thinned alike."""
+    """Return the fused cloud and, thinned in the same way, the measured points alone."""
     yield Progress("merging the sensors' clouds", 0.75)
     if fused.measured is None:
         own = [node.sensor for node in placement.placed(nodes)]
@@ -240,7 +240,7 @@ def roll_over(
     placement: Placement,
     clouds: FusedCloud | MergedClouds,
 ) -> Steps[SurfaceResult]:
-    """The surface of one of the clouds; without a triangle where the ball falls through everywhere."""
+    """Make the surface of one of the clouds; it has no triangles if no ball rests on three points."""
     yield Progress(f"rolling the ball over the {name} cloud", fraction)
     cloud: PointCloud = getattr(clouds, name)
     surface = roll_or_nothing(cloud, radii(config, clouds.r_F_m, clouds.sigma_D_m))
@@ -248,11 +248,11 @@ def roll_over(
 
 
 Truth = tuple[dict[str, float] | None, dict[str, float] | None]
-"""The surfaces before and after fusion compared with the truth; None where it or the surface is missing."""
+"""Comparison of the surfaces before and after fusion with the truth; None without truth or surface."""
 
 
 def compare(rig: Rig, placement: Placement, after: SurfaceResult, before: SurfaceResult) -> Steps[Truth]:
-    """Both surfaces against the truth."""
+    """Compare both surfaces with the truth."""
     if rig.truth is None:
         return None, None
     yield Progress("comparing with the truth", 0.9)
@@ -261,34 +261,34 @@ def compare(rig: Rig, placement: Placement, after: SurfaceResult, before: Surfac
 
 
 def poisson(rig: Rig, placement: Placement, clouds: FusedCloud) -> Steps[SurfaceResult]:
-    """Screened Poisson reconstruction of the fused cloud, a baseline beside the ball."""
+    """Make the screened Poisson surface of the fused cloud, a baseline."""
     yield Progress("Poisson reconstruction", 0.7)
     return with_rays(poisson_surface(clouds.fused, clouds.r_F_m), rig, placement)
 
 
 def alpha(config: SurfaceConfig, rig: Rig, placement: Placement, clouds: FusedCloud) -> Steps[SurfaceResult]:
-    """The alpha shape of the fused cloud with the radius of the largest ball, a baseline beside the ball."""
+    """Make the alpha shape of the fused cloud with the radius of the largest ball, a baseline."""
     yield Progress("the alpha shape", 0.7)
     largest_m = radii(config, clouds.r_F_m, clouds.sigma_D_m)[-1]
     return with_rays(alpha_surface(clouds.fused, largest_m), rig, placement)
 
 
 def with_rays(surface: SurfaceResult, rig: Rig, placement: Placement) -> SurfaceResult:
-    """The surface with what the registered cameras' rays measure of it."""
+    """Measure a surface by the rays of the registered cameras; returns it with these measures."""
     cameras, quality = cameras_of(rig, placement), surface.quality
     points = len(surface.vertices_m) + quality.unused_points
     return measured(surface, cameras, points, _sensed(rig, placement))
 
 
 def yardstick_of_rig(rig: Rig) -> Yardstick | None:
-    """For those who compare several surfaces of one rig; None without truth."""
+    """Prepare the truth for comparisons with several surfaces of one rig; None without truth."""
     return None if rig.truth is None else yardstick_of(rig.truth)
 
 
 def compared(
     rig: Rig, placement: Placement, surface: SurfaceResult, yardstick: Yardstick | None = None
 ) -> dict[str, float] | None:
-    """A surface against the truth of its rig; None without truth or without a triangle."""
+    """Compare a surface with the truth of its rig; None without truth or triangles."""
     if rig.truth is None or not len(surface.triangles):
         return None
     cameras = cameras_of(rig, whole_placement(rig, range(len(rig.frames)), placement))
@@ -296,7 +296,7 @@ def compared(
 
 
 def cameras_of(rig: Rig, placement: Placement) -> list[Camera]:
-    """The registered cameras, whose rays measure a surface; none of a node that found no place."""
+    """Return the registered cameras, whose rays measure a surface; nodes that found no pose are left out."""
     return [
         Camera(frame.intrinsics, pose)
         for frame, pose in placement.placed(list(zip(rig.frames, placement.T_world_camera, strict=True)))
@@ -304,13 +304,13 @@ def cameras_of(rig: Rig, placement: Placement) -> list[Camera]:
 
 
 def dressed(rig: Rig, placement: Placement, surface: Surface) -> Texture:
-    """The photographs of the registered cameras on a surface."""
+    """Texture a surface with the photographs of the registered cameras."""
     pictures = [(frame.rgb, frame.rgb_known) for frame in placement.placed(rig.frames)]
     return photographed(surface, cameras_of(rig, placement), pictures)
 
 
 def _sensed(rig: Rig, placement: Placement) -> list[DepthMap]:
-    """What the registered cameras measured."""
+    """Return the measured depth images of the registered cameras."""
     return [frame.depth for frame in placement.placed(rig.frames)]
 
 
@@ -328,4 +328,4 @@ STAGES: dict[StageName, Callable[..., Steps[Any]]] = {
     "poisson": poisson,
     "alpha": alpha,
 }
-"""What each stage does with its settings and the results of the stages before it, as ``NEEDS`` names them."""
+"""Function of each stage; its arguments are settings and the results of earlier stages, as in ``NEEDS``."""

@@ -1,4 +1,4 @@
-"""The records that stages hand to each other: frozen, plain arrays, units in the names.
+"""Records that stages pass to each other: frozen, plain arrays, units in the names.
 
 Conventions: metres, seconds, radians; OpenCV camera axes (x right, y down, z forward); pixel
 centres at integers; ``T_a_b`` is the (4, 4) matrix that maps coordinates in frame b to frame a;
@@ -24,7 +24,7 @@ AnyPath = str | os.PathLike[str]
 
 
 class PointSource(IntEnum):
-    """Where a fused point came from."""
+    """Origin of a fused point."""
 
     SENSOR = 0
     INFERRED = 1
@@ -61,7 +61,7 @@ class CameraIntrinsics:
     def pinhole(
         fx_px: float, fy_px: float, cx_px: float, cy_px: float, width_px: int, height_px: int
     ) -> CameraIntrinsics:
-        """An undistorted camera."""
+        """Return an undistorted camera."""
         matrix = np.array([[fx_px, 0.0, cx_px], [0.0, fy_px, cy_px], [0.0, 0.0, 1.0]])
         return CameraIntrinsics(matrix, np.zeros(5), width_px, height_px)
 
@@ -87,16 +87,16 @@ class DepthMap:
 
 @dataclass(frozen=True, slots=True)
 class DepthNoise:
-    """How uncertain a depth sensor's measurement is: max(s0, s1 z^p) / cos(angle)^q (SPEC 1.5)."""
+    """Standard deviation of a depth sensor's measurements: max(s0, s1 z^p) / cos(angle)^q (SPEC 1.5)."""
 
     s0_m: float
     s1_m: float
-    """At a distance of 1 m."""
+    """Standard deviation at a depth of 1 m."""
     p: float
     q: float
 
     def sd_m(self, z_m: FloatArray, cosine: FloatArray | float = 1.0) -> FloatArray:
-        """Standard deviation at depth ``z_m``, of surfaces at that cosine of incidence."""
+        """Return the standard deviation at depth ``z_m`` on surfaces with this cosine of incidence."""
         along_m = np.maximum(self.s0_m, self.s1_m * np.asarray(z_m, float) ** self.p)
         return along_m / np.asarray(cosine, float) ** self.q
 
@@ -112,22 +112,22 @@ class RgbdFrame:
     """(H, W), on the same pixel grid as ``rgb``."""
     intrinsics: CameraIntrinsics
     T_world_camera: FloatArray
-    """(4, 4) pose as the node believes it to be; registration corrects it."""
+    """(4, 4) pose as given with the images; registration corrects it."""
     rgb_known: BoolArray | None = None
-    """(H, W) where ``rgb`` has arrived, if the images came over a network; None is everywhere."""
+    """(H, W) mask of the pixels of ``rgb`` that arrived over a network; None means all."""
     coarse: DepthMap | None = None
-    """(H, W) depth known only coarsely, where ``depth`` is unknown: a guess, as inferred depth is."""
+    """(H, W) coarse depth where ``depth`` is unknown; it is treated as a guess, like inferred depth."""
     noise: DepthNoise | None = None
-    """Of ``depth`` as its sensor's calibration found it; None is that of a Kinect."""
+    """Noise of ``depth`` from its sensor's calibration; None means that of a Kinect."""
     pose_known: bool = True
-    """False if nobody gave the pose, so that registration must find it from anywhere."""
+    """False if the pose is unknown, so that registration must find it without a start."""
     notes: tuple[str, ...] = ()
-    """What is doubtful about its images, a sentence each, with what to try."""
+    """Doubts about the images, one sentence each, with what to try."""
 
 
 @dataclass(frozen=True, slots=True)
 class RigTruth:
-    """What is really there, known for rendered scenes only."""
+    """Ground truth of a rendered scene."""
 
     vertices_m: FloatArray
     """(V, 3) world frame."""
@@ -142,7 +142,7 @@ class RigTruth:
 
 
 MAX_NODES = 6
-"""Of a rig."""
+"""Largest number of nodes in a rig."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,13 +155,13 @@ class Rig:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is doubtful about the images of its nodes, a sentence each."""
+        """Doubts about the images of its nodes, one sentence each."""
         return tuple(f"{frame.name}: {note}" for frame in self.frames for note in frame.notes)
 
 
 @dataclass(frozen=True, slots=True)
 class PointCloud:
-    """Points with what is known about each; optional columns are None or have N rows."""
+    """Points with optional columns, each None or with N rows."""
 
     points_m: FloatArray
     """(N, 3) float64."""
@@ -170,7 +170,7 @@ class PointCloud:
     normals: FloatArray | None = None
     """(N, 3) unit vectors towards the observing camera."""
     pixels: IntArray | None = None
-    """(N, 2) the (u, v) image pixel each point was back-projected from."""
+    """(N, 2) pixel (u, v) from which each point was back-projected."""
     sigma_m: FloatArray | None = None
     """(N,) standard deviation of the depth."""
     source: ByteArray | None = None
@@ -180,7 +180,7 @@ class PointCloud:
         return len(self.points_m)
 
     def select(self, rows: BoolArray | IntArray) -> PointCloud:
-        """The points at ``rows``: an (N,) mask or indices."""
+        """Return the points at ``rows``: an (N,) mask or indices."""
         places = np.flatnonzero(rows) if rows.dtype == bool else rows
         columns: dict[str, Any] = {}
         for column in fields(self):
@@ -190,7 +190,7 @@ class PointCloud:
 
     @staticmethod
     def concatenate(clouds: Sequence[PointCloud]) -> PointCloud:
-        """All points of all clouds in order, with the columns that every one of them has."""
+        """Join clouds in order; keeps the columns that all of them have."""
         columns: dict[str, Any] = {}
         for column in fields(PointCloud):
             parts = [getattr(cloud, column.name) for cloud in clouds]
@@ -198,7 +198,7 @@ class PointCloud:
         return PointCloud(**columns)
 
     def transformed(self, T_target_source: FloatArray) -> PointCloud:
-        """The same points after a (4, 4) rigid or similarity transform."""
+        """Return the points after a (4, 4) rigid or similarity transform."""
         linear, translation = T_target_source[:3, :3], T_target_source[:3, 3]
         scale = np.cbrt(np.linalg.det(linear))
         return replace(
@@ -211,7 +211,7 @@ class PointCloud:
 
 @dataclass(frozen=True, slots=True)
 class RegistrationStep:
-    """One iteration of any registration method, all of it that a player or plot needs."""
+    """One iteration of any registration method, complete enough to play back or plot."""
 
     index: int
     """0 for the first matching, made at the start pose."""
@@ -226,9 +226,9 @@ class RegistrationStep:
     sigma_m: float
     """Scale of the weight function; NaN for methods without one."""
     gate_m: float
-    """Distance beyond which no pair counted; infinite for methods without a gate."""
+    """Distance beyond which pairs were rejected; infinite for methods without a gate."""
     objective: float
-    """Weighted mean square the update minimised, after the update, in square metres."""
+    """Weighted mean square that the update minimised, after the update, in square metres."""
     rmse_m: float
     """Root of the weighted mean squared point distance of the pairs, before the update."""
     mean_distance_m: float
@@ -243,7 +243,7 @@ class RegistrationStep:
 
 @dataclass(frozen=True, slots=True)
 class RegistrationResult:
-    """The folded steps of a registration."""
+    """Final transform and all steps of a registration."""
 
     T_target_source: FloatArray
     """(4, 4) maps the source cloud onto the target cloud."""
@@ -255,19 +255,19 @@ class RegistrationResult:
 
 @dataclass(frozen=True, slots=True)
 class Gaps:
-    """What all cameras together see of a mesh's holes; one that two of them see counts twice."""
+    """Gaps that the cameras see in a mesh; a gap seen by two cameras counts twice."""
 
     count: int
-    """Patches of pixels side by side whose rays miss the mesh, whatever their size."""
+    """Connected groups of pixels whose rays miss the mesh, of any size."""
     large: int
-    """Those of 100 cm² or more."""
+    """Groups of 100 cm² or more."""
     area_m2: float
-    """Of all, as if each pixel's gap faced its camera at the depth of the nearest pixel that hits."""
+    """Area of all groups, as if each pixel faced the camera at the depth of the nearest pixel that hits."""
 
 
 @dataclass(frozen=True, slots=True)
 class SurfaceQuality:
-    """Measures of a mesh's holes and health (SPEC 5); the first is the headline."""
+    """Measures of a mesh's holes and validity (SPEC 5); ``no_hit_ray_share`` is the main one."""
 
     no_hit_ray_share: float
     """Share of the cameras' pixel rays that miss the mesh, 0 to 1."""
@@ -275,7 +275,7 @@ class SurfaceQuality:
     """Connected components of the graph of edges with exactly one face."""
     boundary_length_m: float
     hole_area_m2: float
-    """Fan-triangulated area of loops shorter than 1 m, without those that run around a piece."""
+    """Fan-triangulated area of loops shorter than 1 m, except those around a whole component."""
     non_manifold_edges: int
     """Edges with more than two faces."""
     components: int
@@ -283,15 +283,15 @@ class SurfaceQuality:
     unused_points: int
     """Input points that no triangle uses."""
     within_2pct_share: float = float("nan")
-    """Share of the pixels that the sensors have measured whose ray meets the mesh within 2 % of the
-    measurement, 0 to 1; NaN without sensor depth."""
+    """Share of the measured pixels whose ray meets the mesh within 2 % of the measured depth, 0 to 1; NaN
+    without sensor depth."""
     within_5pct_share: float = float("nan")
-    """The same within 5 %."""
+    """The same share within 5 %."""
     guessed_ray_share: float = float("nan")
-    """Share of the cameras' pixel rays that meet a triangle most of whose corners were inferred; NaN where
-    the source of the points is unknown."""
+    """Share of the cameras' pixel rays that meet a triangle with two or three inferred corners; NaN if the
+    source of the points is unknown."""
     gaps: Gaps | None = None
-    """Holes as a person counts them; None without cameras."""
+    """Gaps as groups of pixels; None without cameras."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,52 +305,52 @@ class Surface:
     colors: ByteArray | None = None
     """(V, 3) RGB."""
     radii_m: tuple[float, ...] = ()
-    """Radii of the balls that made it, ascending; none for a surface that no ball made."""
+    """Radii of the balls that made it, ascending; empty for a surface made by another method."""
     normals: FloatArray | None = None
-    """(V, 3) of the points that the vertices were."""
+    """(V, 3) normals of the points from which the vertices come."""
     source: ByteArray | None = None
     """(V,) ``PointSource`` of those points."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SurfaceResult(Surface):
-    """A mesh and its measures."""
+    """A mesh with its measures."""
 
     quality: SurfaceQuality
 
 
 WHITE_ROWS = 16
-"""Rows of white below the photographs of a ``Texture``."""
+"""Number of white rows below the photographs of a ``Texture``."""
 
 
 @dataclass(frozen=True, slots=True)
 class Corners:
-    """A mesh whose vertices are there once for each photograph that they take colours from."""
+    """A mesh whose vertices are repeated once for each photograph from which they take colours."""
 
     vertices: IntArray
-    """(W,) index of each in the mesh that was dressed."""
+    """(W,) index of each vertex in the original mesh."""
     triangles: IntArray
     """(F, 3) int32."""
     uv: FloatArray
-    """(W, 2) float32 in shares of the image from its upper left corner, as glTF has it; where nothing was
-    photographed, somewhere white."""
+    """(W, 2) float32 image coordinates, shares from the upper left corner (glTF); white where no camera sees
+    the triangle."""
     seen: BoolArray
     """(W,) False where no camera sees the triangles."""
 
 
 @dataclass(frozen=True, slots=True)
 class Texture:
-    """Photographs for the triangles of one mesh."""
+    """Photographs and texture coordinates for the triangles of one mesh."""
 
     image: ByteArray
-    """(H, W, 3) RGB, the photographs beside and below each other, and ``WHITE_ROWS`` below them."""
+    """(H, W, 3) RGB: the photographs in a grid, and below them ``WHITE_ROWS`` white rows."""
     camera: IntArray
-    """(F,) int32, whose photograph each triangle wears; -1 where no camera sees it."""
+    """(F,) int32 camera whose photograph is used for each triangle; -1 if no camera sees it."""
     uv: FloatArray
-    """(C, V, 2) float32, where each camera sees each vertex."""
+    """(C, V, 2) float32 texture coordinates of each vertex in each camera's photograph."""
 
     def corners(self, triangles: IntArray) -> Corners:
-        """The mesh as renderers need it, by the (F, 3) triangles that were dressed."""
+        """Return the mesh in renderers' form, by the (F, 3) triangles of the original mesh."""
         count = self.uv.shape[1]
         keys = (self.camera[:, None].astype(np.int64) + 1) * count + triangles
         used, inverse_of = np.unique(keys, return_inverse=True)

@@ -1,4 +1,4 @@
-"""Cameras that stand still around one sink: their topology, failures and duty cycle (SPEC 6.1)."""
+"""Network of fixed cameras around one sink: topology, failures and duty cycle (SPEC 6.1)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def disconnected(config: NetworkConfig) -> tuple[str, ...]:
-    """Names of the nodes without a route to the sink in the run of this config, without running it."""
+    """Return the names of the nodes without a route to the sink in this config, without running it."""
     ground = np.random.default_rng(config.run.seed).spawn(1)[0]
     places, _, success = _topology(config, ground)
     names = collection_names(config)
@@ -36,25 +36,25 @@ def disconnected(config: NetworkConfig) -> tuple[str, ...]:
 def _topology(
     config: NetworkConfig, rng: np.random.Generator
 ) -> tuple[FixedPlaces, Radio, NDArray[np.float64]]:
-    """Positions, radio, and (N, N) success probability of each link."""
+    """Return the positions, the radio, and (N, N) success probability of each link."""
     layout_rng, radio_rng = rng.spawn(2)
     places, radio = place_nodes(config.nodes, layout_rng), Radio(config.radio, config.mac, radio_rng)
     return places, radio, link_success(config, radio, places)
 
 
 def collection_names(config: NetworkConfig) -> tuple[str, ...]:
-    """Names of the nodes, the sink and the cloud if there is one, in the order of their numbers."""
+    """Return the names of the nodes, the sink and the cloud (if there is one), in the order of their ids."""
     cloud = ("cloud",) if config.uplink.exists else ()
     return (*(f"node {node + 1}" for node in range(config.nodes.count)), "sink", *cloud)
 
 
 class Collection:
-    """A network of fixed cameras; ``env`` runs it."""
+    """A network of fixed cameras, simulated by running ``env``."""
 
     def __init__(
         self, env: simpy.Environment, config: NetworkConfig, recorder: Recorder, rng: np.random.Generator
     ) -> None:
-        """Each source of randomness has a stream of its own, spawned from ``rng``."""
+        """Create the network; each source of randomness has its own stream, spawned from ``rng``."""
         ground, medium_rng, mac_rng, self._rng, uplink_rng, pause_rng = rng.spawn(6)
         self._env, self._config, self._recorder = env, config, recorder
         self.places, radio, self._success = _topology(config, ground)
@@ -65,7 +65,7 @@ class Collection:
         """Why each node is down: ``NODE_DOWN`` if it failed, ``NONE`` if it sleeps; None if it is up."""
         self._asleep = False
         interval_ns = to_ns(config.nodes.interval_s)
-        self._cameras = [  # they take images independently of each other
+        self._cameras = [  # each with its own random time of the first image
             Camera(self.shared, station, int(self._rng.integers(interval_ns or BEGIN_WITHIN_NS)))
             for station in self.stations[:-1]
         ]
@@ -101,23 +101,23 @@ class Collection:
 
     @property
     def ended(self) -> simpy.Event:
-        """Happens when every image has arrived or was given up, and no packet is left."""
+        """Event that every image has arrived or was given up, and no packet is left."""
         return self.shared.book.ended
 
     @property
     def roles(self) -> tuple[str, ...]:
-        """Role of each name."""
+        """Role of each node, in the order of the names."""
         return tuple("node" if name.startswith("node") else name for name in self.names)
 
     @property
     def positions_m(self) -> np.ndarray:
-        """(N, 2) in the order of the names; the cloud is drawn where the sink is."""
+        """(N, 2) position of each node in the order of the names; the cloud has the sink's position."""
         positions_m = self.places.positions_m
         return np.vstack([positions_m, *(positions_m[-1:] for _ in self.names[len(positions_m) :])])
 
     @property
     def fraction(self) -> float:
-        """Share of the images that have arrived or were given up; 0 if they never end."""
+        """Share of the images that have arrived or were given up; 0 without a planned number of images."""
         planned = self._config.nodes.images * self._config.nodes.count
         return sum(image.closed for image in self.shared.book.images) / planned if planned else 0.0
 
@@ -136,7 +136,7 @@ class Collection:
         self.stations[sender].report(packet, receiver, delivery)
 
     def _fail_and_recover(self, camera: Camera, station: Station) -> Generator[simpy.Event, Any, None]:
-        """Random failures and recoveries of one node."""
+        """Run the random failures and recoveries of one node, as a process."""
         env, node, nodes = self._env, station.index, self._config.nodes
         while True:
             yield env.timeout(to_ns(self._rng.exponential(3600.0 / nodes.failures_per_h)))
@@ -152,7 +152,7 @@ class Collection:
             camera.recovered = env.event()
 
     def _sleep_and_wake(self) -> Generator[simpy.Event, Any, None]:
-        """The duty cycle: all nodes wake and fall asleep together; the sink never sleeps."""
+        """Run the duty cycle, as a process: all nodes wake and fall asleep together, except the sink."""
         env, nodes = self._env, self._config.nodes
         period_ns = to_ns(nodes.duty_period_s)
         awake_ns = max(1, round(nodes.duty_cycle * period_ns))
@@ -170,7 +170,7 @@ class Collection:
         self._wake_all()
 
     def _update_state(self, node: int) -> None:
-        """Record the state of a node that failed, recovered, woke or fell asleep."""
+        """Record the new state of a node that failed, recovered, woke or fell asleep."""
         state: Cause | None = None
         if self.shared.failed[node]:
             state = Cause.NODE_DOWN
@@ -185,7 +185,7 @@ class Collection:
                 self._recorder.add(int(self._env.now), EventKind.DOWN, node, cause=state)
 
     def _reroute(self) -> None:
-        """Find the routes that avoid failed nodes."""
+        """Recompute the routes so that they avoid failed nodes."""
         works = ~np.array(self.shared.failed)
         self.shared.routes = shortest_paths(self._success * np.outer(works, works), self.shared.sink)
         self._wake_all()

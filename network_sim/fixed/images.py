@@ -1,4 +1,4 @@
-"""Images in the network: their size, their fragments, and which of these have arrived."""
+"""Images in the network: file sizes, fragments, and a record of all images and packets."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ ImageFormat = Literal["ppm", "pgm", "jpeg", "png"]
 
 
 def ppm_bytes(width_px: int, height_px: int) -> int:
-    """Size of a binary PPM file (P6) with 8 bits a channel."""
+    """Return the bytes of a binary PPM file (P6) with 8 bits per channel."""
     return len(f"P6\n{width_px} {height_px}\n255\n") + 3 * width_px * height_px
 
 
 def pgm_bytes(width_px: int, height_px: int) -> int:
-    """Size of a binary PGM file (P5) with 16 bits, such as a depth image in millimetres."""
+    """Return the bytes of a binary PGM file (P5) with 16 bits, such as a depth image in millimetres."""
     return len(f"P5\n{width_px} {height_px}\n65535\n") + 2 * width_px * height_px
 
 
 def encoded_bytes(image: np.ndarray, file_format: ImageFormat, quality: int = 90) -> int:
-    """Size of an image as a file.
+    """Return the bytes of an image as a file.
 
     Args:
-        image: (H, W, 3) uint8 colour, or (H, W) uint16 depth, which only pgm and png can hold.
-        file_format: JPEG and PNG are really encoded.
-        quality: Of JPEG, 1 to 100.
+        image: (H, W, 3) uint8 colour, or (H, W) uint16 depth, which only pgm and png can store.
+        file_format: File format; for JPEG and PNG the image is encoded to find its size.
+        quality: JPEG quality, 1 to 100.
 
     Raises:
-        InputError: the format cannot hold such an image.
+        InputError: the format cannot store such an image.
     """
     depth = image.ndim == 2 and image.dtype == np.uint16
     color = image.ndim == 3 and image.shape[2] == 3 and image.dtype == np.uint8
@@ -59,12 +59,12 @@ def encoded_bytes(image: np.ndarray, file_format: ImageFormat, quality: int = 90
 
 
 class Fragments:
-    """Which fragments of an image one place has."""
+    """The fragments of an image that one node has."""
 
     __slots__ = ("missing_count", "present")
 
     def __init__(self, count: int) -> None:
-        """None of ``count`` yet."""
+        """Start with none of ``count`` fragments."""
         self.present = bytearray(count)
         self.missing_count = count
 
@@ -77,59 +77,59 @@ class Fragments:
         return True
 
     def missing(self) -> list[int]:
-        """Indices of the missing fragments, rising."""
+        """Return the indices of the missing fragments, in rising order."""
         return [index for index, present in enumerate(self.present) if not present]
 
 
 @dataclass(slots=True)
 class Image:
-    """One image, or colour and depth of one instant, that is being sent."""
+    """An image that is being sent, or colour and depth of one instant."""
 
     id: int
     node: int
     captured_ns: int
     size_bytes: int
     data_bytes: int
-    """Most bytes of it in one packet."""
+    """Most bytes of the image in one packet."""
     at_sink: Fragments = field(init=False)
     at_cloud: Fragments = field(init=False)
     packets: int = 0
-    """How many of its packets are queued or in flight."""
+    """Number of its packets that are queued or in flight."""
     sending_over: bool = False
-    """Its camera sends no more fragments: with its last packet the image ends."""
+    """Its camera sends no more fragments: the image is given up if its last packet does not complete it."""
     loss_cause: Cause = Cause.NONE
     """Cause of its last lost packet."""
     closed: bool = False
-    """It has arrived or was given up."""
+    """The image has arrived or was given up."""
     last_news_ns: int = 0
-    """When the sink last received a new fragment, or requested the missing ones."""
+    """Time at which the sink last received a new fragment, or requested the missing ones."""
 
     def __post_init__(self) -> None:
         self.at_sink, self.at_cloud = Fragments(self.count), Fragments(self.count)
 
     @property
     def count(self) -> int:
-        """How many fragments it has."""
+        """Number of fragments of the image."""
         return -(-self.size_bytes // self.data_bytes)
 
     def index_of(self, packet: Packet) -> int:
-        """Which fragment a packet carries."""
+        """Return the index of the fragment that a packet carries."""
         return packet.first_byte // self.data_bytes
 
 
 class Book:
-    """Gives images and packets their ids, records their events, and ends the run with the last of them."""
+    """Assigns ids to images and packets, records their events, and detects when none of them is left."""
 
     def __init__(
         self, env: simpy.Environment, recorder: Recorder, data_bytes: int, header_bytes: int
     ) -> None:
-        """``data_bytes`` of an image fit into a packet, beside ``header_bytes``."""
+        """Start an empty record; a packet carries ``data_bytes`` of an image and ``header_bytes``."""
         self.env = env
         self.images: list[Image] = []
         self.cameras = 0
-        """Cameras that will take further images."""
+        """Number of cameras that will take further images."""
         self.ended = env.event()
-        """Every image has arrived or was given up, and no packet is left."""
+        """Event that every image has arrived or was given up, and no packet is left."""
         self._recorder = recorder
         self._data_bytes = data_bytes
         self._header_bytes = header_bytes
@@ -146,7 +146,7 @@ class Book:
         return image
 
     def close(self, image: Image, at: int, cause: Cause = Cause.NONE) -> None:
-        """The image is complete at the node ``at``, or given up for ``cause``; once closed it stays so."""
+        """Close an image that is complete at node ``at``, or given up for ``cause``; ignored if closed."""
         if image.closed:
             return
         image.closed = True
@@ -192,7 +192,7 @@ class Book:
         self.gone(packet, Cause.NONE)
 
     def gone(self, packet: Packet, cause: Cause) -> None:
-        """Count a packet whose end is recorded as gone."""
+        """Count a packet as gone, after its RECEIVE or DROP was recorded."""
         self._under_way -= 1
         if packet.kind is PacketKind.IMAGE:
             image = self.images[packet.image]
@@ -203,12 +203,12 @@ class Book:
         self.end_if_nothing_left()
 
     def give_up_if_lost(self, image: Image) -> None:
-        """Give an image up when none of its fragments is sent any more."""
+        """Give up an image if its camera sends no more fragments and no packet of it is left."""
         if image.sending_over and not image.packets and not image.closed:
             self.close(image, -1, image.loss_cause)
 
     def end_if_nothing_left(self) -> None:
-        """End the run when no image is open, no packet in flight and no camera active."""
+        """Trigger ``ended`` if no image is open, no packet is in flight and no camera is active."""
         if not (self._under_way or self._open or self.cameras or self.ended.triggered):
             self.ended.succeed()
 

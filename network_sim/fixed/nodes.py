@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
 STATUS_AFTER_NS = 2 * NS_PER_S
 """Time awake without a new fragment after which the sink requests the missing ones; a camera waits twice as
-long before it sends one again."""
+long before it sends its last fragment again."""
 PAUSE_NS = NS_PER_S // 50
 """Mean pause after the second unacknowledged packet in a row, doubled with each further one; without it,
 hidden nodes collide for ever."""
 MAX_DOUBLINGS = 8
 GUARD_NS = NS_PER_S // 20
-"""Within this time before the nodes fall asleep no packet is begun."""
+"""Time before the nodes fall asleep in which no transmission begins."""
 
 
 @dataclass(slots=True)
@@ -36,30 +36,30 @@ class Shared:
     env: simpy.Environment
     config: NodesConfig
     rng: np.random.Generator
-    """For the pauses of all nodes."""
+    """Random generator of the pauses of all nodes."""
     book: Book
     routes: Routes
-    """Of the nodes that have not failed."""
+    """Routes over the nodes that have not failed."""
     unreachable: tuple[int, ...]
     """Nodes without a route to the sink even when none has failed."""
     destination: int
-    """Of images: the sink or the cloud behind it."""
+    """Destination of images: the sink, or the cloud behind it."""
     acknowledged: bool
     """The medium access acknowledges packets, so that a sender learns whether its packet arrived."""
     failed: list[bool]
     up: list[bool]
-    """Neither failed nor asleep."""
+    """For each node, True if it is neither failed nor asleep."""
     mac: Mac = field(init=False)
     sleeps_at_ns: int | None = None
-    """When the nodes fall asleep next."""
+    """Time at which the nodes fall asleep next; None without a duty cycle."""
     taken: set[tuple[int, int]] = field(default_factory=set)
-    """(packet id, neighbour) of packets that have arrived there before their sender's attempt ended."""
+    """(packet id, neighbour) of packets that reached this neighbour before their sender's attempt ended."""
     requested: dict[int, tuple[int, ...]] = field(default_factory=dict)
-    """Fragments that each STATUS packet, by id, requests; empty if the image is complete."""
+    """Fragments that each STATUS packet (by id) requests; empty if the image is complete."""
 
     @property
     def sink(self) -> int:
-        """The node where all routes end."""
+        """The sink, destination of all routes."""
         return self.routes.sink
 
     @property
@@ -68,22 +68,22 @@ class Shared:
         return STATUS_AFTER_NS + round((1.0 - self.config.duty_cycle) * to_ns(self.config.duty_period_s))
 
     def next_hop(self, at: int, destination: int) -> int:
-        """The next node of a packet's route; -1 if there is none."""
+        """Return the next node of a packet's route; -1 if there is none."""
         return self.routes.next_hop(at, min(destination, self.sink))
 
 
 class Station:
-    """A node's buffer and the loop that empties it; the sink has one too, for its STATUS packets."""
+    """A node's buffer and the loop that sends its packets; the sink has one for its STATUS packets."""
 
     def __init__(self, shared: Shared, index: int) -> None:
-        """An empty buffer; ``camera`` is set for nodes that have one."""
+        """Start the sending loop with an empty buffer; a ``Camera`` sets ``camera`` on its own station."""
         self.index = index
         self.camera: Camera | None = None
         self.buffer: deque[Packet] = deque()
         self._shared = shared
         self._idle: simpy.Event | None = None
         self._unanswered = 0
-        """Consecutive packets that were not acknowledged."""
+        """Number of consecutive packets that were not acknowledged."""
         shared.env.process(self._run())
 
     def put(self, packet: Packet) -> None:
@@ -126,19 +126,19 @@ class Station:
                 yield shared.env.timeout(pause_ns)
 
     def report(self, packet: Packet, hop: int, delivery: Delivery) -> None:
-        """The outcome of a packet that was under way when its attempt ended."""
+        """Process the outcome of a packet that was still under way after ``Mac.send``."""
         self._count_own(packet, 1)
         self._finish_attempt(packet, hop, delivery)
         self.wake()
 
     def _count_own(self, packet: Packet, change: int) -> None:
-        """Packets that are under way take no room in the buffer."""
+        """Change the camera's count of waiting fragments: packets under way take no room in the buffer."""
         if self._is_own_fragment(packet):
             assert self.camera is not None
             self.camera.waiting += change
 
     def _finish_attempt(self, packet: Packet, hop: int, delivery: Delivery) -> None:
-        """After an attempt to send: the packet has arrived, stays in the buffer, or is dropped."""
+        """Process a packet after an attempt to send: it has arrived, stays in the buffer, or is dropped."""
         shared = self._shared
         taken = (packet.id, hop) in shared.taken
         shared.taken.discard((packet.id, hop))
@@ -147,12 +147,12 @@ class Station:
                 assert self.camera is not None
                 self.camera.on_sent(packet, delivery.ok, delivery.ok and hop == shared.sink)
         elif not delivery.ok and not shared.up[self.index] and not shared.failed[self.index]:
-            self.buffer.appendleft(packet)  # it fell asleep: it goes on when it wakes
+            self.buffer.appendleft(packet)  # the node fell asleep: it sends this packet when it wakes
         else:
             self._drop(packet, delivery.cause or Cause.RETRIES, ok=delivery.ok)
 
     def _pause_ns(self, delivery: Delivery) -> int:
-        """Pause after this packet."""
+        """Draw the pause in ns after a packet with this outcome."""
         if delivery.ok:
             self._unanswered = 0
         elif delivery.cause in (Cause.RETRIES, Cause.ACK_LOST):
@@ -163,7 +163,7 @@ class Station:
         return 0
 
     def _next(self) -> Packet | None:
-        """Take the packet to send from the buffer; None without one, or shortly before the node sleeps."""
+        """Take the next packet from the buffer; None if there is none or the node sleeps or soon will."""
         shared = self._shared
         env, sleeps_at_ns = shared.env, shared.sleeps_at_ns
         if not shared.up[self.index] or (sleeps_at_ns is not None and env.now + GUARD_NS > sleeps_at_ns):
@@ -193,7 +193,7 @@ class Station:
         return packet.source == self.index and packet.kind is PacketKind.IMAGE
 
     def _drop(self, packet: Packet, cause: Cause, ok: bool = False) -> None:
-        """``ok``: the sender believes that it was delivered."""
+        """Drop a packet; ``ok`` means that the sender believes it was delivered."""
         self._shared.book.dropped(packet, self.index, cause)
         if self._is_own_fragment(packet):
             assert self.camera is not None
@@ -201,16 +201,16 @@ class Station:
 
 
 class Outgoing:
-    """A camera's state of an image that it sends."""
+    """Sending state of one image at its camera."""
 
     def __init__(self, image: Image, settled: simpy.Event) -> None:
-        """Every fragment is still to send; ``settled`` happens when there is no more to send."""
+        """Start with all fragments unsent; ``settled`` is triggered when no more must be sent."""
         self.image = image
         self.to_send = deque(range(image.count))
         self.queued: set[int] = set()
         """Fragments in the buffer or on the air."""
         self.confirmed = Fragments(image.count)
-        """Fragments that the camera knows to be at the sink."""
+        """Fragments that, as the camera knows, have reached the sink."""
         self.settled = settled
         self.last_news_ns = 0
         self.probed = False
@@ -220,21 +220,21 @@ class Camera:
     """Takes images and keeps each until the sink has it or it is given up."""
 
     def __init__(self, shared: Shared, station: Station, phase_ns: int) -> None:
-        """``phase_ns`` is when the first image is taken."""
+        """Start the camera; it takes its first image at ``phase_ns``."""
         self.recovered = shared.env.event()
-        """Happens when the node recovers from a failure; a new event replaces it then."""
+        """Event that the node recovers from a failure; then a new event replaces it."""
         self._shared = shared
         self._station = station
         self._open: dict[int, Outgoing] = {}
         self.waiting = 0
-        """Its fragments in the buffer, and the one that is being sent."""
+        """Number of its fragments in the buffer or being sent."""
         self._buffer_share = max(1, shared.config.buffer_packets // 2)
         station.camera = self
         shared.book.cameras += 1
         shared.env.process(self._capture(phase_ns))
 
     def fill_buffer(self, buffer: deque[Packet]) -> None:
-        """Put the next fragments into the buffer: at most half of it, the rest is for packets to forward."""
+        """Put the next fragments into the buffer, at most half of it; the other half is for forwarding."""
         shared = self._shared
         for outgoing in self._open.values():
             while outgoing.to_send:
@@ -248,7 +248,7 @@ class Camera:
                 buffer.append(packet)
 
     def on_sent(self, packet: Packet, ok: bool, confirmed: bool) -> None:
-        """A fragment was sent: delivered as far as the node knows (``ok``), ``confirmed`` by the sink."""
+        """Process a sent fragment: delivered as far as the node knows (``ok``), ``confirmed`` by the sink."""
         shared = self._shared
         self.waiting -= 1
         outgoing = self._open.get(packet.image)
@@ -273,7 +273,7 @@ class Camera:
             shared.env.process(self._probe(outgoing))
 
     def on_status(self, image: int, missing: tuple[int, ...]) -> None:
-        """A STATUS packet came: the fragments that the sink is missing, none if the image is complete."""
+        """Process a STATUS packet with the fragments missing at the sink, none if the image is complete."""
         outgoing = self._open.get(image)
         if outgoing is None:
             return
@@ -286,12 +286,12 @@ class Camera:
         self._station.wake()
 
     def _settle(self, outgoing: Outgoing) -> None:
-        """Send no more of an image."""
+        """Stop sending an image."""
         if self._open.pop(outgoing.image.id, None) is not None:
             outgoing.settled.succeed()
 
     def _probe(self, outgoing: Outgoing) -> Generator[simpy.Event, Any, None]:
-        """Send the last fragment again after long silence: the sink may not know of the image at all."""
+        """Send the last fragment again after long silence: the sink may have received none of the image."""
         env, wait_ns = self._shared.env, 2 * self._shared.status_after_ns
         while outgoing.image.id in self._open:
             silent_ns = env.now - outgoing.last_news_ns
@@ -313,7 +313,7 @@ class Camera:
             settled = self._take_image()
             taken += 1
             if settled is None and config.images == 0 and config.interval_s == 0.0:
-                break  # without a route, now or ever: one expired image is enough
+                break  # there will never be a route: one expired image is enough
             if config.interval_s:
                 yield shared.env.timeout(to_ns(config.interval_s))
             elif settled is not None:
@@ -322,7 +322,7 @@ class Camera:
         shared.book.end_if_nothing_left()
 
     def _take_image(self) -> simpy.Event | None:
-        """Take an image; returns the event that it is settled, None without a route to the sink."""
+        """Take an image; returns its ``settled`` event, or None without a route to the sink."""
         shared, config = self._shared, self._shared.config
         node = self._station.index
         image = shared.book.capture(node, config.size_bytes(node))

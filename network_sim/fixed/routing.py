@@ -1,4 +1,4 @@
-"""Routes to the sink: shortest paths over links, by expected transmissions."""
+"""Routes to the sink: shortest paths by expected transmissions (ETX), and success rates of links."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Routes:
     """Expected transmissions to the sink; infinite without a route."""
 
     def hops(self, node: int) -> int:
-        """Links between a node and the sink; -1 without a route."""
+        """Return the number of links from a node to the sink; -1 without a route."""
         if math.isinf(self.cost[node]):
             return -1
         count = 0
@@ -37,7 +37,7 @@ class Routes:
         return count
 
     def next_hop(self, at: int, destination: int) -> int:
-        """The next node of a packet, towards the sink or down its tree; -1 without a route."""
+        """Return the next node of a packet, up the tree to the sink or down from it; -1 without a route."""
         if destination == self.sink:
             return self.parents[at]
         node = destination
@@ -52,15 +52,15 @@ class Routes:
 
 
 def shortest_paths(success: NDArray, sink: int) -> Routes:
-    """The cheapest route of every node (Dijkstra); a link costs its expected transmissions (ETX).
+    """Find the cheapest route of every node (Dijkstra); a link costs its expected transmissions (ETX).
 
     Args:
-        success: (N, N) probability that a frame from row to column arrives; 0 is no link. Booleans give the
-            fewest hops.
-        sink: where all routes end.
+        success: (N, N) probability that a frame from row to column arrives; 0 means no link. Booleans give
+            the fewest hops.
+        sink: destination of all routes.
 
     Returns:
-        Of equally cheap routes the one over the lower-numbered node, nearer to the sink.
+        The routes. Of equally cheap ones, that over the next node nearest to the sink, then lowest-numbered.
     """
     both = np.asarray(success, float) * np.asarray(success, float).T
     with np.errstate(divide="ignore"):
@@ -82,15 +82,15 @@ def shortest_paths(success: NDArray, sink: int) -> Routes:
 
 
 def link_success(config: NetworkConfig, radio: Radio, places: Places) -> NDArray[np.float64]:
-    """How likely an undisturbed data frame arrives over each link.
+    """Compute the probability that an undisturbed data frame arrives, for each link.
 
     Args:
-        config: Size and medium access of the packets. Serial lines and recorded links join every two nodes.
+        config: Size and medium access of the packets. Serial lines and recorded links connect all nodes.
         radio: Powers, threshold and noise.
-        places: Where the nodes are.
+        places: Positions of the nodes.
 
     Returns:
-        (N, N) probabilities, the mean over fading; 0 where the mean power is below the receive threshold.
+        (N, N) probabilities, averaged over fading; 0 where the mean power is below the receive threshold.
     """
     count = places.count
     if config.mac.kind in ("serial", "replay"):

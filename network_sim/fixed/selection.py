@@ -1,8 +1,8 @@
-"""Which M of N cameras send, so that together they see the surface best (SPEC 6.3, thesis 3.6.2).
+"""Selection of the M of N cameras that send, for the best joint view of the surface (SPEC 6.3, thesis 3.6.2).
 
 ``q`` (N, V) is the quality of camera i's view of surface voxel v, from 0 to 1. A set S of cameras has value
-``F(S) = sum_v w_v (1 - prod over i in S of (1 - q_iv))``: monotone and submodular, so that taking the best
-next camera M times gives at least 1 - 1/e of the optimum (Nemhauser, Wolsey and Fisher 1978).
+``F(S) = sum_v w_v (1 - prod over i in S of (1 - q_iv))``: monotone and submodular, so that the greedy choice
+of M cameras has at least 1 - 1/e of the optimum (Nemhauser, Wolsey and Fisher 1978).
 """
 
 from __future__ import annotations
@@ -23,30 +23,30 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The cameras that send."""
+    """The selected cameras."""
 
     cameras: tuple[int, ...]
-    """In the order in which they were chosen."""
+    """Camera indices, in the order of selection."""
     values: tuple[float, ...]
-    """F after each of them."""
+    """F after each selected camera."""
     evaluations: int
-    """Gains of a single camera that were computed."""
+    """Number of computed gains of a single camera."""
 
     @property
     def value(self) -> float:
-        """F of all of them."""
+        """F of all selected cameras."""
         return self.values[-1] if self.values else 0.0
 
 
 def view_quality(
     visible: BoolArray, distance_m: FloatArray, cos_incidence: FloatArray, reference_m: float
 ) -> FloatArray:
-    """(N, V) visibility x resolution x incidence.
+    """Return the view quality (N, V): visibility x resolution x incidence.
 
     Args:
         visible: (N, V) whether camera i sees voxel v.
-        distance_m: (N, V) from camera to voxel.
-        cos_incidence: (N, V) cosine between the line of sight and the surface's normal.
+        distance_m: (N, V) distance from camera to voxel.
+        cos_incidence: (N, V) cosine between the line of sight and the surface normal.
         reference_m: distance up to which the resolution is full; beyond it pixels per area fall with the
             square of the distance.
     """
@@ -55,15 +55,15 @@ def view_quality(
 
 
 def coverage(q: FloatArray, cameras: Sequence[int], weights: FloatArray | None = None) -> float:
-    """F of a set of cameras; ``weights`` (V,) are one by default."""
+    """Return F of a set of cameras; ``weights`` (V,) are one by default."""
     missed = np.prod(1.0 - q[list(cameras)], axis=0)
     return float(_weights(q, weights) @ (1.0 - missed))
 
 
 def greedy(q: FloatArray, count: int, weights: FloatArray | None = None) -> Selection:
-    """At most ``count`` cameras, always the one with the largest gain next; none that gains nothing.
+    """Select at most ``count`` cameras greedily by largest gain; cameras without a gain are left out.
 
-    Lazy: a camera's gain never grows while others are chosen, so that old gains are bounds (Minoux 1978).
+    Gains are evaluated lazily: a camera's gain never grows, so old gains are upper bounds (Minoux 1978).
 
     Raises:
         InputError: ``q`` is no (N, V) array of shares, a weight is negative, or ``count`` is not 1 to N.
@@ -75,16 +75,16 @@ def greedy(q: FloatArray, count: int, weights: FloatArray | None = None) -> Sele
 def greedy_by_cost(
     q: FloatArray, costs: FloatArray, budget: float, weights: FloatArray | None = None
 ) -> Selection:
-    """Cameras whose costs stay within ``budget``: bytes, or joules.
+    """Select cameras whose total cost stays within ``budget`` (bytes or joules).
 
-    The better of two greedy choices, by gain per cost and by gain alone; either alone can be arbitrarily bad,
-    the better one has at least (1 - 1/e) / 2 of the optimum (Leskovec et al. 2007, CELF).
+    The result is the better of two greedy choices, by gain per cost and by gain; either alone can be
+    arbitrarily bad, the better has at least (1 - 1/e) / 2 of the optimum (Leskovec et al. 2007, CELF).
 
     Args:
-        q: (N, V) how well each camera sees each voxel.
-        costs: (N,) what each camera's images cost, above zero.
-        budget: what all chosen ones may cost together.
-        weights: (V,) what each voxel is worth; one by default.
+        q: (N, V) quality of each camera's view of each voxel.
+        costs: (N,) cost of each camera's images, above zero.
+        budget: largest total cost of the selected cameras.
+        weights: (V,) weight of each voxel; one by default.
 
     Raises:
         InputError: ``q``, a weight or a cost is out of range, or the budget is less than every cost.
@@ -102,7 +102,7 @@ def greedy_by_cost(
 def at_random(
     q: FloatArray, count: int, rng: np.random.Generator, weights: FloatArray | None = None
 ) -> Selection:
-    """``count`` cameras drawn without regard to what they see."""
+    """Select ``count`` cameras at random, independent of ``q``."""
     _check(q, count, weights)
     return _as_given(q, [int(camera) for camera in rng.permutation(len(q))[:count]], weights)
 
@@ -110,14 +110,14 @@ def at_random(
 def nearest(
     q: FloatArray, count: int, distances_m: FloatArray, weights: FloatArray | None = None
 ) -> Selection:
-    """The ``count`` cameras with the least of the (N,) distances, to the sink or to what is looked at."""
+    """Select the ``count`` cameras with the least (N,) distances, for example to the sink or the scene."""
     _check(q, count, weights)
     order = np.argsort(distances_m, kind="stable")[:count]
     return _as_given(q, [int(camera) for camera in order], weights)
 
 
 def all_cameras(q: FloatArray, weights: FloatArray | None = None) -> Selection:
-    """Every camera, in order: the baseline of every selection."""
+    """Select all cameras, in order, as the baseline."""
     _check(q, len(q), weights)
     return _as_given(q, list(range(len(q))), weights)
 
@@ -135,7 +135,7 @@ def _lazy(
     costs: FloatArray,
     budget: float,
 ) -> Selection:
-    """Lazy greedy by gain over divisor; a camera that the rest of the budget does not pay for is left out."""
+    """Select lazily and greedily by gain / divisor; cameras above the remaining budget are left out."""
     remaining = _weights(q, weights).copy()
     chosen: list[int] = []
     values: list[float] = []

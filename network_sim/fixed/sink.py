@@ -18,13 +18,13 @@ if TYPE_CHECKING:
     from network_sim.trace.log import Recorder
 
 ID_BYTES = 4
-"""Number of an image, and of the runs that follow, in a STATUS packet."""
+"""Bytes for the image id and the number of runs in a STATUS packet."""
 RUN_BYTES = 4
-"""First and last index of a run of missing fragments."""
+"""Bytes for the first and last index of a run of consecutive missing fragments."""
 
 
 class Sink:
-    """Where all routes end."""
+    """The sink: destination of all routes, and gateway to the cloud if there is an uplink."""
 
     def __init__(
         self,
@@ -34,7 +34,7 @@ class Sink:
         recorder: Recorder,
         rng: np.random.Generator,
     ) -> None:
-        """``station`` sends the STATUS packets; with an uplink, fragments go on to the cloud."""
+        """Create the sink; ``station`` sends STATUS packets, an uplink forwards fragments to the cloud."""
         self._shared = shared
         self._station = station
         self._reported_ns: dict[int, int] = {}
@@ -45,7 +45,7 @@ class Sink:
             self._uplink = Uplink(shared.env, uplink, recorder, rng, *places, *callbacks)
 
     def receive(self, packet: Packet) -> None:
-        """A fragment arrived over the radio."""
+        """Process a fragment that arrived over the radio."""
         book = self._shared.book
         image = book.images[packet.image]
         new = image.at_sink.add(image.index_of(packet))
@@ -63,12 +63,12 @@ class Sink:
             self._report_complete(image)
 
     def _needs_status(self, image: Image) -> bool:
-        """Whether the camera needs STATUS packets, as it cannot know by itself which fragments arrive."""
+        """Return whether the camera needs STATUS packets to learn which fragments have arrived."""
         shared = self._shared
         return shared.config.retransmit and (not shared.acknowledged or shared.routes.hops(image.node) != 1)
 
     def _report_complete(self, image: Image) -> None:
-        """Send the camera a STATUS that its image is complete, again later if it goes on sending."""
+        """Send the camera a STATUS that its image is complete; repeat it later if fragments still arrive."""
         now_ns = int(self._shared.env.now)
         last_ns = self._reported_ns.get(image.id)
         due = last_ns is None or now_ns - last_ns >= self._shared.status_after_ns
@@ -88,7 +88,7 @@ class Sink:
             yield shared.env.timeout(shared.status_after_ns - silent_ns)
 
     def _missing_for_status(self, image: Image) -> tuple[int, ...]:
-        """The missing fragments, as many runs as fit into one packet."""
+        """Return the missing fragments, limited to the runs that fit into one packet."""
         config = self._shared.config
         room = max(1, (config.payload_bytes - config.header_bytes - ID_BYTES) // RUN_BYTES)
         missing = image.at_sink.missing()

@@ -1,6 +1,6 @@
-"""The cellular hop from the sink to the cloud: one sender with a queue, a latency and random loss.
+"""Cellular uplink from the sink to the cloud: one sender with a queue, a latency and random loss.
 
-They are set, or those of a recorded link, which begins with the run.
+Rate, latency and loss are configured, or come from a recorded link that is replayed from the run's start.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 
 class Uplink:
-    """Sends packets in order; a lost one is not sent again.
+    """Sends packets in order; it does not retransmit lost packets.
 
-    It records ENQUEUE and DELIVER, and LOSS and DROP with ``UPLINK``. It uses none of the nodes' radio, so
-    there is no AIR: the duration of DELIVER or LOSS is the time it took to send.
+    It records ENQUEUE and DELIVER, and LOSS and DROP with ``UPLINK``. It does not use the nodes' radio, so
+    there is no AIR: the duration of DELIVER or LOSS is the transmission time.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class Uplink:
         receive: Callable[[Packet, int], None],
         lost: Callable[[Packet], None],
     ) -> None:
-        """``receive(packet, cloud)`` gets each packet that arrives, ``lost(packet)`` each other one.
+        """Create the uplink; it calls ``receive(packet, cloud)`` on arrival, ``lost(packet)`` on loss.
 
         Raises:
             InputError: ``config`` has neither a rate nor a recorded link that can be read.
@@ -87,7 +87,7 @@ class Uplink:
         self._receive(packet, self._cloud)
 
     def _report_loss(self, packet: Packet, travels_ns: int) -> Generator[simpy.Event, Any, None]:
-        """The sink finds out right after the packet should have arrived."""
+        """Report a loss to the sink, right after the packet should have arrived."""
         yield self._env.timeout(travels_ns + 1)
         self._lost(packet)
 

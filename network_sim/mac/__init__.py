@@ -20,7 +20,7 @@ FRAME_HEADER_BYTES: dict[MacKind, int] = {
     "ieee80211b": dcf.HEADER_BYTES,
     "ieee802154": ieee802154.PHY_BYTES + ieee802154.HEADER_BYTES,
 }
-"""What a medium access adds to a packet to make a frame of it; the others add nothing."""
+"""Bytes that each medium access adds to a packet to form a frame; the others add none."""
 
 
 class Mac(Protocol):
@@ -29,13 +29,13 @@ class Mac(Protocol):
     def send(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Delivery]:
         """Carry a packet to a neighbour: ``delivery = yield from mac.send(packet, a, b)``.
 
-        A sender has one packet at a time, besides those that are ``under_way``. ``Delivery.ok`` is what the
-        sender knows.
+        A sender sends one packet after the other; earlier ones may still be ``under_way``. ``Delivery.ok`` is
+        the sender's knowledge.
         """
 
 
 def make_mac(context: MacContext) -> Mac:
-    """The medium access that ``context.config.mac.kind`` names."""
+    """Create the medium access named by ``context.config.mac.kind``."""
     kind = context.config.mac.kind
     if kind in ("ideal", "serial"):
         return OwnLink(context)

@@ -1,4 +1,4 @@
-"""Bianchi's model of saturated stations that all hear one another (SPEC 6.3).
+"""Bianchi's throughput model of saturated stations that all hear one another (SPEC 6.3).
 
 G. Bianchi, "Performance analysis of the IEEE 802.11 distributed coordination function", IEEE JSAC 18(3),
 2000. Every station always has a packet, retries for ever and collides in each attempt with the same
@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """Times and sizes of a medium access; every frame of one kind is equally long."""
+    """Times and sizes of a medium access; all frames of one kind have the same length."""
 
     payload_bits: float
     header_us: float
@@ -27,7 +27,7 @@ class Timing:
     sifs_us: float
     difs_us: float
     delay_us: float
-    """Propagation from one station to another."""
+    """Propagation delay between two stations."""
 
 
 DSSS_11 = Timing(
@@ -47,14 +47,14 @@ DSSS_11 = Timing(
 
 @dataclass(frozen=True, slots=True)
 class Saturated:
-    """Saturation throughput and the probabilities behind it."""
+    """Saturation throughput and the probabilities from which it follows."""
 
     throughput_bps: float
-    """Payload, of all stations together."""
+    """Payload throughput of all stations together."""
     collision_probability: float
-    """Of an attempt (p)."""
+    """Probability p that an attempt collides."""
     attempt_probability: float
-    """Of a station in a slot (tau)."""
+    """Probability tau that a station transmits in a slot."""
 
 
 def bianchi(
@@ -65,19 +65,19 @@ def bianchi(
     rts: bool = False,
     silence_us: float | None = None,
 ) -> Saturated:
-    """Saturation throughput.
+    """Compute the saturation throughput of n stations.
 
     Args:
-        stations: n, at least 1.
-        timing: of the medium access.
-        window: W, backoffs of the first attempt to choose from.
-        stages: m, doublings of the window.
-        rts: with RTS/CTS, or basic access.
-        silence_us: interframe space after a collision; None is a DIFS, as Bianchi assumes. Stations of the
-            standard wait for an EIFS (364 us in IEEE 802.11b).
+        stations: number of stations n, at least 1.
+        timing: times and sizes of the medium access.
+        window: contention window W of the first attempt, slots.
+        stages: number m of doublings of the window.
+        rts: True for RTS/CTS, False for basic access.
+        silence_us: interframe space after a collision; None is a DIFS, as Bianchi assumes. Stations that
+            follow the standard wait for an EIFS (364 us in IEEE 802.11b).
 
     Returns:
-        Bianchi's equations 7 to 13, without a limit of retries.
+        Throughput and probabilities from Bianchi's equations 7 to 13, without a limit of retries.
     """
 
     p, tau = _attempts(stations, window, stages)
@@ -99,10 +99,10 @@ def bianchi(
 
 
 def _attempts(stations: int, window: int, stages: int) -> tuple[float, float]:
-    """Probabilities that an attempt collides, and that a station attempts in a slot."""
+    """Solve for the probabilities p that an attempt collides and tau that a station transmits in a slot."""
 
     def attempts(p: float) -> float:
-        # The sum of (2p)^i, which his closed form divides by 1 - 2p, has no gap at p = 1/2.
+        # Bianchi's closed form divides by 1 - 2p; the sum of (2p)^i is also defined at p = 1/2.
         growth = sum((2.0 * p) ** stage for stage in range(stages))
         return 2.0 / (window + 1.0 + p * window * growth)
 

@@ -1,4 +1,4 @@
-"""What every medium access works with, and random numbers for its backoffs."""
+"""Clock, channel and callbacks that every medium access needs, and random numbers for its backoffs."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from network_sim.trace.log import Recorder
 
 _BLOCK = 4096
-"""Random numbers are drawn in blocks: a call for each would dominate the run time."""
+"""Random numbers drawn per call: one call for each number would dominate the run time."""
 
 
 def ignore(packet: Packet, sender: int, receiver: int, delivery: Delivery) -> None:
-    """For senders that never ask what became of a packet."""
+    """Ignore the reported outcome of a packet (default of ``MacContext.report``)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,24 +29,24 @@ class MacContext:
     """The clock, the channel and the nodes of one medium access."""
 
     env: simpy.Environment
-    """Its clock counts nanoseconds."""
+    """Simulation environment; its clock counts nanoseconds."""
     medium: Medium
     """The shared channel; ideal and serial links do not use it."""
     config: NetworkConfig
-    """Of the whole network; ``config.mac`` is this medium access."""
+    """Config of the whole network; ``config.mac`` is for this medium access."""
     recorder: Recorder
-    """Gets AIR, ACK, LOSS and DELIVER."""
+    """Receives the events AIR, ACK, LOSS and DELIVER."""
     rng: np.random.Generator
-    """Draws backoffs."""
+    """Random generator of the backoffs."""
     up: Callable[[int], bool]
-    """Whether a node is awake."""
+    """Returns whether a node is awake."""
     receive: Callable[[Packet, int], None]
-    """Gets each packet once per ``send`` at most, and the node that it has reached."""
+    """Called with a packet and the node that it has reached, at most once per ``send``."""
     report: Callable[[Packet, int, int, Delivery], None] = ignore
-    """Gets each packet that was under way when ``send`` ended, its sender, its receiver, and the outcome."""
+    """Called with packet, sender, receiver and outcome of each packet that was under way after ``send``."""
 
 
 def random_below(most: int, rng: np.random.Generator) -> Iterator[int]:
-    """Random numbers below a power of two; their lowest bits are those of smaller windows."""
+    """Yield random integers below a power of two; their lowest bits serve for smaller windows."""
     while True:
         yield from rng.integers(0, most, size=_BLOCK).tolist()

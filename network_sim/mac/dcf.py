@@ -1,9 +1,9 @@
 """IEEE 802.11b distributed coordination function (SPEC 6.3), with or without RTS/CTS.
 
-Contention is resolved per transmission, not per slot: a station knows when its countdown would end, and a
-busy channel freezes the rest of it. One timer runs for the countdown that ends first, an overtaken timer does
-nothing, and a countdown that nothing can disturb is skipped. A reply is put on the air when the frame before
-it ends, to start a SIFS later: listeners do not see the channel idle between them.
+Contention is resolved per transmission, not per slot: a station knows when its countdown will expire, and a
+busy channel freezes the remaining slots. One timer runs for the countdown that expires first; an outdated
+timer does nothing, and a countdown that nothing can disturb takes no event. A reply is put on the air at the
+end of the frame before it, with a start a SIFS later: no listener sees an idle channel between them.
 """
 
 from __future__ import annotations
@@ -28,38 +28,38 @@ DIFS_NS = SIFS_NS + 2 * SLOT_NS
 PLCP_NS = 192_000
 """Long preamble and PLCP header."""
 PROPAGATION_NS = 1_000
-"""Bianchi's delay from one station to another; a reply takes twice as long."""
+"""Bianchi's propagation delay between two stations; frame and reply together take twice as long."""
 GAP_NS = SIFS_NS + 2 * PROPAGATION_NS
-"""Between a frame and its reply."""
+"""Time between a frame and its reply."""
 HEADER_BYTES = 28 + 8
-"""MAC header with check sum, and LLC/SNAP."""
+"""Size of the MAC header with check sum, and of LLC/SNAP."""
 ACK_BYTES = 14
 RTS_BYTES = 20
 FASTEST_BPS = 11e6
 CONTROL_BPS = 2e6
-"""Acknowledgements, RTS and CTS; a network of 1 Mb/s has no faster ones."""
+"""Rate of acknowledgements, RTS and CTS, except in a network of 1 Mb/s, which sends these at 1 Mb/s too."""
 EIFS_NS = SIFS_NS + PLCP_NS + 8 * ACK_BYTES * 1000 + DIFS_NS
-"""Silence after a frame that could not be read: its acknowledgement may be on the air, at 1 Mb/s."""
+"""Silence after a damaged frame: its acknowledgement may be on the air, at 1 Mb/s."""
 REPLY_WAIT_NS = GAP_NS + SLOT_NS + PLCP_NS
-"""From the end of a frame until its sender counts it as lost; a DIFS and the next countdown follow."""
+"""Time from the end of a frame until its sender counts it as lost; a DIFS and a countdown follow."""
 MIN_WINDOW = 32
 MAX_WINDOW = 1024
 ATTEMPTS = 7
-"""Frames, or RTS, for a packet before it is dropped, if ``mac.retries`` says nothing."""
+"""Attempts (data frames, or RTS) per packet before it is dropped, if ``mac.retries`` is None."""
 
 _NEVER = 2**62
 _AIR, _ACK, _DELIVER, _NONE = EventKind.AIR, EventKind.ACK, EventKind.DELIVER, Cause.NONE
-"""An enumeration is slow to look up, and these are for every packet."""
+"""Local names, because enumeration members are slow to look up and these are used for every packet."""
 _FIRST_ATTEMPT = Delivery(True, Cause.NONE, 1)
 
 
 def air_ns(frame_bytes: int, rate_bps: float) -> int:
-    """Time on the air of a frame with its preamble."""
+    """Return the time on the air of a frame, preamble included."""
     return PLCP_NS + round(8e9 * frame_bytes / rate_bps)
 
 
 def data_ns(size_bytes: int, rate_bps: float = FASTEST_BPS) -> int:
-    """Time on the air of a data frame.
+    """Return the time on the air of a data frame.
 
     Args:
         size_bytes: payload of the medium access: application bytes with UDP and IP headers.
@@ -69,50 +69,50 @@ def data_ns(size_bytes: int, rate_bps: float = FASTEST_BPS) -> int:
 
 
 ACK_NS = air_ns(ACK_BYTES, CONTROL_BPS)
-"""Also of a CTS, which has the same size; in a network of 1 Mb/s both take longer."""
+"""Duration of an acknowledgement or a CTS (same size); in a network of 1 Mb/s both take longer."""
 
 
 @dataclass(slots=True, eq=False)
 class _Station:
-    """A node's view of the channel, and its countdown.
+    """A node's view of the channel, and its backoff countdown.
 
-    Three states: it counts (``from_ns`` is set), it is frozen by a busy channel, or it is sending. Without a
-    packet only the backoff after the last one goes on; when that is over it leaves the channel.
+    A station is in one of three states: counting down (``from_ns`` is set), frozen by a busy channel, or
+    sending. Without a packet it only finishes the backoff after its last packet, then unsubscribes.
     """
 
     node: int
     counting: dict[int, _Station]
     """The stations with a packet that are not frozen."""
     unsubscribe: Callable[[_Station], None]
-    """Ends a station's subscription."""
+    """Cancels a station's subscription to the channel."""
     eifs_ns: int
     listener: Listener | None = None
-    """Its subscription to the channel; None when there is nothing to count down."""
+    """The subscription to the channel; None when there is nothing to count down."""
     event: simpy.Event | None = None
-    """Succeeds when it may send; None without a packet."""
+    """Succeeds when the station may send; None without a packet."""
     slots: int = 0
-    """Left to count down."""
+    """Slots left to count down."""
     begins_ns: int = 0
-    """When its next frame begins, once that is certain."""
+    """Start of its next frame, once that is certain."""
     from_ns: int = _NEVER
-    """Start of the countdown; never while frozen."""
+    """Start of the countdown; ``_NEVER`` while frozen or sending."""
     free_ns: int = 0
-    """End of the interframe space after the last frame it heard."""
+    """End of the interframe space after the last frame that it heard."""
     reserved_ns: int = -DIFS_NS
     """End of the reservations that it has read (NAV)."""
     own_free_ns: int = 0
-    """End of the interframe space after its own last frame, with the wait for a reply."""
+    """End of the interframe space after its own last frame, including the wait for a reply."""
     sending: bool = False
     arrived: bool = False
-    """Its packet has reached the receiver, whether or not it knows."""
+    """Its packet has reached the receiver, even if the acknowledgement was lost."""
 
     @property
     def expiry_ns(self) -> int:
-        """When the countdown ends if nothing freezes it."""
+        """Time at which the countdown expires if nothing freezes it."""
         return self.from_ns + self.slots * SLOT_NS
 
     def on_busy(self, now_ns: int) -> None:
-        """Freeze, unless the countdown ends at this instant: then it sends too, and the frames collide."""
+        """Freeze the countdown, unless it expires now: then the station sends too, and the frames collide."""
         from_ns = self.from_ns
         if from_ns == _NEVER:
             return
@@ -132,7 +132,7 @@ class _Station:
             self.resume()
 
     def update_nav(self, free_ns: int, damaged: bool) -> None:
-        """Update the reservation from the last frame; a longer one than its own stays valid."""
+        """Update the reservation (NAV) from the last frame; a longer earlier reservation stays valid."""
         if damaged:
             self.free_ns = max(free_ns + self.eifs_ns, self.reserved_ns + DIFS_NS)
         else:
@@ -141,7 +141,7 @@ class _Station:
             self.free_ns = self.reserved_ns + DIFS_NS
 
     def resume(self) -> None:
-        """Count down as soon as both interframe spaces are over."""
+        """Start the countdown at the end of both interframe spaces."""
         self.from_ns = self.free_ns if self.free_ns > self.own_free_ns else self.own_free_ns
         if self.event is not None:
             self.counting[self.node] = self
@@ -151,12 +151,12 @@ class Dcf:
     """Medium access of all stations of one channel."""
 
     def __init__(self, context: MacContext, wait_after_loss: bool = True) -> None:
-        """Stations that have heard and sent nothing yet.
+        """Create a medium access whose stations have heard and sent nothing yet.
 
         Args:
-            context: Clock, channel and nodes; ``config.mac.rts`` says whether to use RTS/CTS.
-            wait_after_loss: follow the standard: an EIFS after damaged frames, and a sender waits for the
-                missing reply. False waits a DIFS only, as Bianchi's model assumes.
+            context: Clock, channel and nodes; ``config.mac.rts`` selects RTS/CTS.
+            wait_after_loss: True follows the standard: an EIFS after damaged frames, and a sender waits for
+                the missing reply. False waits for a DIFS only, as Bianchi's model assumes.
         """
         self._env = context.env
         self._medium = context.medium
@@ -212,7 +212,7 @@ class Dcf:
         return Delivery(False, Cause.ACK_LOST if station.arrived else Cause.RETRIES, self._attempts)
 
     def _contend(self, station: _Station, size_bytes: int) -> simpy.Event | None:
-        """Event that the station may send; None if nothing can happen before its frame is over."""
+        """Return the event that the station may send; None if nothing can happen before its frame is over."""
         env = self._env
         now_ns = int(env.now)
         self._backing_off.pop(station.node, None)
@@ -236,7 +236,7 @@ class Dcf:
         return station.event
 
     def _subscribe(self, station: _Station, now_ns: int) -> None:
-        """Listen to the channel; a station that finds it idle for long enough needs no backoff."""
+        """Subscribe to the channel; a station that finds it idle for long enough needs no backoff."""
         medium, node = self._medium, station.node
         listener = station.listener = medium.subscribe(node, station.on_busy, station.on_idle)
         station.update_nav(*medium.last_heard(node))
@@ -247,13 +247,13 @@ class Dcf:
             station.from_ns = max(station.free_ns, station.own_free_ns, now_ns)
 
     def _unsubscribe(self, station: _Station) -> None:
-        """Stop listening: there is nothing to send and nothing to count down."""
+        """Unsubscribe from the channel: there is nothing to send and nothing to count down."""
         self._medium.unsubscribe(station.node)
         self._backing_off.pop(station.node, None)
         station.listener, station.from_ns, station.sending = None, _NEVER, False
 
     def _begin_backoff(self, station: _Station, window: int) -> None:
-        """Draw the next backoff, which runs with or without another packet."""
+        """Draw the next backoff, which counts down even without another packet."""
         station.slots = next(self._backoffs) & (window - 1)
         station.sending = False
         self._backing_off[station.node] = station
@@ -262,7 +262,7 @@ class Dcf:
         self._schedule()
 
     def _schedule(self) -> None:
-        """Set the timer to the countdown that ends first."""
+        """Set the timer to the countdown that expires first."""
         if not self._counting:
             return
         first_ns = min([station.from_ns + station.slots * SLOT_NS for station in self._counting.values()])
@@ -272,7 +272,7 @@ class Dcf:
             timer.callbacks.append(self._fire)
 
     def _fire(self, _: simpy.Event) -> None:
-        """Let every station send whose countdown ends now."""
+        """Let every station whose countdown expires now send."""
         now_ns = int(self._env.now)
         if now_ns != self._timer_ns:
             return
@@ -290,7 +290,7 @@ class Dcf:
     def _exchange(
         self, packet: Packet, station: _Station, receiver: int
     ) -> Generator[simpy.Event, Any, Cause]:
-        """One attempt; returns ``NONE`` when the sender has the acknowledgement."""
+        """Make one attempt; returns ``NONE`` if the sender got the acknowledgement, else the cause."""
         env, sender, size_bytes = self._env, station.node, packet.size_bytes
         cts, begins_ns = None, station.begins_ns
         if self._rts:
@@ -328,7 +328,7 @@ class Dcf:
     def _reserve(
         self, packet: Packet, station: _Station, receiver: int
     ) -> Generator[simpy.Event, Any, Transmission | None]:
-        """RTS and CTS; returns the CTS, after which the data frame has to be sent, or None."""
+        """Exchange RTS and CTS; returns the CTS, which the data frame follows, or None on failure."""
         sender, begins_ns, rest_ns = station.node, station.begins_ns, GAP_NS + self._reply_ns + GAP_NS
         rts = self._start_frame(
             _ACK, packet, sender, receiver, RTS_BYTES, begins_ns, self._rts_ns, rest_ns, None
@@ -353,7 +353,7 @@ class Dcf:
     def _start_reply(
         self, packet: Packet, sender: int, receiver: int, begins_ns: int, rest_ns: int, to: Transmission
     ) -> Transmission:
-        """An acknowledgement or a CTS to a frame that ends now."""
+        """Put an acknowledgement or a CTS on the air, in reply to a frame that ends now."""
         return self._start_frame(
             _ACK, packet, sender, receiver, ACK_BYTES, begins_ns, self._reply_ns, rest_ns, to
         )
@@ -370,7 +370,7 @@ class Dcf:
         reserve_ns: int,
         replied_to: Transmission | None,
     ) -> Transmission:
-        """Put a frame on the air; the one that it replies to ends now."""
+        """Put a frame on the air; the frame to which it replies ends now."""
         how = self._modulation if kind is _AIR else self._control
         frame = self._medium.start(sender, duration_ns, receiver, size_bytes, how, begins_ns, reserve_ns)
         if replied_to is not None:
@@ -381,7 +381,7 @@ class Dcf:
         return frame
 
     def _outcome(self, frame: Transmission) -> Cause:
-        """Why a frame that ends now did not arrive; ``NONE`` if it did."""
+        """Return why a frame that ends now did not arrive; ``NONE`` if it did."""
         cause = self._medium.outcome(frame)
         if not (self._up(frame.sender) and self._up(frame.receiver)):
             return Cause.NODE_DOWN
@@ -390,7 +390,7 @@ class Dcf:
     def _fail_attempt(
         self, packet: Packet, station: _Station, frame: Transmission, cause: Cause, wait_ns: int
     ) -> None:
-        """End an attempt with this frame; the sender waits ``wait_ns`` for the missing reply."""
+        """Record the attempt that failed with this frame; its sender waits ``wait_ns`` for the reply."""
         now_ns = frame.end_ns
         self._medium.clear(frame)
         receiver = frame.receiver if frame.sender == station.node else frame.sender

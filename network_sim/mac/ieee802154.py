@@ -1,9 +1,9 @@
 """Unslotted IEEE 802.15.4 at 2.4 GHz: CSMA/CA with acknowledgement and retries (SPEC 6.1).
 
-A node waits a random number of backoff periods, assesses the channel (CCA), turns its radio round and sends.
-During the turnaround it is deaf: a frame that starts then collides. Nothing is computed per slot: an attempt
-costs one event for backoff and assessment, and one for each part of the exchange; where nothing else happens
-meanwhile, one up to the end of the frame and one for its acknowledgement.
+A node waits a random number of backoff periods, assesses the channel (CCA), switches its radio to sending
+and sends. During this turnaround it is deaf: a frame that starts then collides. Nothing is computed per slot:
+an attempt takes one simulation event for backoff and assessment, and one for each part of the exchange; if
+nothing else happens meanwhile, one up to the end of the frame and one for its acknowledgement.
 """
 
 from __future__ import annotations
@@ -25,29 +25,29 @@ BACKOFF_NS = 20 * SYMBOL_NS
 CCA_NS = 8 * SYMBOL_NS
 TURNAROUND_NS = 12 * SYMBOL_NS
 ACK_WAIT_NS = 54 * SYMBOL_NS
-"""From the end of a frame until its sender stops to wait for the end of the acknowledgement."""
+"""Time from the end of a frame until its sender stops waiting for the end of the acknowledgement."""
 PHY_BYTES = 6
-"""Preamble, start of frame and length."""
+"""Size of preamble, start of frame and length."""
 CHECKED_BYTES = 5
-"""Frame control, sequence number and check sum."""
+"""Size of frame control, sequence number and check sum."""
 HEADER_BYTES = CHECKED_BYTES + 6
-"""The same with a network and two short addresses."""
+"""``CHECKED_BYTES`` with a network address and two short node addresses."""
 ACK_BYTES = PHY_BYTES + CHECKED_BYTES
 ACK_NS = ACK_BYTES * BYTE_NS
 ACKNOWLEDGED_NS = TURNAROUND_NS + ACK_NS
-"""From the end of a frame to that of its acknowledgement."""
+"""Time from the end of a frame to the end of its acknowledgement."""
 MIN_BE = 3
 MAX_BE = 5
 MAX_CSMA_BACKOFFS = 4
 MAX_FRAME_RETRIES = 3
 _WINDOWS = tuple((1 << min(MIN_BE + busy, MAX_BE)) - 1 for busy in range(MAX_CSMA_BACKOFFS + 1))
-"""The most backoff periods that a node waits, by how many assessments found the channel busy."""
+"""Most backoff periods that a node waits, by the number of assessments that found the channel busy."""
 _AIR, _ACK, _DELIVER, _NONE = EventKind.AIR, EventKind.ACK, EventKind.DELIVER, Cause.NONE
-"""An enumeration is slow to look up, and these are for every frame."""
+"""Local names, because enumeration members are slow to look up and these are used for every frame."""
 
 
 def spacing_ns(frame_bytes: int) -> int:
-    """Silence of a sender after a frame of this size without its PHY header (SIFS or LIFS)."""
+    """Return the silence (SIFS or LIFS) after a frame; ``frame_bytes`` excludes the PHY header."""
     return (12 if frame_bytes <= 18 else 40) * SYMBOL_NS
 
 
@@ -58,7 +58,7 @@ class Ieee802154:
         self._env = context.env
         self._medium = context.medium
         self._next_ns = context.env.peek if context.medium.places.static else lambda: 0
-        """When the next event is; who moves is always about to."""
+        """Returns the time of the next event; 0 if nodes move, which then counts as an event now."""
         self._ack = context.config.mac.ack
         retries = context.config.mac.retries
         self._attempts = 1 + (MAX_FRAME_RETRIES if retries is None else retries) if self._ack else 1
@@ -69,15 +69,15 @@ class Ieee802154:
         self._losses = LinkLosses(loss, context.config.run.seed) if loss.share else None
         self._ready_ns: dict[int, int] = {}
         self._acking_until_ns: dict[int, int] = {}
-        """Until when in ns each receiver is busy with an acknowledgement."""
+        """Time until which each receiver is busy with an acknowledgement."""
         self._backoffs = random_below(1 << MAX_BE, context.rng)
 
     def send(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Delivery]:
         """Carry a packet to a neighbour: ``delivery = yield from mac.send(packet, a, b)``.
 
         Returns:
-            ``ok`` is what the sender knows, ``cause`` what happened: without acknowledgements a packet that
-            did not arrive is ``ok`` with a cause; one that was dropped although it arrived has ``ACK_LOST``.
+            ``ok`` is the sender's knowledge, ``cause`` the true outcome: without acknowledgements a packet
+            that was lost is ``ok`` with a cause; one that was dropped although it arrived has ``ACK_LOST``.
         """
         arrived, frame_bytes = False, PHY_BYTES + HEADER_BYTES + packet.size_bytes
         for attempt in range(self._attempts):
@@ -102,10 +102,10 @@ class Ieee802154:
     def _access(
         self, packet: Packet, sender: int, receiver: int
     ) -> Generator[simpy.Event, Any, tuple[Cause, int]]:
-        """CSMA/CA: wait for an idle channel, without an event wherever nothing else happens before.
+        """Wait for an idle channel (CSMA/CA), without a simulation event if nothing else happens before.
 
         Returns:
-            Why the sender may not send, or ``NONE``, and when its frame begins.
+            Why the sender may not send, or ``NONE``, and the start of its frame in ns.
         """
         env, waited_ns = self._env, int(self._env.now)
         at_ns = max(self._ready_ns.get(sender, 0), waited_ns)
@@ -131,17 +131,17 @@ class Ieee802154:
         return refusal, at_ns
 
     def _busy(self, node: int, at_ns: int) -> bool:
-        """Whether an assessment that ends then finds the channel busy, or the node has to acknowledge.
+        """Return whether an assessment that ends at ``at_ns`` finds the channel or the node itself busy.
 
-        The end of the assessment decides (as in ns-3's lr-wpan): only the turnaround is vulnerable. It ends
-        now, or later if nothing happens before.
+        The end of the assessment decides (as in ns-3's lr-wpan): only the turnaround is vulnerable. It is
+        now, or later if nothing happens before. A node is busy while it sends an acknowledgement.
         """
         return at_ns < self._acking_until_ns.get(node, 0) or self._medium.busy_until(node, at_ns)
 
     def _transmit(
         self, packet: Packet, sender: int, receiver: int, frame_bytes: int, begins_ns: int
     ) -> Generator[simpy.Event, Any, Cause]:
-        """Put the frame on the air at a time, now or later; returns why it did not arrive."""
+        """Put the frame on the air at ``begins_ns``, now or later; returns why it was lost, or ``NONE``."""
         env, duration_ns = self._env, frame_bytes * BYTE_NS
         self._add(begins_ns, _AIR, packet, sender, receiver, frame_bytes, _NONE, duration_ns)
         transmission = self._medium.start(sender, duration_ns, receiver, frame_bytes, "oqpsk", begins_ns)
@@ -157,10 +157,10 @@ class Ieee802154:
     def _acknowledge(
         self, packet: Packet, sender: int, receiver: int, cause: Cause, ended_ns: int
     ) -> Generator[simpy.Event, Any, bool]:
-        """The acknowledgement of a frame that has just ended, unless that failed for ``cause``.
+        """Send the acknowledgement of a frame that has just ended, unless the frame failed for ``cause``.
 
         Returns:
-            Whether its sender has received it.
+            Whether the frame's sender has received the acknowledgement.
         """
         env = self._env
         if cause:

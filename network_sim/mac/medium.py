@@ -1,11 +1,11 @@
 """One shared radio channel: frames on the air, carrier sense, and which frames survive (SPEC 6.3).
 
 A frame is received when its power reaches the receive threshold, exceeds the largest sum of overlapping
-powers by the capture ratio, and its receiver was not sending meanwhile; the stronger frame survives whichever
-began first. IEEE 802.15.4 spreads its bits over so many chips that this would be too strict: its receivers
-stay with the frame that came first, whose overlapped bits are wrong as often as the ratio of the powers says
-(as ns-3's lr-wpan has it). A node senses a frame from the carrier-sense threshold on, without fading. Signals
-travel in no time.
+powers by the capture ratio, and its receiver was not sending meanwhile; the stronger frame survives even if
+it began later. This would be too strict for IEEE 802.15.4, which spreads its bits over many chips: its
+receivers keep the frame that began first, and the ratio of the powers gives the error rate of the overlapped
+bits (as in ns-3's lr-wpan). A node senses a frame whose mean power reaches the carrier-sense threshold;
+sensing has no fading. Propagation takes no time.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from network_sim.radio.propagation import Modulation, Radio
 
 MEMORY_NS = 5_000_000
-"""How long ended transmissions are kept: longer than a medium access looks back."""
+"""Time for which ended transmissions are kept: longer than a medium access looks back."""
 REFRESH_NS = 100_000_000
 """Interval at which powers between moving nodes are recomputed: a vehicle moves about a metre."""
 _NONE = Cause.NONE
-"""An enumeration is slow to look up, and this is for every frame."""
+"""A local name, because enumeration members are slow to look up and this is used for every frame."""
 
 
 @dataclass(slots=True, eq=False)
@@ -42,21 +42,21 @@ class Transmission:
     start_ns: int
     end_ns: int
     reserved_ns: int
-    """End of the reservation (NAV): the end of the frame, or of the exchange it belongs to."""
+    """End of the reservation (NAV): the end of the frame, or of the exchange that it is part of."""
     power_w: float
-    """At the receiver, with fading."""
+    """Power at the receiver, with fading."""
     size_bytes: int
     modulation: Modulation
-    """For ``Radio.error_rate``."""
+    """Modulation, from which ``Radio.error_rate`` computes bit errors."""
     overlaps: list[Transmission]
     """Frames that were on the air at the same time, in the order in which they began."""
     heard: list[Listener]
-    """Listeners that sense it."""
+    """Listeners that sense the frame."""
     earlier: int = 0
-    """How many of the overlapping frames began before it."""
+    """Number of overlapping frames that began before it."""
 
     def peak_interference_w(self, powers_w: list[float]) -> float:
-        """The largest sum of overlapping powers at any instant of this frame.
+        """Return the largest sum of overlapping powers at any instant of this frame.
 
         Args:
             powers_w: received powers of ``overlaps``, in their order, at one node.
@@ -77,26 +77,26 @@ class Transmission:
 
 @dataclass(slots=True, eq=False)
 class Listener:
-    """Callbacks of a node for when its channel becomes busy and idle."""
+    """Callbacks of a node that are called when its channel becomes busy or idle."""
 
     node: int
     on_busy: Callable[[int], None]
     on_idle: Callable[[int, bool], None]
     busy: int = 0
-    """How many transmissions it senses now."""
+    """Number of transmissions that the node senses now."""
 
 
 class Medium:
     """One shared channel."""
 
     def __init__(self, env: simpy.Environment, radio: Radio, places: Places, rng: Generator) -> None:
-        """An idle channel.
+        """Create an idle channel.
 
         Args:
-            env: Its clock counts nanoseconds.
+            env: Simulation environment; its clock counts nanoseconds.
             radio: Powers and thresholds.
-            places: Where the nodes are.
-            rng: Draws bit errors.
+            places: Positions of the nodes.
+            rng: Random generator of bit errors.
         """
         self.env = env
         self.radio = radio
@@ -112,9 +112,9 @@ class Medium:
         self._cs_w = radio.cs_threshold_w
 
     def power_w(self, sender: int, receiver: int) -> float:
-        """Power at ``receiver`` of a frame of ``sender``, without fading; 0 if they are the same.
+        """Return the power at ``receiver`` of a frame of ``sender``, without fading; 0 for the same node.
 
-        Between moving nodes it is as of ``REFRESH_NS`` before the last frame, or later.
+        Between moving nodes the value may be up to ``REFRESH_NS`` older than the last frame.
         """
         row_w = self._rows_w.get(sender)
         if row_w is None:
@@ -123,7 +123,7 @@ class Medium:
         return power_w if power_w >= 0.0 else self._link_power_w(sender, receiver)
 
     def _new_row_w(self, sender: int) -> list[float]:
-        """Powers at all nodes; negative until they are first used."""
+        """Create the list of a sender's powers at all nodes; a negative entry is not computed yet."""
         row_w = self._rows_w[sender] = [-1.0] * self.places.count
         row_w[sender] = 0.0
         return row_w
@@ -146,13 +146,13 @@ class Medium:
         """Put a frame on the air and call the listeners that sense it.
 
         Args:
-            sender: Node.
-            duration_ns: On the air, with its preamble.
-            receiver: Node.
-            size_bytes: Of the frame, and
-            modulation: how it is sent, for bit errors; unused when the radio has no noise.
-            begins_ns: When it starts, now or later, as a reply does; a frame that begins before that must
-                end after it. None is now.
+            sender: Node that sends.
+            duration_ns: Time on the air, with the preamble.
+            receiver: Node that receives.
+            size_bytes: Size of the frame; with
+            modulation: it gives the bit errors. Both are unused when the radio has no noise.
+            begins_ns: Start of the frame: None for now, or later for a reply; a frame that begins before
+                this start must end after it.
             reserve_ns: Duration of the reservation (NAV) after its end, for every node that can read it.
 
         Returns:
@@ -194,7 +194,7 @@ class Medium:
                 listener.on_busy(start_ns)
 
     def finish(self, frame: Transmission) -> Cause:
-        """``outcome`` and ``clear`` in one."""
+        """Return the ``outcome`` of a frame at its end, and ``clear`` it."""
         alone = frame.power_w >= self._rx_w and not frame.overlaps and self.radio.noise_w is None
         cause = _NONE if alone else self.outcome(frame)
         self.clear(frame)
@@ -225,11 +225,11 @@ class Medium:
                 listener.on_idle(*self._overheard(frame, node))
 
     def _overheard(self, frame: Transmission, node: int) -> tuple[int, bool]:
-        """Reception of a frame by any node that overhears it, without fading and noise.
+        """Determine the reception of a frame by a node that overhears it, without fading and noise.
 
         Returns:
-            From when the channel is free, and whether the frame was damaged. A node that was sending itself
-            knows of neither damage nor reservation.
+            Time from which the channel is free, and whether the frame was damaged. A node that was sending
+            itself notices neither damage nor reservation.
         """
         power_w, overlaps = self.power_w(frame.sender, node), frame.overlaps
         if overlaps:
@@ -244,10 +244,10 @@ class Medium:
         return frame.reserved_ns, False
 
     def outcome(self, frame: Transmission) -> Cause:
-        """Reception of a frame that ends now by its receiver; call it once, as it draws random numbers.
+        """Determine whether a frame that ends now is received; call once, because it draws random numbers.
 
         Returns:
-            ``NONE`` if its receiver has it; else ``COLLISION``, ``NOISE`` or ``RANGE``.
+            ``NONE`` if its receiver got the frame; else ``COLLISION``, ``NOISE`` or ``RANGE``.
         """
         radio, receiver, power_w, interference_w = self.radio, frame.receiver, frame.power_w, 0.0
         if power_w < self._rx_w:
@@ -270,7 +270,7 @@ class Medium:
         return _NONE
 
     def _lost_in_overlap(self, frame: Transmission, powers_w: list[float], interference_w: float) -> bool:
-        """Whether an 802.15.4 receiver was busy with an earlier frame, or got overlapped bits wrong."""
+        """Return whether an 802.15.4 receiver was busy with an earlier frame or has wrong overlapped bits."""
         if max(powers_w[: frame.earlier], default=0.0) >= self._rx_w:
             return True
         if not interference_w:
@@ -283,16 +283,16 @@ class Medium:
 
     @property
     def undisturbed(self) -> bool:
-        """Whether the channel is idle and at most one node listens."""
+        """Whether the channel is idle and has at most one listener."""
         return not self._active and len(self._listeners) < 2
 
     def _sensed(self, frame: Transmission, node: int) -> bool:
         return self.power_w(frame.sender, node) >= self._cs_w
 
     def busy_until(self, node: int, at_ns: int) -> bool:
-        """Whether somebody else's frame is on the air at this node in the last instant before a time.
+        """Return whether this node senses another node's frame in the last instant before ``at_ns``.
 
-        That is now, or later if nothing happens before.
+        ``at_ns`` is now, or later if nothing happens before.
         """
         for frame in self._active:
             if frame.start_ns < at_ns and self._sensed(frame, node):
@@ -305,12 +305,12 @@ class Medium:
         return False
 
     def last_heard(self, node: int) -> tuple[int, bool]:
-        """From when the channel is free at this node, and whether the last frame was damaged there.
+        """Return when the channel at this node became free, and whether the last frame was damaged there.
 
-        The arguments that ``on_idle`` of a listener would have got.
+        These are the arguments that a listener's ``on_idle`` would have received.
 
         Returns:
-            ``-MEMORY_NS`` for the time if nothing was heard for that long.
+            The time (``-MEMORY_NS`` if nothing was heard for that long) and the damage.
         """
         for frame in reversed(self._recent):
             if self._sensed(frame, node):
@@ -323,10 +323,10 @@ class Medium:
         """Call back when the channel at this node becomes busy or idle, until ``unsubscribe``.
 
         Args:
-            node: One listener per node.
-            on_busy: Gets the time in ns, which lies ahead for a reply that begins later.
-            on_idle: Gets the time from which the channel is free (now, or when the frame's reservation
-                ends), and whether the last frame was received with errors (EIFS).
+            node: Node that listens; each node has one listener.
+            on_busy: Called with the time in ns, which is in the future for a reply that begins later.
+            on_idle: Called with the time from which the channel is free (now, or the end of the frame's
+                reservation), and whether the last frame was received with errors (EIFS).
         """
         listener = self._listeners[node] = Listener(node, on_busy, on_idle)
         now_ns = int(self.env.now)
@@ -337,5 +337,5 @@ class Medium:
         return listener
 
     def unsubscribe(self, node: int) -> None:
-        """End the callbacks of a node."""
+        """Stop the callbacks of a node."""
         self._listeners.pop(node, None)

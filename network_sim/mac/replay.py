@@ -1,4 +1,4 @@
-"""A recorded link for every sender: its rate, half its round trip as latency, and its losses (SPEC 6.5)."""
+"""Medium access that replays a recorded link for each sender: rate, latency and losses (SPEC 6.5)."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from network_sim.types import Cause, Delivery, EventKind, Packet
 from packetmesh.errors import InputError
 
 REPLAY_STREAM = 2
-"""Keeps these draws apart from whatever else is drawn from the same seed."""
+"""Number of this random stream, so that its draws are independent of others from the same seed."""
 
 
 class RecordedLink:
-    """Every sender has the whole link to itself, from a place in the recording that is drawn for it.
+    """A recorded link per sender, each replayed from a random start; the latency is half the round trip.
 
-    A packet is on its way while the next one is sent: ``send`` ends with the last bit, and ``context.report``
-    gets the outcome. With ``mac.ack`` that is a round trip after the last bit, else when the packet arrives
-    or would have. A frame that is caught by a rate of 0 stays on the air until its last bit is sent.
+    A packet travels while the next one is sent: ``send`` returns after the last bit, and ``context.report``
+    gets the outcome, with ``mac.ack`` a round trip after the last bit, else when the packet arrives or would
+    have arrived. A frame that meets a rate of 0 stays on the air until its last bit is sent.
     """
 
     def __init__(self, context: MacContext) -> None:
-        """Reads the recording.
+        """Read the recording.
 
         Raises:
-            InputError: ``mac.trace`` names none, or none that can be read.
+            InputError: ``mac.trace`` is empty, or its file cannot be read.
         """
         mac, self._seed = context.config.mac, context.config.run.seed
         if mac.trace is None:
@@ -41,13 +41,13 @@ class RecordedLink:
         self._lost = LinkLosses(context.config.loss, self._seed).lost
         self._links: dict[int, tuple[Replay, np.random.Generator]] = {}
         self._arrives_ns: dict[int, int] = {}
-        """When the last packet of each sender arrives: none overtakes another."""
+        """Arrival time of the last packet of each sender: no packet overtakes another."""
 
     def send(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Delivery]:
         """Carry a packet to a neighbour: ``delivery = yield from mac.send(packet, a, b)``.
 
         Returns:
-            What the sender knows; a packet that it has sent is ``under_way``.
+            The sender's knowledge; a packet that it has sent is ``under_way``.
         """
         env, up, size_bytes = self._context.env, self._context.up, packet.size_bytes
         record = self._context.recorder.add_packet
@@ -73,7 +73,7 @@ class RecordedLink:
     def _travel(
         self, packet: Packet, sender: int, receiver: int, arrives_ns: int, latency_ns: int, lost: bool
     ) -> Generator[simpy.Event, Any, None]:
-        """From the last bit until the sender knows as much as it will."""
+        """Deliver or lose a packet after its last bit was sent, then report the outcome to the sender."""
         context, env = self._context, self._context.env
         yield env.timeout(arrives_ns - int(env.now))
         cause = Cause.LINK if lost else Cause.NONE if context.up(receiver) else Cause.NODE_DOWN
@@ -86,7 +86,7 @@ class RecordedLink:
         context.report(packet, sender, receiver, Delivery(not (cause and self._ack), cause, 1))
 
     def _link(self, sender: int) -> tuple[Replay, np.random.Generator]:
-        """The sender's link, and what draws its losses."""
+        """Return the sender's link and the random generator of its losses, created at first use."""
         found = self._links.get(sender)
         if found is None:
             rng = np.random.default_rng((self._seed, REPLAY_STREAM, sender))

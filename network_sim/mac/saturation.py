@@ -1,6 +1,6 @@
-"""Saturation throughput of a medium access: every node around one sink always has a packet.
+"""Saturation throughput of a medium access, simulated: every node around one sink always has a packet.
 
-Without buffers and images, for comparison with Bianchi's model and with ns-3.
+There are no buffers and no images, for comparison with Bianchi's model and with ns-3.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from network_sim.trace.log import Recorder
 from network_sim.types import BEGIN_WITHIN_NS, Cause, EventKind, Packet, PacketKind, to_ns
 
 WARM_UP = 0.05
-"""Share of the time at the start that is not counted: the nodes start at the same instant."""
+"""Share of the duration that is not counted, at the start: the nodes all start within 10 ms."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,35 +33,35 @@ class Saturation:
     """Outcome of a run of saturated nodes."""
 
     throughput_bps: float
-    """Payload without the headers above the medium access that reached the sink, of all nodes together."""
+    """Rate at which payload of all nodes reached the sink, without headers above the medium access."""
     delivery_ratio: float
     """Share of packets that reached the sink."""
     packets: int
-    """Packets that were delivered or dropped."""
+    """Number of packets that were delivered or dropped."""
     attempts: int
-    """Data frames sent for them."""
+    """Number of data frames sent for these packets."""
     losses: dict[Cause, int]
-    """Attempts that failed, by cause."""
+    """Number of failed attempts, by cause."""
     packets_by_node: tuple[int, ...]
-    """How many of each node's packets reached the sink."""
+    """Number of each node's packets that reached the sink."""
     kernel_events: int
-    """Events of the simulation's kernel, warm-up included."""
+    """Number of events of the simulation kernel, warm-up included."""
 
 
 def saturation(
     config: NetworkConfig, nodes: int, duration_s: float, seed: int, wait_after_loss: bool = True
 ) -> Saturation:
-    """Run saturated nodes on a circle around a sink, all within range of one another.
+    """Simulate saturated nodes on a circle around a sink, all within range of one another.
 
     Args:
-        config: medium access, radio, and of ``nodes`` the payload, its header and the radius of the circle.
-        nodes: how many send.
+        config: medium access, radio, and in ``nodes`` the payload, its header and the circle's radius.
+        nodes: number of sending nodes.
         duration_s: simulated time, warm-up included.
-        seed: the same gives the same result.
-        wait_after_loss: False lets IEEE 802.11b go on after a collision as Bianchi's model does.
+        seed: random seed; the same seed gives the same result.
+        wait_after_loss: False makes IEEE 802.11b wait only a DIFS after a collision, as in Bianchi's model.
 
     Raises:
-        ValueError: another medium access has no EIFS.
+        ValueError: ``wait_after_loss`` is False for a medium access other than IEEE 802.11b.
     """
     config = replace(
         config,
@@ -93,7 +93,7 @@ def saturation(
 
 @dataclass(slots=True)
 class _Tally:
-    """Packets of one node after the warm-up."""
+    """Numbers of packets of one node after the warm-up."""
 
     packets: int = 0
     arrived: int = 0
@@ -102,7 +102,7 @@ class _Tally:
 def _summary(
     config: NetworkConfig, counters: Counters, tallies: list[_Tally], kernel_events: int
 ) -> Saturation:
-    """The outcome after the warm-up."""
+    """Compute the outcome after the warm-up from counters and tallies."""
     events = counters.count[counters.warmup_minutes :].sum(axis=(0, 2))
     lost = events[EventKind.LOSS]
     packets, arrived = (sum(getattr(tally, key) for tally in tallies) for key in ("packets", "arrived"))
@@ -128,7 +128,7 @@ def _saturate(
     tally: _Tally,
     begin_ns: int,
 ) -> Generator[simpy.Event, Any, None]:
-    """A node that sends the next packet as soon as the last is delivered or dropped."""
+    """Send the next packet of a node as soon as the last is delivered or dropped, without end."""
     sink, size_bytes, warmup_ns = config.nodes.count, config.nodes.payload_bytes, to_ns(config.run.warmup_s)
     kind, arrived = PacketKind.IMAGE, (Cause.NONE, Cause.ACK_LOST)  # slow to look up for every packet
     yield env.timeout(begin_ns)

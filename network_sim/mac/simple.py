@@ -12,13 +12,13 @@ from network_sim.radio.losses import LinkLosses
 from network_sim.types import NS_PER_S, Cause, Delivery, EventKind, Packet
 
 IDEAL_BITS = 8
-"""Bits on the link for a byte."""
+"""Bits per byte on an ideal link."""
 SERIAL_BITS = 10
-"""Bits for a byte on a serial line: a start bit, 8 data bits, no parity, a stop bit."""
+"""Bits per byte on a serial line: a start bit, 8 data bits, no parity, a stop bit."""
 
 
 class OwnLink:
-    """Every sender has a link of its own, which loses what ``config.loss`` says and nothing else."""
+    """A separate link for each sender, whose only losses are those of ``config.loss``."""
 
     def __init__(self, context: MacContext) -> None:
         mac = context.config.mac

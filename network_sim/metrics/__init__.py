@@ -1,1 +1,1 @@
-"""Numbers of a run, computed from its trace: metrics, energy, coverage, arrivals."""
+"""Evaluation of a run from its trace: metrics, energy, coverage, arrivals."""

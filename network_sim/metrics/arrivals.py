@@ -1,6 +1,6 @@
-"""What has arrived when, and what was spent until then: the trace as a sink sees it.
+"""Arrival times of image fragments, and bytes, losses and energy spent until any moment of a run.
 
-A packet's bytes [first_byte, first_byte + byte_count) of an image are all that the network knows of them.
+A fragment is identified by its bytes [first_byte, first_byte + byte_count) of an image.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Arrivals:
-    """Columns (A,) of the first arrival of each fragment, by time."""
+    """Columns (A,) of the first arrival of each fragment, sorted by time."""
 
     t_ns: IntArray
     image: IntArray
     node: IntArray
-    """Whose camera took the image."""
+    """Node whose camera took the image."""
     first_byte: IntArray
     byte_count: IntArray
     """The fragment is bytes [first_byte, first_byte + byte_count) of its image."""
@@ -40,12 +40,12 @@ class Arrivals:
 
 @dataclass(frozen=True, slots=True)
 class Spent:
-    """What a run had spent at some moments: arrays of one shape, or single numbers for a single moment."""
+    """Bytes, losses and energy of a run until given moments: arrays of one shape, or single numbers."""
 
     sent_bytes: IntArray
-    """Bytes of all frames that had begun, headers and retries included, replies not."""
+    """Bytes of all frames that had begun, including headers and retries, excluding replies."""
     lost: IntArray
-    """Attempts to send a packet that had failed, on the uplink too."""
+    """Failed attempts to send a packet, including those on the uplink."""
     radio_j: FloatArray
     """Energy of the radios of all camera nodes."""
     platform_j: FloatArray
@@ -53,10 +53,10 @@ class Spent:
 
 
 def arrivals(trace: NetworkTrace, at: Place = "sink") -> Arrivals:
-    """The first arrival of each fragment of an image at the sink, or at the cloud behind it.
+    """Find the first arrival of each image fragment at the sink, or at the cloud behind it.
 
     Raises:
-        InputError: the run kept no log of its packets, or has no such place.
+        InputError: the run kept no log of its packets, or has no such node.
 
     >>> import packetmesh as pm
     >>> config = pm.with_settings(pm.NETWORK_PRESETS["thesis-link"], ["nodes.image_bytes=2000"])
@@ -86,9 +86,9 @@ def arrivals(trace: NetworkTrace, at: Place = "sink") -> Arrivals:
 
 
 def energy_by_node_j(trace: NetworkTrace, t_ns: ArrayLike) -> FloatArray:
-    """(M, N) joules of each node, radio and platform, from the start of the run until each of M moments.
+    """Return (M, N) joules of each node, radio and platform, from the run's start until each of M moments.
 
-    Those of sinks, access points and the cloud are 0: they have mains.
+    Sinks, access points and the cloud have mains power; their values are 0.
 
     Raises:
         InputError: the run kept no log of its packets.
@@ -103,13 +103,13 @@ def energy_by_node_j(trace: NetworkTrace, t_ns: ArrayLike) -> FloatArray:
 
 
 def until(trace: NetworkTrace, t_ns: ArrayLike) -> Spent:
-    """What was spent from the start of the run, its warm-up included, until each of some moments.
+    """Compute bytes, losses and energy from the run's start, warm-up included, until each given moment.
 
-    One pass over the log, whatever the number of moments: ask for all of them at once.
+    All moments together take one pass over the log: pass them in one call.
 
     Args:
-        trace: of a run that kept its log.
-        t_ns: moments, of any shape; after the end of the run nothing more is spent.
+        trace: trace of a run that kept its log.
+        t_ns: moments, of any shape; moments after the end of the run count as its end.
 
     Raises:
         InputError: the run kept no log of its packets.
@@ -137,8 +137,8 @@ def _log(trace: NetworkTrace) -> Events:
 def _radio_times(
     trace: NetworkTrace, log: Events, moments: IntArray, camera: NDArray[np.bool_]
 ) -> energy.RadioTimes:
-    """Time of some nodes (N,) together in each state until each moment; sending comes before sleeping, and
-    both before receiving, as in ``network_sim.trace.states``.
+    """Sum the time of the nodes ``camera`` (N,) in each state until each moment. Where states overlap,
+    sending has priority over sleeping, and both over receiving, as in ``network_sim.trace.states``.
     """
     on_air = log.of(EventKind.AIR, EventKind.ACK)
     spans = {
@@ -157,7 +157,7 @@ def _radio_times(
 
 
 def _asleep(changes: Events, horizon_ns: int) -> IntArray:
-    """(I, 3) node, start and end of each time that a node was down."""
+    """Return (I, 3) node, start and end of each span in which a node was down."""
     down_since_ns: dict[int, int] = {}
     spans = []
     rows = (changes.node, changes.t_ns, changes.kind)
@@ -171,9 +171,9 @@ def _asleep(changes: Events, horizon_ns: int) -> IntArray:
 
 
 def _passed_ns(spans: IntArray, moments: IntArray) -> IntArray:
-    """How much of all spans (I, 3) lies before each moment (K,): the sums of t - start less those of t - end.
+    """Sum the parts of all spans (I, 3) before each moment t (K,): sum of t - start, less sum of t - end.
 
-    Either sum may pass 2^63 and wrap; their difference is right again.
+    Either sum may exceed 2^63 and wrap around; their difference is still correct.
     """
     passed_ns = np.zeros(len(moments), np.int64)
     for sign, column in ((1, spans[:, 1]), (-1, spans[:, 2])):

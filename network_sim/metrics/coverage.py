@@ -1,6 +1,6 @@
-"""Which pieces of road were seen when, and of which of these sights an image has arrived.
+"""Road coverage: which road cells cameras saw in each time span, and which of these sights arrived.
 
-A sight is a cell of the road (SPEC 6.2) in a span of ``scheme.validity_s``, as long as an image shows it.
+A sight is a pair of a road cell (SPEC 6.2) and a time span of ``scheme.validity_s``.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ NEVER_NS = np.iinfo(np.int64).max
 
 @dataclass(frozen=True, slots=True)
 class RoadCoverage:
-    """The sights of a run after its warm-up, one a row."""
+    """The sights of a run after its warm-up, one per row."""
 
     cell: NDArray[np.int64]
-    """(S,) the cell of each."""
+    """(S,) cell of each sight."""
     seen_ns: NDArray[np.int64]
-    """(S,) when a camera had it first."""
+    """(S,) time of the first image of each sight."""
     covered_ns: NDArray[np.int64]
-    """(S,) when the first of its images arrived; ``NEVER_NS`` if none did."""
+    """(S,) time of the first arrival of one of its images; ``NEVER_NS`` if none arrived."""
     arrived: int
-    """Images that arrived."""
+    """Number of images that arrived."""
 
     def counts(self, t_ns: int, cells: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(cells,) sights of each cell until a time: all, and those of which an image had arrived."""
+        """Count the sights of each cell until ``t_ns``: (cells,) all, and (cells,) with an arrived image."""
         seen, covered = self.seen_ns <= t_ns, self.covered_ns <= t_ns
         return np.bincount(self.cell[seen], minlength=cells), np.bincount(self.cell[covered], minlength=cells)
 
 
 def road_coverage(trace: NetworkTrace) -> RoadCoverage | None:
-    """The sights of a run; None if no image of a road was taken, or the images' events were not kept."""
+    """Find the sights of a run; None if no image of a road was taken, or image events were not kept."""
     taken = trace.events.of(EventKind.CAPTURE)
     taken = taken.where((taken.peer >= 0) & (taken.t_ns >= to_ns(trace.config.run.warmup_s)))
     if not len(taken):

@@ -1,4 +1,4 @@
-"""Joules of radios and platforms, from the time that each radio spends in each state (SPEC 6.3)."""
+"""Energy of radios and platforms, from the time that each radio spends in each state (SPEC 6.3)."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class RadioTimes:
-    """How long each radio was in each state, arrays of one shape; the platform sleeps with its radio."""
+    """Time of each radio in each state, arrays of one shape; the platform sleeps with its radio."""
 
     tx_s: FloatArray
     """Sending."""
     rx_s: FloatArray
     """Receiving."""
     idle_s: FloatArray
-    """Listening to a channel on which nothing for it was sent."""
+    """Listening while no frame for this node is on the air."""
     sleep_s: FloatArray
     """Asleep or down."""
 
     @property
     def elapsed_s(self) -> FloatArray:
-        """All states together."""
+        """Time in all states together."""
         return self.tx_s + self.rx_s + self.idle_s + self.sleep_s
 
 
 def radio_times(states_ns: NDArray[np.int64], elapsed_s: float | FloatArray) -> RadioTimes:
-    """Times of radios that listen whenever they do nothing else.
+    """Compute the radio times, where the time outside all recorded states is listening.
 
     Args:
         states_ns: (..., S) time in each ``State``.
-        elapsed_s: simulated time in which they were counted; broadcasts to (...).
+        elapsed_s: simulated time over which the states were counted; broadcasts to (...).
     """
     states_s = states_ns / NS_PER_S
     tx_s, rx_s, sleep_s = (states_s[..., s] for s in (State.SENDING, State.RECEIVING, State.ASLEEP))
@@ -49,7 +49,7 @@ def radio_times(states_ns: NDArray[np.int64], elapsed_s: float | FloatArray) -> 
 
 @dataclass(frozen=True, slots=True)
 class Energy:
-    """Joules of each node by state: of its radio, and of the computer and camera that carry it."""
+    """Energy of each node by state: of its radio, and of its platform (computer and camera)."""
 
     tx_j: FloatArray
     """Radio sending."""
@@ -66,17 +66,17 @@ class Energy:
 
     @property
     def radio_j(self) -> FloatArray:
-        """The radio in all its states."""
+        """Energy of the radio in all its states."""
         return self.tx_j + self.rx_j + self.idle_j + self.sleep_j
 
     @property
     def total_j(self) -> FloatArray:
-        """Radio and platform."""
+        """Energy of radio and platform."""
         return self.radio_j + self.platform_j + self.platform_sleep_j
 
 
 def joules(times: RadioTimes, config: EnergyConfig) -> Energy:
-    """Energy of times in states."""
+    """Compute the energy from the time in each state and its power."""
     return Energy(
         tx_j=times.tx_s * config.tx_w,
         rx_j=times.rx_s * config.rx_w,
@@ -88,15 +88,15 @@ def joules(times: RadioTimes, config: EnergyConfig) -> Energy:
 
 
 def cumulative_radio_j(counters: Counters, nodes: NDArray[np.bool_], config: EnergyConfig) -> FloatArray:
-    """Energy of the radios of the chosen nodes together, from the end of the warm-up on.
+    """Sum the radio energy of the chosen nodes, from the end of the warm-up on.
 
     Args:
-        counters: of a run.
-        nodes: (N,) which nodes.
+        counters: counters of a run.
+        nodes: (N,) True for each chosen node.
         config: power of each state.
 
     Returns:
-        (M + 1,) joules until each of ``counters.edges_ns`` from the end of the warm-up, where they are 0.
+        (M + 1,) joules until each of ``counters.edges_ns``, starting with 0 at the end of the warm-up.
     """
     after = slice(counters.warmup_minutes, None)
     elapsed_s = np.diff(counters.edges_ns[after]) / NS_PER_S
@@ -105,10 +105,10 @@ def cumulative_radio_j(counters: Counters, nodes: NDArray[np.bool_], config: Ene
 
 
 def lifetimes_s(times: RadioTimes, config: EnergyConfig) -> FloatArray:
-    """(N,) how long each node's battery lasts if it goes on as it did.
+    """Return (N,) seconds that each node's battery lasts at its mean power in the run.
 
-    Infinite without a battery or without consumption. The network's lifetime, until the first node is empty,
-    is the least of them.
+    A lifetime is infinite without a battery or without consumption. The network's lifetime, until the first
+    battery is empty, is the minimum.
     """
     total_j = joules(times, config).total_j
     if config.battery_j is None:

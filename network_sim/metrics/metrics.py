@@ -1,7 +1,7 @@
 """Metrics of a run: pure functions of its trace, each number with its unit and its definition.
 
-Nearly all come from the counters, so that they are the same whether the log was kept or not. A metric whose
-data are missing is absent. Events of the warm-up do not count, nor do packets and images created in it.
+Most metrics come from the counters and so do not depend on whether the log was kept. A metric whose data are
+missing is absent. Events of the warm-up do not count, nor do packets and images created in it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Rows = Iterator[tuple[str, float, str, str]]
 
 
 def metrics(trace: NetworkTrace) -> dict[str, Metric]:
-    """All metrics that the trace can give, by name; none if the run ended within the warm-up.
+    """Compute all metrics that the trace allows, by name; none if the run ended within the warm-up.
 
     >>> import packetmesh as pm
     >>> config = pm.with_settings(pm.NETWORK_PRESETS["thesis-link"], ["nodes.image_bytes=2000"])
@@ -54,7 +54,7 @@ def metrics(trace: NetworkTrace) -> dict[str, Metric]:
 
 
 def image_delays_s(trace: NetworkTrace) -> NDArray[np.float64]:
-    """(A,) seconds from capture to arrival of each image that arrived, in the order of arrival.
+    """Return (A,) seconds from capture to arrival of each image that arrived, in the order of arrival.
 
     As in the metrics, images that were captured during the warm-up do not count.
 
@@ -78,12 +78,12 @@ def image_delays_s(trace: NetworkTrace) -> NDArray[np.float64]:
 
 
 def elapsed_s(trace: NetworkTrace) -> float:
-    """Seconds from the end of the warm-up to the end of the run."""
+    """Return the seconds from the end of the warm-up to the end of the run."""
     return to_s(trace.horizon_ns - to_ns(trace.config.run.warmup_s))
 
 
 def _outcomes(trace: NetworkTrace) -> Rows:
-    """Delivery and delay of images and of their packets."""
+    """Yield delivery ratios and delays of images and of their packets."""
     yield from _outcome("image", trace.counters.images, "taken")
     yield from _outcome("packet", trace.counters.packets, "first queued")
 
@@ -114,7 +114,7 @@ def _rates(trace: NetworkTrace) -> Rows:
 
 
 def _losses(trace: NetworkTrace) -> Rows:
-    """Frames, packets and images that failed, by cause. Zeros too, so that runs can be averaged."""
+    """Yield failed attempts, packets and images by cause, zeros too, so that runs can be averaged."""
     delivered = _count(trace, EventKind.DELIVER)
     for kind, name, what in (
         (EventKind.LOSS, "attempts_lost", "Attempts to send that failed, others may have followed"),
@@ -139,7 +139,7 @@ def _airtime(trace: NetworkTrace) -> Rows:
 
 
 def _queue(trace: NetworkTrace) -> Rows:
-    """From sums alone: a packet adds the time from when it came to the end, less that from when it left."""
+    """Yield the mean queue: a packet adds its time from entering to the run's end, less that from leaving."""
     counters = trace.counters
     rest_ns = trace.horizon_ns - counters.edges_ns[1:, None, None, None]
     weights_s = (counters.until_end_ns + counters.count * rest_ns) / NS_PER_S
@@ -184,7 +184,7 @@ def _overheads(trace: NetworkTrace) -> Rows:
 
 
 def _coverage(trace: NetworkTrace) -> Rows:
-    """Which pieces of road were seen when; needs the images' events and cells."""
+    """Yield road coverage and redundancy, if the trace has image events with road cells."""
     sights = road_coverage(trace)
     if sights is None:
         return
@@ -211,10 +211,10 @@ def _bytes(trace: NetworkTrace, kind: EventKind, packet_kind: PacketKind | None 
 
 
 def _states_ns(trace: NetworkTrace) -> NDArray[np.int64]:
-    """(N, S) time in each state."""
+    """Return (N, S) nanoseconds in each state after the warm-up."""
     return _after(trace, trace.counters.states_ns).sum(axis=0)
 
 
 def camera_nodes(trace: NetworkTrace) -> NDArray[np.bool_]:
-    """(N,) the nodes with a camera and a battery; sinks, access points and the cloud have mains."""
+    """Return (N,) True for nodes with camera and battery; sinks, access points and cloud have mains power."""
     return np.isin(trace.roles, ("node", "vehicle"))

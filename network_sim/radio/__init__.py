@@ -1,1 +1,1 @@
-"""Links: positions, propagation, and losses that are set or recorded."""
+"""Radio links: node positions, propagation, configured losses and recorded links."""

@@ -1,4 +1,4 @@
-"""Recorded links, and what a packet meets that is sent over one again (SPEC 6.5)."""
+"""Recorded links: reading a recording, and its replay in simulated time (SPEC 6.5)."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ FloatArray = NDArray[np.float64]
 
 HOLE_ROWS = 10.0
 HOLE_S = 1.0
-"""A gap is a hole from this long, and from this many times the usual time between rows."""
+"""A step longer than both ``HOLE_S`` and ``HOLE_ROWS`` times the median step between rows is a hole."""
 _COLUMNS = ("time in s", "rate in Mbit/s", "round trip in ms", "share lost from 0 to 1")
 MOST_BYTES = 20_000_000
-"""Of a recording: half a million rows."""
+"""Largest size of a recording: half a million rows."""
 _FOR_EVER_NS = 2**62
 
 
 @dataclass(frozen=True, slots=True)
 class LinkTrace:
-    """A recording of a link, T rows; each holds until the next, the last as long as rows usually do."""
+    """A recorded link, T rows; each is valid until the next, the last for the median time between rows."""
 
     t_s: FloatArray
-    """(T,) times, rising from 0; a single row holds for ever."""
+    """(T,) times, rising from 0; a single row is valid for ever."""
     rate_bps: FloatArray
-    """(T,) bits a second; 0 while nothing can be sent, but not throughout."""
+    """(T,) bits per second; 0 while nothing can be sent, but not in all rows."""
     round_trip_s: FloatArray
-    """(T,) from sender to receiver and back."""
+    """(T,) time from sender to receiver and back."""
     loss: FloatArray
     """(T,) share of packets that get lost, 0 to 1."""
 
     @property
     def edges_ns(self) -> NDArray[np.int64]:
-        """(T + 1,) where the rows begin, and where the recording ends."""
+        """(T + 1,) start times of the rows, and the end of the recording."""
         starts_ns = np.rint(self.t_s * NS_PER_S).astype(np.int64)
         last_ns = _FOR_EVER_NS
         if len(starts_ns) > 1:
@@ -50,25 +50,25 @@ class LinkTrace:
 
     @property
     def mean_loss(self) -> float:
-        """Share lost, averaged over time: what packets lose that come evenly in time."""
+        """Loss averaged over time: the share lost of packets that are sent evenly in time."""
         return float(np.average(self.loss, weights=np.diff(self.edges_ns)))
 
 
 def constant_link(rate_bps: float, round_trip_s: float, loss: float) -> LinkTrace:
-    """A link that never changes."""
+    """Create a link that never changes."""
     return LinkTrace(*(np.array([value]) for value in (0.0, rate_bps, round_trip_s, loss)))
 
 
 def read_link_trace(path: str | Path) -> LinkTrace:
-    """Reads a recorded link: a text file with four columns (``_COLUMNS``).
+    """Read a recorded link: a text file with four columns (``_COLUMNS``).
 
-    Times rise from row to row and count from the first one. Lines may be blank, and what follows a # is
-    a comment. A share between -1 and 0 counts as 0: more packets came in its row than were sent in it.
+    Times rise from row to row and count from the first one. Lines may be blank, and text after a # is a
+    comment. A share between -1 and 0 counts as 0: more packets arrived during the row than were sent in it.
 
     Raises:
-        InputError: the file cannot be read, has no rows, a row with another number of columns, with what is
-            no number or out of range; times that do not rise; a hole in time, in which nobody knows what the
-            link did; or a rate of 0 throughout.
+        InputError: the file cannot be read, has no rows, or a row has the wrong number of columns, a field
+            that is no number, or a number out of range; times do not rise; a hole in time leaves the link's
+            state unknown; or all rates are 0.
     """
     text = read_text(path, "recorded link", MOST_BYTES)
     lines, rows = [], []
@@ -123,24 +123,24 @@ def _check_times(t_s: FloatArray, lines: list[int], path: str | Path) -> None:
 
 
 class Replay:
-    """A recording that is played again and again; its times are nanoseconds of the simulation."""
+    """A recorded link that is replayed in a loop; its times are nanoseconds of the simulation."""
 
     def __init__(self, trace: LinkTrace, from_share: float = 0.0) -> None:
-        """``from_share`` of the recording, 0 to 1, is over when the simulation begins."""
+        """Start the simulation at the share ``from_share`` (0 to 1) of the recording."""
         edges_ns = trace.edges_ns
         with np.errstate(divide="ignore"):
             byte_ns = 8 * NS_PER_S / trace.rate_bps
         self._edges_ns: list[int] = edges_ns.tolist()
         self._byte_ns: list[float] = byte_ns.tolist()
         self._carried: list[float] = np.append(0.0, np.cumsum(np.diff(edges_ns) / byte_ns)).tolist()
-        """Bytes that the link can carry until each edge."""
+        """Bytes that the link can carry from the start of the recording until each edge."""
         self._latency_ns = [to_ns(0.5 * round_trip_s) for round_trip_s in trace.round_trip_s.tolist()]
         self._loss: list[float] = trace.loss.tolist()
         self._span_ns = self._edges_ns[-1]
         self._start_ns = int(from_share * self._span_ns) if len(self._loss) > 1 else 0
 
     def opens_ns(self, now_ns: int) -> int:
-        """From when the link carries something: now, or when its rate rises above 0."""
+        """Return the time from which the link can send: now, or when its rate rises above 0."""
         turn, _, row = self._at(now_ns)
         edge = bisect_right(self._carried, self._carried[row])
         if edge == len(self._carried):
@@ -148,7 +148,7 @@ class Replay:
         return max(now_ns, turn * self._span_ns + self._edges_ns[edge - 1] - self._start_ns)
 
     def ends_ns(self, now_ns: int, size_bytes: int) -> int:
-        """When a packet that is sent from now on is sent whole."""
+        """Return the time at which the last bit is sent of a packet whose first bit is sent now."""
         turn, at_ns, row = self._at(now_ns)
         duration_ns = size_bytes * self._byte_ns[row]
         if at_ns + duration_ns <= self._edges_ns[row + 1]:
@@ -161,14 +161,14 @@ class Replay:
         return (turn + turns) * self._span_ns + self._edges_ns[row] + rest_ns - self._start_ns
 
     def latency_ns(self, now_ns: int) -> int:
-        """Half the round trip: how long what is sent now travels."""
+        """Return the latency of a packet that is sent now: half the round trip."""
         return self._latency_ns[self._at(now_ns)[2]]
 
     def loss(self, now_ns: int) -> float:
-        """Probability that what is sent now gets lost."""
+        """Return the probability that a packet that is sent now gets lost."""
         return self._loss[self._at(now_ns)[2]]
 
     def _at(self, now_ns: int) -> tuple[int, int, int]:
-        """How often the recording has begun again, the time within it, and the row of that time."""
+        """Return the number of completed replays, the time in the current one, and the row of that time."""
         turn, at_ns = divmod(now_ns + self._start_ns, self._span_ns)
         return turn, at_ns, bisect_right(self._edges_ns, at_ns) - 1

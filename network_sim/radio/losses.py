@@ -1,4 +1,4 @@
-"""Losses that are set: a share of the frames, each by itself or in bursts (SPEC 6.5)."""
+"""Configured losses: a share of the frames is lost, independently or in bursts (SPEC 6.5)."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ import numpy as np
 from network_sim.config import LossConfig
 
 LOSS_STREAM = 1
-"""Keeps what is lost apart from whatever else is drawn from the same seed."""
+"""Number of this random stream, so that losses are independent of other draws from the same seed."""
 _BLOCK = 1024
 
 
 class LinkLosses:
-    """Which frames get lost on each link, one after the other.
+    """Sequence of lost and received frames on each link.
 
-    Every link has a chain and a stream of its own, which depend on the seed and on its two nodes alone: what
-    is lost on it does not change with what is sent elsewhere.
+    Every link has its own Markov chain and random stream, which depend only on the seed and the link's two
+    nodes: its losses do not change with traffic on other links.
     """
 
     def __init__(self, config: LossConfig, seed: int) -> None:
-        """With a share of 0 nothing is drawn."""
+        """Prepare the links; with a loss share of 0 nothing is drawn."""
         self._config = config
         self._seed = seed
         self._links: dict[tuple[int, int], Iterator[bool]] = {}
 
     def lost(self, sender: int, receiver: int) -> bool:
-        """Whether the link loses the frame that its sender sends next."""
+        """Return whether the link loses the next frame of this sender."""
         if not self._config.share:
             return False
         link = self._links.get((sender, receiver))
@@ -38,11 +38,11 @@ class LinkLosses:
 
 
 def frames_lost(config: LossConfig, rng: np.random.Generator) -> Iterator[bool]:
-    """Whether each frame of a link is lost: Gilbert's two states, of which one loses all and one nothing.
+    """Yield whether each frame of a link is lost: Gilbert's model, with a bad state that loses all frames.
 
     After a loss the next frame is lost with probability 1 - p_bg, else with p_gb; p_bg = 1 / burst and
-    p_gb = p_bg L / (1 - L) for a share L. Losses by chance alone are the same with bursts of 1 / (1 - L),
-    and none are shorter: then frames would have to know of each other to avoid each other.
+    p_gb = p_bg L / (1 - L) for a loss share L. Independent losses have a mean burst of 1 / (1 - L); shorter
+    bursts would need negatively correlated losses, so they are raised to this value.
     """
     share = config.share
     goes_on = max(1.0 - 1.0 / config.burst_packets, share)

@@ -1,4 +1,4 @@
-"""Positions of the nodes, and the layouts of fixed ones."""
+"""Positions of the nodes, and layouts of fixed nodes."""
 
 from __future__ import annotations
 
@@ -13,54 +13,54 @@ class Places(Protocol):
     """Positions of all nodes at any time."""
 
     static: bool
-    """No node moves: distances may be cached."""
+    """True if no node moves, so that distances may be cached."""
 
     @property
     def count(self) -> int:
-        """Nodes, sinks and access points together."""
+        """Number of nodes, sinks and access points together."""
 
     def position_m(self, node: int, now_ns: int) -> tuple[float, float]:
-        """Where a node is, in metres east and north."""
+        """Return a node's position in metres east and north."""
 
     def distance_m(self, a: int, b: int, now_ns: int) -> float:
-        """Distance of two nodes."""
+        """Return the distance of two nodes."""
 
 
 class FixedPlaces:
-    """Nodes that stand still."""
+    """Positions of nodes that do not move."""
 
     static = True
 
     def __init__(self, positions_m: np.ndarray) -> None:
-        """``positions_m`` is (N, 2)."""
+        """Compute all distances from the positions (N, 2)."""
         self.positions_m = np.asarray(positions_m, dtype=float)
         between_m = self.positions_m[:, None] - self.positions_m[None]
         self._distances_m: list[list[float]] = np.hypot(between_m[..., 0], between_m[..., 1]).tolist()
 
     @property
     def count(self) -> int:
-        """Nodes and sink together."""
+        """Number of nodes and sink together."""
         return len(self._distances_m)
 
     def position_m(self, node: int, now_ns: int) -> tuple[float, float]:
-        """Where a node is, the same at any time."""
+        """Return a node's position, which is the same at any time."""
         x_m, y_m = self.positions_m[node].tolist()
         return x_m, y_m
 
     def distance_m(self, a: int, b: int, now_ns: int) -> float:
-        """Distance of two nodes, the same at any time."""
+        """Return the distance of two nodes, which is the same at any time."""
         return self._distances_m[a][b]
 
 
 def place_nodes(config: NodesConfig, rng: np.random.Generator) -> FixedPlaces:
-    """Positions of the nodes, then the sink: as given, or by ``config.layout``.
+    """Place the nodes, then the sink: as given in ``config.places_m``, or by ``config.layout``.
 
     Args:
-        config: Count, places, or layout and spacing.
-        rng: Draws the random layout; the others do not use it.
+        config: Count, and positions or layout and spacing.
+        rng: Random generator of the random layout; the other layouts do not use it.
 
     Returns:
-        Places of ``config.count`` + 1 nodes; the sink is the last and stands at the origin of a layout.
+        Positions of ``config.count`` + 1 nodes; the sink is the last and is at the origin of a layout.
     """
     if config.places_m:
         return FixedPlaces(np.reshape(config.places_m, (-1, 2)))

@@ -1,6 +1,6 @@
 """Propagation and reception: mean power over distance, shadowing, fading, bit errors (SPEC 6.3).
 
-Powers are in watts and distances in metres, inside as well as in every argument; decibels only in the config.
+All powers are in watts and all distances in metres; only the config has decibels.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from network_sim.config import MacConfig, NetworkConfig, RadioConfig
 from network_sim.radio.places import Places
 
 Modulation = Literal["dbpsk", "dqpsk", "cck5.5", "cck11", "oqpsk"]
-"""How bytes are sent: IEEE 802.11b at 1, 2, 5.5 and 11 Mb/s, IEEE 802.15.4 at 250 kb/s."""
+"""Modulations: IEEE 802.11b at 1, 2, 5.5 and 11 Mb/s, IEEE 802.15.4 at 250 kb/s."""
 IEEE80211B: dict[float, tuple[Modulation, float]] = {
     1e6: ("dbpsk", 9.0),
     2e6: ("dqpsk", 6.0),
     5.5e6: ("cck5.5", 3.0),
     11e6: ("cck11", 0.0),
 }
-"""By the rate in bit/s: the modulation, and how many decibels less power than at 11 Mb/s it takes. The data
-sheet of Acer's MPCI-101 has -91, -88, -85 and -82 dBm, at which 8 % of frames of 1024 bytes are lost."""
+"""Modulation by rate in bit/s, and the decibels by which it needs less power than 11 Mb/s. The data sheet of
+Acer's MPCI-101 has -91, -88, -85 and -82 dBm, at which 8 % of frames of 1024 bytes are lost."""
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 _ROUNDING = 1e-9  # nodes exactly range_m apart hear each other, however their distance was computed
@@ -34,18 +34,18 @@ _BLOCK = 1024
 
 
 def wavelength_m(frequency_hz: float) -> float:
-    """Wavelength of a carrier in vacuum."""
+    """Return the wavelength of a carrier in vacuum."""
     return SPEED_OF_LIGHT_MPS / frequency_hz
 
 
 def crossover_m(antenna_height_m: float, wavelength_m: float) -> float:
-    """Distance ``4 pi h^2 / lambda`` from which the ground reflection takes over (Rappaport 2002, 4.6)."""
+    """Return ``4 pi h^2 / lambda``, where the ground reflection begins to dominate (Rappaport 2002, 4.6)."""
     return 4.0 * math.pi * antenna_height_m**2 / wavelength_m
 
 
 @dataclass(frozen=True, slots=True)
 class PathLoss:
-    """Mean power as one power law near the sender and another one far away."""
+    """Mean received power over distance: one power law near the sender, another one far away."""
 
     near_w: float
     """Power of the near law at 1 m."""
@@ -54,26 +54,26 @@ class PathLoss:
     """Power of the far law at 1 m."""
     far_exponent: float
     break_m: float
-    """Where the far law takes over; infinite if it never does."""
+    """Distance from which the far law applies; infinite if it never does."""
     least_m: float
-    """Below this distance the power no longer grows: the law would exceed the transmitted power."""
+    """Distance below which the power is constant: the law would exceed the transmitted power."""
 
     def power_w(self, distance_m: float) -> float:
-        """Mean received power at a distance."""
+        """Return the mean received power at a distance."""
         held_m = distance_m if distance_m > self.least_m else self.least_m
         if held_m < self.break_m:
             return self.near_w * held_m**-self.near_exponent
         return self.far_w * held_m**-self.far_exponent
 
     def distance_m(self, power_w: float) -> float:
-        """Farthest distance at which the mean received power is still ``power_w``, of what is less than the
-        power at ``least_m``."""
+        """Return the largest distance at which the mean received power is still ``power_w``, for any
+        ``power_w`` below the power at ``least_m``."""
         far_m = (self.far_w / power_w) ** (1.0 / self.far_exponent)
         return far_m if far_m >= self.break_m else (self.near_w / power_w) ** (1.0 / self.near_exponent)
 
 
 def free_space(tx_power_w: float, wavelength_m: float, gain: float = 1.0, loss: float = 1.0) -> PathLoss:
-    """Friis 1946: ``Pr = Pt G^2 lambda^2 / ((4 pi d)^2 L)`` with the gain G of each antenna."""
+    """Return Friis' law (1946): ``Pr = Pt G^2 lambda^2 / ((4 pi d)^2 L)``, G the gain of each antenna."""
     least_m = wavelength_m / (4.0 * math.pi)
     near_w = tx_power_w * gain**2 * least_m**2 / loss
     return PathLoss(near_w, 2.0, near_w, 2.0, math.inf, least_m)
@@ -96,7 +96,7 @@ def power_law(
     gain: float = 1.0,
     loss: float = 1.0,
 ) -> PathLoss:
-    """Free space up to ``reference_m``, from there ``(d / reference)^-exponent`` (Rappaport 2002, 4.9)."""
+    """Return free space to ``reference_m``, then ``(d / reference)^-exponent`` (Rappaport 2002, 4.9)."""
     near = free_space(tx_power_w, wavelength_m, gain, loss)
     break_m = max(reference_m, near.least_m)
     far_w = near.power_w(break_m) * break_m**exponent
@@ -104,7 +104,7 @@ def power_law(
 
 
 def path_loss(config: RadioConfig) -> PathLoss:
-    """The path loss that a config names."""
+    """Return the path loss of the model ``config.model``."""
     tx_power_w, length_m = watts(config.tx_power_dbm), wavelength_m(config.frequency_hz)
     gain, loss = config.antenna_gain, config.system_loss
     if config.model == "friis":
@@ -115,12 +115,12 @@ def path_loss(config: RadioConfig) -> PathLoss:
 
 
 def watts(power_dbm: float) -> float:
-    """Watts of a power in dBm."""
+    """Convert a power in dBm to watts."""
     return 1e-3 * ratio(power_dbm)
 
 
 def ratio(decibels: float) -> float:
-    """Factor of a number of decibels."""
+    """Convert decibels to a factor."""
     return 10.0 ** (decibels / 10.0)
 
 
@@ -130,10 +130,10 @@ _LARGEST = 13.0  # errors are below 1e-16 there
 
 @cache
 def _biorthogonal_table() -> list[float]:
-    """Log of the error rate of one of 16 biorthogonal signals, over steps of b = ``sqrt(2 Es/N0)``.
+    """Tabulate the log of the error rate of 16 biorthogonal signals, over steps of b = ``sqrt(2 Es/N0)``.
 
-    The rate is ``Q(b) + integral from 0 of (1 - (1 - 2 Q(u))^7) phi(u - b) du`` (Proakis 2001, 5.2, as what
-    is missing from one).
+    The rate is ``Q(b) + integral from 0 of (1 - (1 - 2 Q(u))^7) phi(u - b) du`` (Proakis 2001, 5.2, as the
+    complement of his probability).
     """
     nodes, weights = np.polynomial.legendre.leggauss(256)
     u = 11.0 * (nodes + 1.0)
@@ -147,12 +147,12 @@ def _biorthogonal_table() -> list[float]:
 
 @cache
 def _dqpsk_table() -> list[float]:
-    """Log of the bit error rate of differential four-phase keying, over steps of b = ``sqrt(2 Eb/N0)``.
+    """Tabulate the log of the bit error rate of DQPSK, over steps of b = ``sqrt(2 Eb/N0)``.
 
     The rate is ``Q1(x, y) - I0(x y) exp(-(x^2 + y^2) / 2) / 2`` with Marcum's Q and x, y = b sqrt(1 -+ 1/2^½)
     (Proakis 2001, 5.2).
     """
-    from scipy.special import i0e  # who draws a network's reach does without
+    from scipy.special import i0e  # imported here: other uses of this module do not need it
     from scipy.stats import ncx2
 
     b = np.arange(_STEP, _LARGEST + 2 * _STEP, _STEP)
@@ -162,7 +162,7 @@ def _dqpsk_table() -> list[float]:
 
 
 def _rate(table: list[float], b: float) -> float:
-    """Between the two entries of a table; 0 beyond its end."""
+    """Interpolate a table of log rates at b; 0 beyond its end."""
     place = b / _STEP
     if place >= len(table) - 1:
         return 0.0
@@ -172,26 +172,26 @@ def _rate(table: list[float], b: float) -> float:
 
 
 def cck11_symbol_error_rate(sinr: float) -> float:
-    """802.11b at 11 Mb/s: error rate of a symbol of 8 bits (Pei and Henderson 2009, as in ns-3).
+    """Error rate of an 8-bit symbol of 802.11b at 11 Mb/s (Pei and Henderson 2009, as in ns-3).
 
-    One of 256 is sent as two of 16 biorthogonal signals; noise in the 22 MHz of the channel.
+    A symbol (1 of 256) is sent as two of 16 biorthogonal signals; noise in the 22 MHz of the channel.
     """
     one = _rate(_biorthogonal_table(), math.sqrt(8.0 * sinr))
     return one * (2.0 - one)
 
 
 def cck5_symbol_error_rate(sinr: float) -> float:
-    """802.11b at 5.5 Mb/s: error rate of a symbol of 4 bits (Pei and Henderson 2009, as in ns-3)."""
+    """Error rate of a 4-bit symbol of 802.11b at 5.5 Mb/s (Pei and Henderson 2009, as in ns-3)."""
     return _rate(_biorthogonal_table(), math.sqrt(16.0 * sinr))
 
 
 def dqpsk_bit_error_rate(sinr: float) -> float:
-    """802.11b at 2 Mb/s; noise in 22 MHz. ns-3 has this rate's limit for strong signals."""
+    """Bit error rate of 802.11b at 2 Mb/s; noise in 22 MHz. ns-3 uses its limit for strong signals."""
     return _rate(_dqpsk_table(), math.sqrt(22.0 * sinr))
 
 
 def dbpsk_bit_error_rate(sinr: float) -> float:
-    """802.11b at 1 Mb/s: ``exp(-Eb/N0) / 2`` (Proakis 2001, 5.2); noise in 22 MHz."""
+    """Bit error rate of 802.11b at 1 Mb/s: ``exp(-Eb/N0) / 2`` (Proakis 2001, 5.2); noise in 22 MHz."""
     return 0.5 * math.exp(-22.0 * sinr)
 
 
@@ -199,15 +199,15 @@ _OQPSK_TERMS = tuple(((-1) ** k * math.comb(16, k) / 30.0, 20.0 * (1.0 / k - 1.0
 
 
 def oqpsk_bit_error_rate(sinr: float) -> float:
-    """802.15.4 at 2.4 GHz: ``8/15 1/16 sum_k (-1)^k C(16, k) exp(20 sinr (1/k - 1))`` for k from 2 to 16.
+    """Bit error rate of 802.15.4 at 2.4 GHz (IEEE 802.15.4-2006, E.4.1.8).
 
-    IEEE 802.15.4-2006, E.4.1.8.
+    It is ``8/15 1/16 sum_k (-1)^k C(16, k) exp(20 sinr (1/k - 1))`` for k from 2 to 16.
     """
     return min(0.5, max(0.0, sum(factor * math.exp(power * sinr) for factor, power in _OQPSK_TERMS)))
 
 
 def walls_crossed(walls_m: NDArray[np.float64], a_m: tuple[float, float], b_m: tuple[float, float]) -> int:
-    """How many walls (W, 2, 2), of two ends each, the straight line from ``a_m`` to ``b_m`` crosses."""
+    """Count the walls (W, 2, 2), given by their two ends, that the line from ``a_m`` to ``b_m`` crosses."""
     link_m, walls = np.subtract(b_m, a_m), walls_m[:, 1] - walls_m[:, 0]
 
     def side(of: NDArray[np.float64], point_m: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -219,38 +219,38 @@ def walls_crossed(walls_m: NDArray[np.float64], a_m: tuple[float, float], b_m: t
 
 
 def modulation(mac: MacConfig) -> Modulation:
-    """How a medium access sends its data frames."""
+    """Return the modulation of a medium access's data frames."""
     return IEEE80211B[mac.rate_bps][0] if mac.kind == "ieee80211b" else "oqpsk"
 
 
 def _threshold_w(config: RadioConfig, mac: MacConfig) -> float:
-    """Power at the nominal range, or less at the slower rates of IEEE 802.11b."""
+    """Return the power at the nominal range, or less for the slower rates of IEEE 802.11b."""
     less_db = IEEE80211B[mac.rate_bps][1] if mac.kind == "ieee80211b" else 0.0
     return path_loss(config).power_w(config.range_m) * ratio(-less_db)
 
 
 def reach_m(config: NetworkConfig) -> float:
-    """How far a frame is received without shadowing: the nominal range, or farther at a slower rate."""
+    """Return the reach of a frame without shadowing: the nominal range, or more at a slower rate."""
     return path_loss(config.radio).distance_m(_threshold_w(config.radio, config.mac))
 
 
 class Radio:
-    """The radio that every node has: thresholds, the power over each link, errors."""
+    """The radio of every node: thresholds, received power over each link, bit errors."""
 
     def __init__(self, config: RadioConfig, mac: MacConfig, rng: np.random.Generator) -> None:
-        """Draws only the seed of the shadowing, so that shadowing does not depend on the order of frames."""
+        """Draw only the seed of the shadowing, so that shadowing does not depend on the order of frames."""
         law = path_loss(config)
         self.config = config
-        """Its config."""
+        """Config of the radio."""
         self.mean_power_w = law.power_w
         """Mean received power at a distance."""
         self.rx_threshold_w = _threshold_w(config, mac) * (1.0 - _ROUNDING)
-        """Least power that is received; without shadowing, what arrives at the reach."""
+        """Receive threshold: the mean power at the reach."""
         sensed_w = law.power_w(config.sense_range_m) * (1.0 - _ROUNDING)
         self.cs_threshold_w = min(sensed_w, self.rx_threshold_w)
-        """Least power that makes the channel busy; what can be received does."""
+        """Carrier-sense threshold; never above the receive threshold."""
         self.capture_ratio = ratio(config.capture_db)
-        """Least ratio of a frame's power to the sum of what overlaps it."""
+        """Least ratio of a frame's power to the sum of overlapping powers with which it survives."""
         self.noise_w = None if config.noise_dbm is None else watts(config.noise_dbm)
         """Power of the noise; None if there are no bit errors."""
         self._shadowing_db = config.shadowing_db
@@ -258,14 +258,14 @@ class Radio:
         self._shadowing: dict[tuple[int, int], float] = {}
         self._nakagami_m = config.nakagami_m
         self.fades = config.nakagami_m is not None
-        """Whether ``faded_w`` changes anything."""
+        """Whether frames have fading."""
         self._walls_m = np.reshape(config.walls_m, (-1, 2, 2))
         self._wall_gain = ratio(-config.wall_db)
         self._rng = rng
         self._fading: list[float] = []
 
     def link_power_w(self, sender: int, receiver: int, distance_m: float) -> float:
-        """Mean power over a link with the shadowing of its two nodes, the same in both directions."""
+        """Return the mean power over a link with its shadowing, which is the same in both directions."""
         power_w = self.mean_power_w(distance_m)
         if self._shadowing_db == 0.0:
             return power_w
@@ -277,7 +277,7 @@ class Radio:
         return power_w * gain
 
     def between_w(self, places: Places, sender: int, receiver: int, now_ns: int) -> float:
-        """Mean power over the link of two nodes where they are at a time, through the walls in between."""
+        """Return the mean power between two nodes at ``now_ns``, through the walls in between."""
         power_w = self.link_power_w(sender, receiver, places.distance_m(sender, receiver, now_ns))
         if not len(self._walls_m):
             return power_w
@@ -285,7 +285,7 @@ class Radio:
         return power_w * self._wall_gain ** walls_crossed(self._walls_m, *ends_m)
 
     def faded_w(self, power_w: float) -> float:
-        """The power of one frame: Nakagami-m fading makes it gamma distributed with mean ``power_w``."""
+        """Draw the power of one frame: Nakagami-m fading gives a gamma distribution with mean ``power_w``."""
         if self._nakagami_m is None:
             return power_w
         if not self._fading:
@@ -294,12 +294,12 @@ class Radio:
         return power_w * self._fading.pop()
 
     def error_rate(self, sinr: float, size_bytes: float, kind: Modulation) -> float:
-        """Probability that at least one bit of a frame is wrong.
+        """Return the probability that at least one bit of a frame is wrong.
 
         Args:
-            sinr: signal over noise and interference, as a factor.
+            sinr: ratio of signal to noise and interference, as a factor.
             size_bytes: bytes sent with this modulation.
-            kind: their modulation.
+            kind: modulation of these bytes.
         """
         if kind == "cck11":
             return _one_wrong(cck11_symbol_error_rate(sinr), size_bytes)
@@ -316,5 +316,5 @@ _BIT_ERROR_RATES: dict[Modulation, Callable[[float], float]] = {
 
 
 def _one_wrong(rate: float, count: float) -> float:
-    """Probability that at least one of independent symbols is wrong."""
+    """Return the probability that at least one of ``count`` independent symbols is wrong."""
     return -math.expm1(count * math.log1p(-rate))

@@ -1,8 +1,8 @@
-"""Vehicles on a square grid of streets: positions, cells that they see, contacts with access points.
+"""Vehicles on a square grid of streets: routes, positions, road cells, contacts with access points.
 
 The scenario is our reconstruction (SPEC 6.2) of Bruno & Nurchis, "Efficient data collection in multimedia
-vehicular sensing platforms" (arXiv 1311.6013). All vehicles drive at one speed and take a turn at random at
-every crossing, never back. So a route is a sequence of crossings, and positions, cells and contacts have
+vehicular sensing platforms" (arXiv 1311.6013). All vehicles drive at the same speed and choose a random way
+at every crossing, never back. So a route is a sequence of crossings, and positions, cells and contacts have
 closed forms.
 """
 
@@ -18,9 +18,9 @@ from network_sim.types import NS_PER_S
 from packetmesh.errors import InputError
 
 STEPS = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
-"""Blocks east and north for each heading: east, north, west, south."""
+"""Blocks to the east and north for each heading: east, north, west, south."""
 MAX_CELLS = 2**15
-"""The trace keeps the number of a cell where it keeps that of a node, in 16 bits."""
+"""Largest number of cells: the trace stores a cell in the 16-bit column of a node."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,30 +29,30 @@ class Routes:
 
     config: StreetConfig
     crossings: np.ndarray
-    """(V, S + 1) crossings in order; crossing ``x + y (blocks + 1)`` lies ``x`` blocks east, ``y`` north."""
+    """(V, S + 1) crossings in order; crossing ``x + y (blocks + 1)`` is ``x`` blocks east, ``y`` north."""
     headings: np.ndarray
     """(V, S) heading from each crossing to the next."""
     start_m: np.ndarray
-    """(V,)"""
+    """(V,) distance already driven in the first segment at time 0."""
 
     def segments(self, vehicle: int, t_ns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Index of the segment, and metres into it, at those times (T,)."""
+        """Return a vehicle's segment index, and the metres driven in it, at times ``t_ns`` (T,)."""
         driven_m = self.start_m[vehicle] + self.config.speed_mps / NS_PER_S * t_ns
         segment = (driven_m / self.config.block_m).astype(np.int64)
         return segment, driven_m - segment * self.config.block_m
 
     def cells(self, vehicle: int, t_ns: np.ndarray, cell_m: float, directed: bool = True) -> np.ndarray:
-        """The cell, a number below ``cell_numbers()``, of the vehicle at those times (T,).
+        """Return (T,) the vehicle's cell at each time, a number below ``cell_numbers()``.
 
         Args:
-            vehicle: Its number.
+            vehicle: Number of the vehicle.
             t_ns: Times (T,).
             cell_m: Length of a cell.
-            directed: Each direction of a street has cells of its own; otherwise both share them.
+            directed: True gives each direction of a street its own cells; otherwise both share them.
         """
         segment, into_m = self.segments(vehicle, t_ns)
         crossing, heading = self.crossings[vehicle, segment], self.headings[vehicle, segment]
-        if not directed:  # as if all drove the first two ways
+        if not directed:  # number the cells as if all vehicles drove east or north
             back = heading >= len(STEPS) // 2
             crossing = np.where(back, self.crossings[vehicle, segment + 1], crossing)
             heading = heading % (len(STEPS) // 2)
@@ -64,7 +64,7 @@ class Routes:
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """A vehicle within range of an access point."""
+    """Time span in which a vehicle is within range of an access point."""
 
     access_point: int
     enter_ns: int
@@ -77,7 +77,7 @@ class StreetPlaces:
     static = False
 
     def __init__(self, routes: Routes, access_points_m: np.ndarray) -> None:
-        """``access_points_m`` is (A, 2)."""
+        """Prepare positions from the routes and the access points' positions (A, 2)."""
         config = routes.config
         self._segments_per_ns = config.speed_mps / config.block_m / NS_PER_S
         self._start = (routes.start_m / config.block_m).tolist()
@@ -89,11 +89,11 @@ class StreetPlaces:
 
     @property
     def count(self) -> int:
-        """Vehicles and access points together."""
+        """Number of vehicles and access points together."""
         return self._vehicles + len(self._fixed)
 
     def position_m(self, node: int, now_ns: int) -> tuple[float, float]:
-        """Position of a node in metres east and north of the south-western crossing."""
+        """Return a node's position in metres east and north of the south-western crossing."""
         if node >= self._vehicles:
             return self._fixed[node - self._vehicles]
         driven = self._start[node] + self._segments_per_ns * now_ns
@@ -104,23 +104,23 @@ class StreetPlaces:
         return x0_m + part * (x_m[segment + 1] - x0_m), y0_m + part * (y_m[segment + 1] - y0_m)
 
     def distance_m(self, a: int, b: int, now_ns: int) -> float:
-        """Distance of two nodes at that time."""
+        """Return the distance of two nodes at ``now_ns``."""
         ax_m, ay_m = self.position_m(a, now_ns)
         bx_m, by_m = self.position_m(b, now_ns)
         return hypot(ax_m - bx_m, ay_m - by_m)
 
 
 def crossings_m(config: StreetConfig) -> np.ndarray:
-    """Positions (C, 2) of all crossings, C = (blocks + 1)^2."""
+    """Return the positions (C, 2) of all crossings, C = (blocks + 1)^2."""
     y, x = np.divmod(np.arange((config.blocks + 1) ** 2), config.blocks + 1)
     return np.column_stack([x, y]) * config.block_m
 
 
 def access_points_m(config: StreetConfig) -> np.ndarray:
-    """Positions (A, 2) of the access points: at crossings, spread evenly over the grid."""
+    """Return the positions (A, 2) of the access points: at crossings, spread evenly over the grid."""
     side = ceil(sqrt(config.access_points))
     even = (np.arange(side) + 0.5) / side * config.blocks
-    # Halves go outwards, so that the pattern stays symmetric and no two points meet.
+    # Halves are rounded outwards: the pattern stays symmetric and no two points coincide.
     along = np.where(even < config.blocks / 2, np.ceil(even - 0.5), np.floor(even + 0.5))
     chosen = np.linspace(0, side**2 - 1, config.access_points).round().astype(int)
     y, x = np.divmod(chosen, side)
@@ -128,10 +128,10 @@ def access_points_m(config: StreetConfig) -> np.ndarray:
 
 
 def cell_numbers(config: StreetConfig, cell_m: float) -> int:
-    """One more than the largest number of a cell; those of streets that would leave the grid stay unused.
+    """Return the count of cell numbers; those of streets that would leave the grid stay unused.
 
     Raises:
-        InputError: more cells than the trace can number.
+        InputError: there are more than ``MAX_CELLS`` cells.
     """
     numbers = (config.blocks + 1) ** 2 * len(STEPS) * _pieces(config, cell_m)
     if numbers > MAX_CELLS:
@@ -143,7 +143,7 @@ def cell_numbers(config: StreetConfig, cell_m: float) -> int:
 
 
 def cells_m(config: StreetConfig, cell_m: float) -> np.ndarray:
-    """(C, 2, 2) both ends of every cell, in the order of their numbers and the direction of driving."""
+    """Return (C, 2, 2) start and end of every cell in driving direction, ordered by cell number."""
     pieces = _pieces(config, cell_m)
     ends_m = np.minimum(np.arange(pieces + 1) * cell_m, config.block_m)
     into_m = np.stack((ends_m[:-1], ends_m[1:]), axis=1)
@@ -152,10 +152,10 @@ def cells_m(config: StreetConfig, cell_m: float) -> np.ndarray:
 
 
 def drive(config: StreetConfig, horizon_s: float, rng: np.random.Generator) -> Routes:
-    """Routes that last until the horizon.
+    """Draw random routes that last until the horizon.
 
-    Vehicles start anywhere on the streets. That is also how they are spread at any later time: each way into
-    a crossing is as likely as each way out of it.
+    Vehicles start uniformly distributed over the streets, and stay so distributed: every way into a crossing
+    and every way out of it are equally likely.
     """
     side = config.blocks + 1
     x, y = np.arange(side**2) % side, np.arange(side**2) // side
@@ -179,10 +179,10 @@ def drive(config: StreetConfig, horizon_s: float, rng: np.random.Generator) -> R
 
 
 def contacts(routes: Routes, points_m: np.ndarray, range_m: float) -> list[list[Contact]]:
-    """For each vehicle, its times within range of each of the points (A, 2), in order of entering.
+    """Compute each vehicle's contacts with the points (A, 2), in order of entering their range.
 
-    A segment meets the disc around a point in one piece at most; pieces that touch at a crossing are one
-    contact.
+    A segment intersects the disc around a point in at most one piece; pieces that touch at a crossing form
+    one contact.
     """
     start_m = crossings_m(routes.config)[routes.crossings[:, :-1]]
     ahead = STEPS[routes.headings]
@@ -200,7 +200,7 @@ def contacts(routes: Routes, points_m: np.ndarray, range_m: float) -> list[list[
 
 
 def _joined(routes: Routes, enter_m: np.ndarray, leave_m: np.ndarray) -> list[tuple[int, int, int]]:
-    """(vehicle, enter_ns, leave_ns) of pieces (V, S) of segments, where those that touch are one."""
+    """Join pieces (V, S) of segments that touch; returns (vehicle, enter_ns, leave_ns) of each."""
     config = routes.config
     inside = leave_m > enter_m
     goes_on = inside[:, :-1] & inside[:, 1:] & (leave_m[:, :-1] == config.block_m) & (enter_m[:, 1:] == 0.0)
@@ -218,7 +218,7 @@ def _joined(routes: Routes, enter_m: np.ndarray, leave_m: np.ndarray) -> list[tu
 
 
 def _turns(open_ways: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Headings (C, 4, 3) to go on with at each crossing for each heading of arrival, and how many (C, 4)."""
+    """Return possible next headings (C, 4, 3) by crossing and heading of arrival, and their count (C, 4)."""
     turns = np.zeros((len(open_ways), 4, 3), dtype=np.int64)
     counts = np.zeros((len(open_ways), 4), dtype=np.int64)
     for crossing, ways in enumerate(open_ways):

@@ -1,7 +1,7 @@
-"""The images of all vehicles.
+"""Images of all vehicles, computed when they are needed.
 
-A vehicle takes one at a fixed interval, so they are computed only when it meets an access point. The scenario
-is our reconstruction (SPEC 6.2) of Bruno & Nurchis (arXiv 1311.6013).
+A vehicle takes images at a fixed interval, so they are computed only when it meets an access point. The
+scenario is our reconstruction (SPEC 6.2) of Bruno & Nurchis (arXiv 1311.6013).
 """
 
 from __future__ import annotations
@@ -17,31 +17,31 @@ from network_sim.types import Cause, EventKind, to_ns
 
 
 class Snapshots:
-    """Capture time and cell of each image, and which images a vehicle has still to offer.
+    """Capture time and cell of each image, and the images that each vehicle still has to offer.
 
-    The buffer of a vehicle is a FIFO (SPEC 6.2): the last 200 images that it took. Image ``i`` of vehicle
-    ``v`` has the number ``v * per_vehicle + i``.
+    The buffer of a vehicle is a FIFO (SPEC 6.2) of its latest ``scheme.buffer_images`` images. Image ``i`` of
+    vehicle ``v`` has the number ``v * per_vehicle + i``.
     """
 
     def __init__(self, config: NetworkConfig, routes: Routes, rng: np.random.Generator) -> None:
-        """``rng`` draws when each vehicle takes its first image, within the first interval."""
+        """Draw from ``rng`` the time of each vehicle's first image, within the first interval."""
         self._routes = routes
         self._cell_m = config.scheme.cell_m
         self._directed = config.scheme.directed_cells
         self._capacity = config.scheme.buffer_images
         self._sample_ns = to_ns(config.scheme.sample_s)
         self.kept_ns = self._capacity * self._sample_ns
-        """How long an image stays in the buffer, unless it is sent before."""
+        """Time after capture for which an image stays in the buffer."""
         vehicles = config.street.vehicles
         self._first_ns: list[int] = rng.integers(self._sample_ns, size=vehicles).tolist()
         self._per_vehicle = to_ns(config.run.horizon_s) // self._sample_ns + 1
         self.arrived = bytearray(vehicles * self._per_vehicle)
-        """Whether the collector has each image."""
+        """For each image, whether the collector has it."""
         self._next = [0] * vehicles
         self._offer_later: list[set[int]] = [set() for _ in range(vehicles)]
 
     def offer(self, vehicle: int, now_ns: int) -> np.ndarray:
-        """Images (T,) in the buffer that were not offered yet or are to be offered again, oldest first."""
+        """Return the images (T,) in the buffer that are new or must be offered again, oldest first."""
         newest = self._newest(vehicle, now_ns)
         oldest = max(newest - self._capacity + 1, 0)
         base = vehicle * self._per_vehicle
@@ -52,16 +52,16 @@ class Snapshots:
         return np.concatenate([np.array(again, dtype=np.int64), images]) if again else images
 
     def offer_later(self, vehicle: int, images: Iterable[int]) -> None:
-        """Offer these images again: they were not collected."""
+        """Offer these images again at the next contact: they were not collected."""
         self._offer_later[vehicle].update(images)
 
     def tags(self, vehicle: int, images: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Cells (T,) and times in ns (T,) of images of a vehicle."""
+        """Return cells (T,) and capture times in ns (T,) of a vehicle's images."""
         captured_ns = self._first_ns[vehicle] + (images - vehicle * self._per_vehicle) * self._sample_ns
         return self._routes.cells(vehicle, captured_ns, self._cell_m, self._directed), captured_ns
 
     def record(self, recorder: Recorder, now_ns: int, image_bytes: int) -> None:
-        """Record all images taken so far, and those that a full buffer dropped before they had arrived."""
+        """Record all images taken so far, and those that a full buffer dropped before their arrival."""
         arrived = np.frombuffer(self.arrived, dtype=bool)
         for vehicle in range(len(self._first_ns)):
             count = self._newest(vehicle, now_ns) + 1

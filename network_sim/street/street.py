@@ -1,10 +1,10 @@
-"""Vehicles with cameras that meet roadside access points: summary, request, upload.
+"""The street scenario: vehicles exchange summaries, requests and images with roadside access points.
 
 Our reconstruction (SPEC 6.2) of the scenario of Bruno & Nurchis, "Efficient data collection in multimedia
 vehicular sensing platforms" (arXiv 1311.6013), of which only the abstract and the first lines could be read.
-A vehicle that enters the range of an access point sends the tags of its new images, again every 10 s; the
-collector behind the access points, wired to them without delay, asks for some; the vehicle sends these. What
-was requested but did not arrive is offered again, as long as it is in the vehicle's buffer.
+A vehicle within range of an access point sends the tags of its new images every 10 s; the collector behind
+the access points, wired to them without delay, requests some of the images; the vehicle sends these. Images
+that were requested but did not arrive are offered again while they are in the vehicle's buffer.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ from network_sim.trace.log import Recorder
 from network_sim.types import EventKind, Packet, PacketKind, to_ns
 
 _STREAMS = 4
-"""Random streams of a run; the first is that of the vehicles."""
+"""Number of random streams of a run; the first is for the vehicles."""
 _ENQUEUE, _RECEIVE, _ARRIVE = EventKind.ENQUEUE, EventKind.RECEIVE, EventKind.ARRIVE
 _IMAGE = PacketKind.IMAGE
-"""An enumeration is slow to look up, and these are for every packet."""
+"""Local names, because enumeration members are slow to look up and these are used for every packet."""
 
 
 def start_street(
@@ -59,7 +59,7 @@ def start_street(
 
 
 def street_of(config: NetworkConfig) -> StreetPlaces:
-    """Positions of all nodes at any time in the street-grid run of this config, without running it."""
+    """Return the nodes' positions over time in the street-grid run of this config, without running it."""
     street_rng = np.random.default_rng(config.run.seed).spawn(_STREAMS)[0]
     return _places(drive(config.street, config.run.horizon_s, street_rng.spawn(3)[0]))
 
@@ -69,7 +69,7 @@ def _places(routes: Routes) -> StreetPlaces:
 
 
 class Street:
-    """Vehicles 0 to V - 1, access points V to V + A - 1, and the collector that the latter are wired to."""
+    """Vehicles (nodes 0 to V - 1), access points (V to V + A - 1), and the collector wired to them."""
 
     def __init__(
         self,
@@ -80,7 +80,7 @@ class Street:
         rng: np.random.Generator,
         mac_rng: np.random.Generator,
     ) -> None:
-        """``rng`` draws the requests of the scheme, ``mac_rng`` backoffs."""
+        """Create the nodes; ``rng`` draws the requests of the scheme, ``mac_rng`` the backoffs."""
         vehicles, points = config.street.vehicles, config.street.access_points
         self.names = tuple(
             [f"vehicle {i + 1}" for i in range(vehicles)] + [f"access point {i + 1}" for i in range(points)]
@@ -101,7 +101,7 @@ class Street:
         self._mac = make_mac(MacContext(env, medium, config, recorder, mac_rng, always_up, self._receive))
 
     def follow(self, vehicle: int, meetings: list[Contact]) -> Generator[simpy.Event, Any, None]:
-        """Process of one vehicle: its contacts, each kept until the vehicle is out of range."""
+        """Run one vehicle as a process: repeat the exchange in each contact until it is out of range."""
         env, record = self._env, self._recorder.add
         for contact in meetings:
             yield env.timeout(max(contact.enter_ns - env.now, 0))
@@ -119,11 +119,11 @@ class Street:
             record(contact.leave_ns, EventKind.LEAVE, vehicle, access_point)
 
     def record_images(self) -> None:
-        """Record the images that were taken and dropped from buffers; called once, when the run is over."""
+        """Record all images taken and all images dropped from buffers; call once, at the end of the run."""
         self._snapshots.record(self._recorder, int(self._env.now), self._config.image_bytes)
 
     def _exchange(self, vehicle: int, access_point: int, leave_ns: int) -> Generator[simpy.Event, Any, None]:
-        """One summary, the request that answers it, and the upload."""
+        """Exchange one summary, the request that answers it, and the upload."""
         env, scheme, snapshots = self._env, self._scheme, self._snapshots
         offered = snapshots.offer(vehicle, int(env.now))
         heard = yield from self._send_summary(vehicle, access_point, leave_ns, offered)
@@ -145,7 +145,7 @@ class Street:
     def _send_summary(
         self, vehicle: int, access_point: int, leave_ns: int, images: np.ndarray
     ) -> Generator[simpy.Event, Any, np.ndarray]:
-        """Send the tags of images (T,); returns those that arrived."""
+        """Send the tags of images (T,); returns the images whose tags arrived."""
         config = self._config
         most = config.datagram_bytes // config.tag_bytes
         heard = [images[:0]]
@@ -160,7 +160,7 @@ class Street:
         return np.concatenate(heard)
 
     def _send_request(self, vehicle: int, access_point: int, ids: int) -> Generator[simpy.Event, Any, int]:
-        """Send a request for that many images; returns how many of its ids arrived, from the first."""
+        """Send a request with ``ids`` image ids; returns the number of leading ids that arrived."""
         config = self._config
         most = config.datagram_bytes // config.id_bytes
         downlink = self._downlinks[access_point - len(self.names)]
@@ -176,7 +176,7 @@ class Street:
     def _upload(
         self, vehicle: int, access_point: int, leave_ns: int, images: list[int], taken_ns: list[int]
     ) -> Generator[simpy.Event, Any, list[int]]:
-        """Send images while in range and in the buffer; returns those that arrived."""
+        """Send images while in range and while they are in the buffer; returns those received."""
         env, parts, kept_ns = self._env, self._parts, self._snapshots.kept_ns
         sent: list[int] = []
         for image, image_ns in zip(images, taken_ns, strict=False):
@@ -216,12 +216,12 @@ class Street:
         return False
 
     def _receive(self, packet: Packet, node: int) -> None:
-        """A packet reached a node, which here is always its last one."""
+        """Record that a packet reached a node, which in this scenario is always its destination."""
         now_ns = int(self._env.now)
         source, image = packet.source, packet.image
         self._arrived[source] = packet.id
         self._recorder.add_packet(now_ns, _RECEIVE, packet, source, node, packet.size_bytes)
-        # Fragments go in order, and none after one that did not arrive: the last completes its image.
+        # Fragments are sent in order, none after a lost one: the last one completes its image.
         if image >= 0 and packet.first_byte + packet.byte_count == self._config.image_bytes:
             self._snapshots.arrived[image] = True
             size_bytes = self._config.image_bytes

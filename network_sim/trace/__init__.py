@@ -1,1 +1,1 @@
-"""The log of a run, its files, and what is counted from it: ledger, counters, states, conservation."""
+"""The event log of a run, its files, and sums over it: ledger, counters, radio states, conservation."""

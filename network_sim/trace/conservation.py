@@ -1,4 +1,4 @@
-"""Conservation of packets: created = received + dropped + in flight."""
+"""Check of the conservation of packets and images: created = received + dropped + in flight."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ _BLOCK = 65536
 
 
 class InternalError(AssertionError):
-    """A trace breaks an invariant of the simulator: a mistake in the program, not in its input."""
+    """A trace violates an invariant of the simulator: an error in the program, not in its input."""
 
 
 @dataclass(frozen=True, slots=True)
 class Balance:
-    """Outcomes of the packets, or of the images, of the whole run, warm-up included."""
+    """Outcomes of all packets, or all images, of a run, warm-up included."""
 
     created: int
     received: int
     dropped: dict[Cause, int]
-    """Given up, by cause."""
+    """Number of packets or images given up, by cause."""
     in_flight: int
     """Held by a node at the end of the run."""
 
     @property
     def accounted(self) -> int:
-        """Must be ``created``."""
+        """Sum of all outcomes; equals ``created`` in a correct trace."""
         return self.received + sum(self.dropped.values()) + self.in_flight
 
 
 def balance(trace: NetworkTrace) -> Balance:
-    """The balance of packets. Each number is counted by itself, so that the equation can fail."""
+    """Return the balance of packets. Each number comes from its own events, so the equation can fail."""
     counters = trace.counters
     held = _count(counters, EventKind.ENQUEUE) - _count(counters, EventKind.DELIVER)
     return Balance(
@@ -48,7 +48,7 @@ def balance(trace: NetworkTrace) -> Balance:
 
 
 def image_balance(trace: NetworkTrace) -> Balance:
-    """The balance of images: taken = arrived + expired + open."""
+    """Return the balance of images: taken = arrived + expired + open."""
     counters = trace.counters
     arrived = _count(counters, EventKind.ARRIVE)
     return Balance(
@@ -60,10 +60,10 @@ def image_balance(trace: NetworkTrace) -> Balance:
 
 
 def check(trace: NetworkTrace) -> None:
-    """Checks the balances, the history of every packet and image, and that log and counters agree.
+    """Check the balances, the history of every packet and image, and that log and counters agree.
 
     Raises:
-        InternalError: a packet or image is lost or created without its event, or log and counters differ.
+        InternalError: a packet or image appears or vanishes without an event, or log and counters differ.
     """
     faults = list(trace.counters.faults)
     for noun, sums in (("packets", balance(trace)), ("images", image_balance(trace))):
@@ -81,7 +81,7 @@ def check(trace: NetworkTrace) -> None:
 
 
 def recount(trace: NetworkTrace) -> Counters:
-    """The counters that a complete log gives."""
+    """Compute the counters again, from a complete log."""
     tally = Tally(trace.counters.states_ns.shape[1], to_ns(trace.config.run.warmup_s))
     for start in range(0, len(trace.events), _BLOCK):
         tally.take(trace.events.rows(start, start + _BLOCK))

@@ -1,7 +1,7 @@
-"""Counters of a run, from which the metrics that need no single events are computed.
+"""Counters of a run: sums over its events, from which most metrics are computed.
 
-Counting is done for blocks of recorded rows, so that recording stays cheap. Counts are whole numbers, the
-same whether the log is kept or not.
+Events are counted in blocks of recorded rows, which keeps recording fast. Counts are whole numbers and do not
+depend on whether the log is kept.
 """
 
 from __future__ import annotations
@@ -22,43 +22,43 @@ _SHAPE = (len(EventKind), len(PacketKind), len(Cause))
 
 @dataclass(frozen=True, slots=True)
 class Counters:
-    """Sums per minute of simulated time. Minute ``warmup_minutes`` starts exactly when the warm-up ends.
+    """Sums per minute of simulated time. Minute ``warmup_minutes`` starts exactly at the end of the warm-up.
 
-    The first and the last minute may be shorter than 60 s. M minutes, K event kinds, P packet kinds,
-    C causes, N nodes, S states.
+    The first and the last minute may be shorter than 60 s. Axes of the arrays: M minutes, K event kinds,
+    P packet kinds, C causes, N nodes, S states.
     """
 
     count: NDArray[np.int64]
-    """(M, K, P, C) events."""
+    """(M, K, P, C) number of events."""
     size_bytes: NDArray[np.int64]
-    """(M, K, P, C)."""
+    """(M, K, P, C) sum of the events' sizes."""
     duration_ns: NDArray[np.int64]
-    """(M, K, P, C), all in the minute in which the event began."""
+    """(M, K, P, C) sum of the durations, each counted in the minute in which its event began."""
     until_end_ns: NDArray[np.int64]
-    """(M, K, P, C) times from the events to the end of their minute: gives the time integral of a queue."""
+    """(M, K, P, C) sum of the times from each event to the end of its minute, for the mean queue length."""
     states_ns: NDArray[np.int64]
     """(M, N, S) time in each ``State``; a frame that spans two minutes is divided between them."""
     edges_ns: NDArray[np.int64]
-    """(M + 1,) bounds of the minutes, from 0 to the horizon."""
+    """(M + 1,) limits of the minutes, from 0 to the horizon."""
     warmup_minutes: int
-    """How many of the minutes are before the end of the warm-up."""
+    """Number of minutes before the end of the warm-up."""
     packets: Outcomes
-    """Of IMAGE packets that were created after the warm-up."""
+    """Outcomes of IMAGE packets that were created after the warm-up."""
     images: Outcomes
-    """Of images that were taken after the warm-up."""
+    """Outcomes of images that were taken after the warm-up."""
     created: int
-    """Packets of the whole run, by their ids."""
+    """Number of packets of the whole run, counted by id."""
     captured: int
-    """Images of the whole run, by their ids."""
+    """Number of images of the whole run, counted by id."""
     faults: tuple[str, ...]
     """Violated invariants as sentences; empty when there are none."""
 
 
 class Tally:
-    """Adds up blocks of recorded rows.
+    """Accumulates the counters from blocks of recorded rows.
 
     Args:
-        nodes: how many nodes there are.
+        nodes: number of nodes.
         warmup_ns: end of the warm-up.
     """
 
@@ -72,7 +72,7 @@ class Tally:
         self._images = Ledger("image")
 
     def take(self, rows: NDArray[Any]) -> None:
-        """Adds rows (E,) with the columns of the trace, in the order of recording."""
+        """Count rows (E,) with the columns of the trace, in the order of recording."""
         since_ns = rows["t_ns"] - self._start_ns
         minute = since_ns // MINUTE_NS
         self._sums = grown(self._sums, int(minute.max()) + 1)
@@ -102,10 +102,10 @@ class Tally:
         self._images.lose(rows["image"][rows["kind"] == EventKind.EXPIRE])
 
     def counters(self, horizon_ns: int) -> Counters:
-        """The sums of the run, which ended at ``horizon_ns``."""
+        """Return the counters of the run, which ended at ``horizon_ns``."""
         minutes = max(-(-(horizon_ns - self._start_ns) // MINUTE_NS), 1)
         sums = grown(self._sums, minutes)
-        for late in range(minutes, len(sums)):  # what happened exactly at the horizon
+        for late in range(minutes, len(sums)):  # events exactly at the horizon
             sums[minutes - 1] += sums[late]
             sums[minutes - 1, 3] += (late - minutes + 1) * MINUTE_NS * sums[late, 0]
         edges_ns = self._start_ns + MINUTE_NS * np.arange(minutes + 1)

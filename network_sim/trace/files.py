@@ -1,6 +1,6 @@
-"""The trace as files: ``trace.ndjson`` and ``trace.csv`` with a line per event, ``trace.json`` with the rest.
+"""Writing a trace to ``trace.ndjson`` and ``trace.csv`` (a line per event) and ``trace.json`` (all else).
 
-Kinds and causes are names in the files; all other columns are whole numbers, times in nanoseconds.
+Event kinds and causes are written as names, all other columns as whole numbers; times are in nanoseconds.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ _BLOCK = 65536
 
 
 def write_trace(trace: NetworkTrace, folder: Path) -> None:
-    """Writes the three files, all or none.
+    """Write the three files of a trace to a folder, all or none.
 
     Raises:
-        InputError: the folder cannot be made or written, or is full.
+        InputError: the folder cannot be created or written, or the disk is full.
     """
     with (
         atomic_path(folder / "trace.ndjson") as ndjson,
@@ -59,7 +59,7 @@ def _write(trace: NetworkTrace, ndjson: Path, table: Path, rest: Path) -> None:
 
 
 def _blocks(events: Events) -> Iterator[list[tuple[Any, ...]]]:
-    """The events as tuples, not all at once: text needs many times their memory."""
+    """Yield the events as tuples in blocks: as text, all events would need many times their memory."""
     for start in range(0, len(events), _BLOCK):
         part = events.rows(start, start + _BLOCK)
         columns = {name: part[name].tolist() for name in _NAMES}
@@ -81,7 +81,7 @@ def _record(trace: NetworkTrace) -> dict[str, Any]:
 
 
 def _counters_record(counters: Counters) -> dict[str, Any]:
-    """Only what is not zero: most combinations of kind and cause never happen."""
+    """Return the counters without their zeros: most combinations of kind and cause never occur."""
     places = np.argwhere(counters.count)
     at = tuple(places.T)
     record: dict[str, Any] = {field.name: getattr(counters, field.name) for field in fields(Counters)}

@@ -1,4 +1,4 @@
-"""Frames on the air, and what became of each."""
+"""Reception or loss of each frame on the air, with the cause."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from network_sim.trace.log import Events
 from network_sim.types import Cause
 
 NOT_HEARD = (Cause.COLLISION, Cause.NOISE, Cause.RANGE, Cause.NODE_DOWN, Cause.UPLINK, Cause.LINK)
-"""Causes for which a frame did not reach its receiver."""
+"""Causes of a LOSS in which the frame itself did not reach its receiver."""
 
 
 def fates(frames: Events, losses: Events) -> NDArray[np.int8]:
-    """Why the receiver did not get each frame.
+    """Find why each frame was lost.
 
     Args:
         frames: (F,) events AIR.
-        losses: events LOSS; each belongs to the last frame of its sender with its packet.
+        losses: events LOSS; each belongs to the latest frame with the same sender and packet.
 
     Returns:
-        (F,) a ``Cause``; ``NONE`` for a frame that was received.
+        (F,) a ``Cause`` for each frame; ``NONE`` for a frame that was received.
     """
     cause = np.full(len(frames), Cause.NONE, np.int8)
     unheard = losses.where(np.isin(losses.cause, np.array(NOT_HEARD, np.int8)))
@@ -36,7 +36,7 @@ def fates(frames: Events, losses: Events) -> NDArray[np.int8]:
 
 
 def _place(frames: Events, losses: Events) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """(F,) and (L,) places of events in the order of node, packet and time; a link may carry many packets."""
+    """Return sort keys (F,) and (L,) that order frames and losses by node, then packet, then time."""
     count = len(frames)
     node = np.append(frames.node, losses.node).astype(np.int64)
     packet = np.append(frames.packet, losses.packet).astype(np.int64)

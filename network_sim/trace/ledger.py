@@ -1,4 +1,4 @@
-"""Outcome and delay of every packet, or of every image, by its id."""
+"""Ledger of the outcome and delay of every packet, or of every image, by id."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from network_sim.types import NS_PER_S
 
 BINS_PER_DECADE = 200
-"""A bin is 1.16 % wide."""
+"""Bins of the delay histogram per decade; each bin is 1.16 % wide."""
 SHORTEST_S = 1e-6
 _BINS = 12 * BINS_PER_DECADE
 _UNSEEN = np.iinfo(np.int64).max
@@ -19,29 +19,29 @@ _UNSEEN = np.iinfo(np.int64).max
 
 @dataclass(frozen=True, slots=True)
 class Delays:
-    """A distribution of delays from 1 us to 11 days; shorter ones count as 1 us."""
+    """Distribution of delays from 1 us to 11 days; shorter ones count as 1 us."""
 
     count: int
     total_s: float
     squares_s2: float
-    """Sum of the squares."""
+    """Sum of the squared delays."""
     histogram: NDArray[np.int64]
     """(B,) counts in bins of equal width on a logarithmic scale."""
 
     @property
     def mean_s(self) -> float:
-        """NaN without any."""
+        """Mean delay; NaN without delays."""
         return self.total_s / self.count if self.count else float("nan")
 
     @property
     def deviation_s(self) -> float:
-        """Standard deviation of the sample; NaN below two."""
+        """Sample standard deviation; NaN for fewer than two delays."""
         if self.count < 2:
             return float("nan")
         return float(np.sqrt(max(self.squares_s2 - self.total_s**2 / self.count, 0.0) / (self.count - 1)))
 
     def percentile_s(self, percent: float) -> float:
-        """The percentile of the delays, to within a bin; NaN without any."""
+        """Return a percentile of the delays, exact to one bin; NaN without delays."""
         if not self.count:
             return float("nan")
         wanted = max(percent / 100.0 * self.count, 1.0)
@@ -52,7 +52,7 @@ class Delays:
 
 
 def delays_of(times_ns: NDArray[np.int64]) -> Delays:
-    """The distribution of delays (D,)."""
+    """Compute the distribution of delays (D,)."""
     times_s = times_ns / NS_PER_S
     place = np.floor(np.log10(np.maximum(times_s, SHORTEST_S) / SHORTEST_S) * BINS_PER_DECADE)
     histogram = np.bincount(np.clip(place, 0, _BINS - 1).astype(np.int64), minlength=_BINS)
@@ -61,16 +61,16 @@ def delays_of(times_ns: NDArray[np.int64]) -> Delays:
 
 @dataclass(frozen=True, slots=True)
 class Outcomes:
-    """Outcomes of the packets or images that were created in a span of time."""
+    """Numbers and delays of the packets or images that were created in a time span."""
 
     created: int
     arrived: int
     delays: Delays
-    """From creation to arrival."""
+    """Times from creation to arrival."""
 
 
 class Ledger:
-    """For each id: creation, arrival, number of nodes that hold it, number of drops."""
+    """Creation time, arrival time, number of holding nodes and number of drops of each id."""
 
     def __init__(self, noun: str) -> None:
         self._noun = noun
@@ -82,41 +82,41 @@ class Ledger:
         self._losses = np.zeros(0, np.int16)
 
     def enter(self, ids: NDArray[np.int32], t_ns: NDArray[np.int64], kind: ArrayLike = 0) -> None:
-        """These were created, or entered one more node."""
+        """Count packets or images that were created, or that entered one more node."""
         self._make_room(ids)
         np.add.at(self._held, ids, 1)
         np.minimum.at(self._first_ns, ids, t_ns)
         self._kind[ids] = kind
 
     def hand_on(self, ids: NDArray[np.int32]) -> None:
-        """These left a node for the next one."""
+        """Count packets or images that left a node for the next one."""
         self._make_room(ids)
         np.subtract.at(self._held, ids, 1)
 
     def lose(self, ids: NDArray[np.int32]) -> None:
-        """These were dropped by the node that held them."""
+        """Count packets or images that were dropped by the node that held them."""
         self.hand_on(ids)
         np.add.at(self._losses, ids, 1)
 
     def arrive(self, ids: NDArray[np.int32], t_ns: NDArray[np.int64]) -> None:
-        """These have reached their destination."""
+        """Count packets or images that have reached their destination."""
         self._make_room(ids)
         np.add.at(self._arrivals, ids, 1)
         self._arrived_ns[ids] = t_ns
 
     def count(self) -> int:
-        """How many were created."""
+        """Return the number of ids that were created."""
         return int(np.count_nonzero(self._first_ns != _UNSEEN))
 
     def outcomes(self, since_ns: int, kind: int = 0) -> Outcomes:
-        """Outcomes of those of this kind that were created from ``since_ns`` on."""
+        """Return the outcomes of the ids of this kind that were created at or after ``since_ns``."""
         created = (self._first_ns != _UNSEEN) & (self._first_ns >= since_ns) & (self._kind == kind)
         arrived = created & (self._arrivals > 0)
         took_ns = self._arrived_ns[arrived] - self._first_ns[arrived]
         return Outcomes(int(created.sum()), int(arrived.sum()), delays_of(took_ns))
 
     def faults(self) -> list[str]:
-        """Violated invariants, each with the first id that violates it."""
+        """Return the violated invariants as sentences, each with the first id that violates it."""
         seen, arrived, lost = self._first_ns != _UNSEEN, self._arrivals > 0, self._losses > 0
         rules = (
             ("has an end but no beginning", ~seen & (arrived | lost | (self._held != 0))),
@@ -142,7 +142,7 @@ class Ledger:
 
 
 def grown(array: NDArray, length: int, fill: int = 0) -> NDArray:
-    """``array``, or a copy with room for at least ``length`` rows, doubled so that it is copied seldom."""
+    """Return ``array``, or a copy with at least ``length`` rows; the size doubles, so copies are rare."""
     if length <= len(array):
         return array
     larger = np.full((max(length, 2 * len(array), 16), *array.shape[1:]), fill, array.dtype)
@@ -151,13 +151,13 @@ def grown(array: NDArray, length: int, fill: int = 0) -> NDArray:
 
 
 def add_at(sums: NDArray[np.int64], row: NDArray[np.int64], column: NDArray[np.int64], what: NDArray) -> None:
-    """``numpy.add.at`` for whole numbers whose sums stay below 2^53, several times as fast.
+    """Add numbers in place, as ``numpy.add.at`` but several times as fast, for sums below 2^53.
 
     Args:
-        sums: (M, ...) added to; what follows the first axis counts as one.
-        row: (E,) places on the first axis.
-        column: (E,) places on the others, flattened.
-        what: (E,).
+        sums: (M, ...) array that is added to; the axes after the first are treated as flattened.
+        row: (E,) indices on the first axis.
+        column: (E,) indices on the flattened other axes.
+        what: (E,) whole numbers to add.
     """
     if not len(row):
         return

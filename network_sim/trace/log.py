@@ -1,20 +1,20 @@
-"""The trace: one append-only log of events, and counters that stay when the log is not kept.
+"""The trace of a run: an append-only log of events, and counters that exist even if the log is not kept.
 
-The log keeps these invariants; ``network_sim.trace.conservation`` checks them on every run.
+The log satisfies these invariants; ``network_sim.trace.conservation`` checks them on every run.
 
-1. Ids of packets and of images count up from 0. A fragment that is sent again by its camera is a new packet.
+1. Ids of packets and of images count up from 0. A fragment that its camera sends again is a new packet.
 2. Every packet that is handed to a node's buffer is ENQUEUEd there, on relays too, and also when the buffer
    is full: then a DROP with ``Cause.BUFFER``, of that packet or of the oldest, follows.
-3. It leaves that node once, by DELIVER (``node`` to ``peer``) or by DROP (``node``). A packet that has
-   arrived is never DROPped by its sender, even if the acknowledgement is lost.
-4. At the instant of DELIVER the next node ENQUEUEs the packet, or, if it is the last, RECEIVE is recorded
-   (``node`` is the source, ``peer`` the last node).
-5. An image is CAPTUREd once (``node`` took it, ``peer`` is the road cell that it shows, or -1) and ends at
-   most once, by ARRIVE (``node`` took it, ``peer`` has it now, all its bytes) or EXPIRE (``node`` took it).
-6. AIR and ACK carry the time when they start and their duration, and are recorded within a second of it.
-7. DOWN with ``Cause.NODE_DOWN`` is a failure, with ``Cause.NONE`` sleep; UP ends either.
+3. The packet leaves that node once, by DELIVER (``node`` to ``peer``) or by DROP (``node``). A packet that
+   has arrived is never DROPped by its sender, even if the acknowledgement is lost.
+4. At the instant of DELIVER the next node ENQUEUEs the packet; at its destination RECEIVE is recorded
+   instead (``node`` is the source, ``peer`` the destination).
+5. An image is CAPTUREd once (``node`` took it, ``peer`` is the road cell that it shows, or -1) and closed at
+   most once: by ARRIVE (``node`` took it, ``peer`` has received all its bytes) or EXPIRE (``node`` took it).
+6. AIR and ACK carry their start time and duration, and are recorded within a second of the start.
+7. DOWN means a failure with ``Cause.NODE_DOWN`` and sleep with ``Cause.NONE``; UP is the end of either.
 
-Late records (a CAPTURE that is only computed when it matters) are sorted in at the end.
+The log is sorted by time at the end, because some records (CAPTUREs on the street) are added late.
 """
 
 from __future__ import annotations
@@ -57,12 +57,12 @@ IMAGE_EVENTS = (
     EventKind.JOIN,
     EventKind.LEAVE,
 )
-"""What is kept of the log when ``keep`` is "images"."""
+"""Kinds of events that the log keeps when ``keep`` is "images"."""
 
 
 @dataclass(frozen=True, slots=True)
 class Events:
-    """Columns of the log (E,), by time and, at the same time, in the order of recording."""
+    """Columns (E,) of the log, sorted by time; simultaneous events keep the order of recording."""
 
     t_ns: NDArray[np.int64]
     duration_ns: NDArray[np.int64]
@@ -80,22 +80,22 @@ class Events:
         return len(self.t_ns)
 
     def columns(self) -> Iterator[NDArray[np.generic]]:
-        """The columns in the order of ``COLUMNS``."""
+        """Return the columns in the order of ``COLUMNS``."""
         return (getattr(self, field.name) for field in fields(self))
 
     def rows(self, start: int, stop: int) -> NDArray[Any]:
-        """Some of the events as rows, as a ``Tally`` takes them."""
+        """Return the events from ``start`` to ``stop`` as rows, the input of ``Tally.take``."""
         rows = np.empty(len(self.t_ns[start:stop]), _ROW)
         for name, _ in COLUMNS:
             rows[name] = getattr(self, name)[start:stop]
         return rows
 
     def where(self, mask: NDArray[np.bool_]) -> Events:
-        """The events that ``mask`` (E,) selects."""
+        """Return the events that ``mask`` (E,) selects."""
         return Events(*(column[mask] for column in self.columns()))  # type: ignore[arg-type]
 
     def of(self, *kinds: EventKind) -> Events:
-        """The events of these kinds."""
+        """Return the events of these kinds."""
         return self.where(np.isin(self.kind, np.array(kinds, np.int8)))
 
 
@@ -104,17 +104,17 @@ class NetworkTrace:
     """The result of one run."""
 
     events: Events
-    """The log: everything, only ``IMAGE_EVENTS`` or nothing, as ``config.run.keep`` says."""
+    """The log: all events, only ``IMAGE_EVENTS``, or none, according to ``config.run.keep``."""
     counters: Counters
     names: tuple[str, ...]
     """Names of the nodes, sink and cloud included, in the order of their numbers."""
     roles: tuple[str, ...]
     """"node", "vehicle", "access-point", "sink" or "cloud", one per name."""
     positions_m: NDArray[np.float64] | None
-    """(N, 2), or None where the nodes move."""
+    """(N, 2) x and y of each node; None if the nodes move."""
     config: NetworkConfig
     horizon_ns: int
-    """When the run ended."""
+    """Time at which the run ended."""
 
 
 class Recorder:
@@ -122,8 +122,8 @@ class Recorder:
 
     Args:
         keep: "all" keeps the log, "images" only ``IMAGE_EVENTS``, "counters" none of it.
-        nodes: how many nodes there are, sink, access points and cloud included.
-        warmup_ns: events before it are counted apart (``config.run.warmup_s``).
+        nodes: number of nodes, sink, access points and cloud included.
+        warmup_ns: end of the warm-up (``config.run.warmup_s``); earlier events are counted separately.
     """
 
     def __init__(self, keep: Keep, nodes: int, warmup_ns: int = 0) -> None:
@@ -148,7 +148,7 @@ class Recorder:
         duration_ns: int = 0,
         packet_kind: PacketKind = PacketKind.IMAGE,
     ) -> None:
-        """Records one event. Bytes straight into a row: a third of the time of a tuple in a list."""
+        """Record one event. Packing it into bytes takes a third of the time of a tuple in a list."""
         rows = self._rows
         rows += self._pack(
             t_ns, duration_ns, packet, image, first_byte, size_bytes, node, peer, kind, cause, packet_kind
@@ -167,7 +167,7 @@ class Recorder:
         cause: Cause = Cause.NONE,
         duration_ns: int = 0,
     ) -> None:
-        """Records an event of a packet at ``node``, towards ``peer``; ``size_bytes`` as in ``add``."""
+        """Record an event of a packet at ``node``, towards ``peer``; ``size_bytes`` as in ``add``."""
         number, packet_kind, _, _, _, image, first_byte, _ = packet
         rows = self._rows
         rows += self._pack(
@@ -177,7 +177,7 @@ class Recorder:
             self._flush()
 
     def add_many(self, t_ns: ArrayLike, kind: EventKind, node: ArrayLike, **values: ArrayLike) -> None:
-        """Records many events of one kind at once: numbers or arrays (E,), named as in ``add``."""
+        """Record many events of one kind: numbers or arrays (E,), named as in ``add``."""
         block = np.zeros(np.size(t_ns), _ROW)
         columns = {"peer": -1, "packet": -1, "image": -1, **values, "t_ns": t_ns, "kind": kind, "node": node}
         for name, column in columns.items():
@@ -194,7 +194,7 @@ class Recorder:
         horizon_ns: int,
         roles: tuple[str, ...],
     ) -> NetworkTrace:
-        """The record of the run, which ended at ``horizon_ns``; nothing more can be added.
+        """Return the trace of the run, which ended at ``horizon_ns``; no event may be added after this.
 
         Raises:
             ValueError: the recorder was made for another warm-up.
@@ -219,7 +219,7 @@ class Recorder:
 
 
 def _sorted_columns(blocks: list[NDArray[Any]]) -> Events:
-    """The blocks as sorted columns; ``blocks`` is emptied, one column's worth at a time."""
+    """Join the blocks into columns sorted by time; ``blocks`` is emptied to save memory."""
     rows = np.concatenate(blocks) if blocks else np.zeros(0, _ROW)
     blocks.clear()
     t_ns = rows["t_ns"].copy()

@@ -1,4 +1,4 @@
-"""Time that each radio spends sending, asleep and receiving, from frames and failures."""
+"""Time that each radio spends sending, asleep and receiving, computed from frames and failures."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ Spans = NDArray[np.int64]
 
 
 class State(IntEnum):
-    """State of a node's radio; for the rest of the time it listens."""
+    """State of a node's radio; outside these states it listens."""
 
     SENDING = 0
     ASLEEP = 1
     """Asleep or failed, and not sending."""
     RECEIVING = 2
-    """A frame that is addressed to it is on the air, and it neither sends nor sleeps."""
+    """A frame addressed to the node is on the air, and the node neither sends nor sleeps."""
 
 
 class StateTimes:
-    """Adds up the time in each state per minute, counted from ``start_ns``.
+    """Sums of the time in each state per minute, counted from ``start_ns``.
 
-    Time is settled a second after it passed, so that rows may come in any order within a second.
+    Times are added with a delay of one second, so that rows may come in any order within a second.
     """
 
     def __init__(self, nodes: int, start_ns: int) -> None:
@@ -42,10 +42,10 @@ class StateTimes:
         self._spans = {state: np.zeros((0, 3), np.int64) for state in State}
         self._down_since_ns: dict[int, int] = {}
         self.late = 0
-        """Rows that came too late to be counted in full."""
+        """Number of rows that came too late to be counted in full."""
 
     def take(self, rows: NDArray[Any]) -> None:
-        """Adds rows (E,) of the trace."""
+        """Count rows (E,) of the trace."""
         kind = rows["kind"]
         frames = rows[(kind == EventKind.AIR) | (kind == EventKind.ACK)]
         changes = rows[(kind == EventKind.DOWN) | (kind == EventKind.UP)]
@@ -60,7 +60,7 @@ class StateTimes:
         self._settle(newest_ns - _LATE_NS)
 
     def sums(self, horizon_ns: int, minutes: int) -> NDArray[np.int64]:
-        """(M, N, S) nanoseconds in each state until the end of the run."""
+        """Return (M, N, S) nanoseconds in each state until the end of the run."""
         self._settle(horizon_ns)
         return grown(self._sums, minutes)[:minutes]
 
@@ -74,7 +74,7 @@ class StateTimes:
             self._add(State.ASLEEP, np.array([[node, self._down_since_ns.pop(node), t_ns]]))
 
     def _settle(self, until_ns: int) -> None:
-        """Count the spans up to this time."""
+        """Count the spans up to ``until_ns``, and keep their later parts."""
         if until_ns <= self._settled_ns:
             return
         for node, since_ns in self._down_since_ns.items():
@@ -98,7 +98,7 @@ class StateTimes:
         self._settled_ns = until_ns
 
     def _count(self, state: State, spans: Spans, sign: int) -> None:
-        """Adds the spans' lengths to the minutes in which they lie."""
+        """Add the spans' lengths to the minutes that they cover."""
         node, start_ns, end_ns = (spans - np.array([0, self._start_ns, self._start_ns])).T
         while len(node):
             minute = start_ns // MINUTE_NS
@@ -110,12 +110,12 @@ class StateTimes:
 
 
 def disjoint(spans: Spans) -> Spans:
-    """The same times of each node as spans that do not overlap."""
+    """Merge the spans of each node into spans that do not overlap and cover the same times."""
     spans = spans[np.lexsort((spans[:, 1], spans[:, 0]))]
     if not len(spans):
         return spans
     node, start_ns, end_ns = spans.T
-    lane_ns = node * (int(end_ns.max()) + 1)  # apart, so that one running maximum serves all nodes
+    lane_ns = node * (int(end_ns.max()) + 1)  # shifts the nodes apart: one running maximum serves all
     reached_ns = np.maximum.accumulate(end_ns + lane_ns)
     start_ns = start_ns.copy()
     start_ns[1:] = np.maximum(start_ns[1:], reached_ns[:-1] - lane_ns[1:])

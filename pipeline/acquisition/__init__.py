@@ -1,4 +1,4 @@
-"""Depth image to filtered point cloud (SPEC 2)."""
+"""Conversion of a depth image to a filtered point cloud (SPEC 2)."""
 
 from pipeline.acquisition.acquire import Acquired, acquire
 from pipeline.acquisition.back_project import back_project, depth_sigma_m

@@ -1,4 +1,4 @@
-"""What is kept of a frame's measured depth, and as what."""
+"""Outlier detection and averaging of a frame's measured depth."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from pipeline.types import DepthMap, RgbdFrame
 
 @dataclass(frozen=True, slots=True)
 class Acquired:
-    """The measured depth of a frame and its outliers; colour has no say in either."""
+    """The measured depth of a frame and its outliers; neither depends on colour."""
 
     depth: DepthMap
-    """(H, W) known where it was measured."""
+    """(H, W) depth, known where it was measured."""
     outliers: Outliers
-    """Of the points of ``back_project``."""
+    """Outliers among the points of ``back_project``."""
 
     def cloud(self, frame: RgbdFrame) -> FilterResult:
-        """The frame's sensor cloud, camera frame, with its outliers split off."""
+        """Return the frame's sensor cloud, camera frame, with its outliers split off."""
         return split(back_project(frame, self.depth), self.outliers)
 
 
 def acquire(frame: RgbdFrame, config: AcquisitionConfig) -> Acquired:
-    """Find the outliers of a frame's depth, and average it over its surfaces.
+    """Find the outliers of a frame's depth, and average the depth over its surfaces.
 
     Args:
-        frame: its depth, and the noise of its sensor where a calibration has found it.
-        config: which outliers, and whether to average.
+        frame: frame with its depth, and its sensor's noise if it was calibrated.
+        config: outlier mode, and whether to average.
 
     Raises:
-        InputError: no pixel has a depth, or as ``find_outliers``.
+        InputError: no pixel has a depth, or as for ``find_outliers``.
     """
     known = pixels_in_front(frame, frame.depth)
     planes = local_planes(frame.depth, frame.intrinsics, frame.noise)

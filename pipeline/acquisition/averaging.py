@@ -1,4 +1,4 @@
-"""Measured depth averaged over its own surface: less noise, no steps, no pixel moved beyond its noise."""
+"""Averaging of measured depth over its own surface, by which no pixel moves farther than its noise."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from pipeline.types import DepthMap, FloatArray
 
 
 def averaged(planes: LocalPlanes) -> DepthMap:
-    """Every depth as the mean of what the pixels around it say of it, of its own surface only.
+    """Average every depth over the surrounding pixels of the same surface.
 
-    The sigma filter (Lee 1983) along the local plane, in 1/z: a neighbour counts if it is no farther off
-    the pixel's plane than noise goes, so that edges stay and no pixel moves beyond its noise. Where noise is
-    as thick as points are apart, a ball that should roll along a wall gets caught inside it; averaged over
-    the image the wall is thin again before any point is merged with another.
+    This is the sigma filter (Lee 1983) along the local plane, in 1/z: a neighbour counts if its distance from
+    the pixel's plane is within the noise, so that edges stay and no pixel moves beyond its noise. Where noise
+    is as large as the point spacing, a ball that should roll along a wall would get caught inside it;
+    averaging makes the wall thin again before points are merged.
 
     Returns:
-        (H, W) metric, known where it was.
+        (H, W) metric depth, known where it was known before.
     """
     known = planes.known
     noise = FARTHEST_SD * planes.sd
@@ -33,15 +33,15 @@ def averaged(planes: LocalPlanes) -> DepthMap:
 def _along(
     inverse: FloatArray, slope: FloatArray, farthest: FloatArray, reach_px: int, down: int, right: int
 ) -> FloatArray:
-    """(H, W) 1/z averaged over the pixels within reach along one axis of the image.
+    """Average (H, W) 1/z over the pixels within reach along one image axis.
 
     Args:
         inverse: (H, W) float32 1/z, 0 where unknown.
-        slope: (H, W) its change from a pixel to the next one along the axis.
-        farthest: (H, W) how far off a pixel's plane its neighbours may be.
-        reach_px: how far to go on either side.
-        down: 1 to go down, with ``right`` 0.
-        right: 1 to go to the right, with ``down`` 0.
+        slope: (H, W) change of 1/z from a pixel to the next one along the axis.
+        farthest: (H, W) largest distance of neighbours from a pixel's plane.
+        reach_px: number of pixels on either side.
+        down: 1 for the vertical axis, with ``right`` 0.
+        right: 1 for the horizontal axis, with ``down`` 0.
     """
     rows, columns = inverse.shape
     averaged = np.empty_like(inverse)

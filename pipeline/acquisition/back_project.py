@@ -1,4 +1,4 @@
-"""Depth pixels to points in the camera frame (eq. 3.4)."""
+"""Back-projection of depth pixels to points in the camera frame (eq. 3.4)."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from pipeline.types import BoolArray, DepthMap, FloatArray, PointCloud, PointSou
 def back_project(
     frame: RgbdFrame, depth: DepthMap | None = None, source: PointSource = PointSource.SENSOR
 ) -> PointCloud:
-    """One point per pixel with known depth, in the camera frame, pixels undistorted first.
+    """Convert each pixel with known depth to a point in the camera frame, after removing the distortion.
 
     Args:
-        frame: gives colours, intrinsics and, when ``depth`` is None, the depth.
+        frame: source of colours, intrinsics and, when ``depth`` is None, the depth.
         depth: (H, W) metric depth on the frame's pixel grid.
-        source: label of every point; only sensor points get ``sigma_m``, since the sensor model
-            says nothing about inferred depth.
+        source: label of every point; only sensor points get ``sigma_m``, because the sensor model does not
+            apply to inferred depth.
 
     Raises:
-        InputError: depth that is not metric, not on the grid of image and intrinsics, or all unknown.
+        InputError: the depth is relative, not on the grid of image and intrinsics, or nowhere known.
 
     >>> import numpy as np, packetmesh as pm
     >>> camera = pm.CameraIntrinsics.pinhole(100.0, 100.0, 1.0, 0.0, width_px=2, height_px=1)
@@ -45,10 +45,10 @@ def back_project(
 
 
 def pixels_in_front(frame: RgbdFrame, depth: DepthMap) -> BoolArray:
-    """(H, W) the pixels that ``back_project`` makes a point of.
+    """Return (H, W) True for the pixels from which ``back_project`` makes a point.
 
     Raises:
-        InputError: as ``back_project``.
+        InputError: as for ``back_project``.
     """
     _check_grid(frame, depth)
     known = depth.valid & (depth.z_m > 0)
@@ -60,12 +60,12 @@ def pixels_in_front(frame: RgbdFrame, depth: DepthMap) -> BoolArray:
 
 
 def _sigma_m(frame: RgbdFrame, z_m: FloatArray) -> FloatArray:
-    """(N,) by the noise that the sensor was found to have, of surfaces seen straight on; else a Kinect's."""
+    """Return (N,) deviations by the sensor's calibrated noise at normal incidence; else by a Kinect's."""
     return depth_sigma_m(z_m) if frame.noise is None else frame.noise.sd_m(z_m)
 
 
 def depth_sigma_m(z_m: FloatArray) -> FloatArray:
-    """Standard deviation of a Kinect's depth at depth ``z_m`` (axial model, Nguyen et al. 2012)."""
+    """Return the standard deviation of a Kinect's depth ``z_m`` (axial model, Nguyen et al. 2012)."""
     return 0.0012 + 0.0019 * (np.asarray(z_m) - 0.4) ** 2
 
 

@@ -1,8 +1,8 @@
-"""Flying pixels: depth that a sensor reports between a surface and the one behind it.
+"""Detection of flying pixels: depths that a sensor reports between a surface and the one behind it.
 
-At the edge of a thing a sensor may mix what it sees of front and back into a depth at which there is
-nothing. These are a depth image's real outliers. Slanted walls, far floors and the steps in which
-disparity comes are none, though their points lie just as far from each other.
+At the edge of an object a sensor may mix front and back into a depth where nothing is. These are the real
+outliers of a depth image, unlike slanted walls, far floors and steps of quantised disparity, although
+the points of these are equally far apart.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ from pipeline.kernels.kdtree import compiled
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 LEAST_SIDES = 3
-"""Surfaces around a pixel that must all be far from it to prove that it stands alone: with two, it may be
+"""Least number of surrounding surfaces that must all be far from an isolated pixel: with two, it may be
 the end of a wire."""
 LINES = ((0, 1), (1, 0), (1, 1), (1, -1))
-"""Pixels down and to the right along the four lines through a pixel."""
+"""Pixel steps down and to the right along the four lines through a pixel."""
 
 
 def flying_score(planes: LocalPlanes) -> FloatArray:
-    """How far every pixel is from all surfaces that it could be of, in standard deviations.
+    """Return how far every pixel is from all surfaces to which it could belong, in standard deviations.
 
-    On each of four lines through a pixel the local plane of the next measured pixel on either side is
-    continued to it. A pixel with one plane in front of it and the other behind it flies by the lesser of
-    the two distances, on the line where that is most. One that stands alone, with planes on three sides or
-    more and all of them far, flies by the distance of the nearest.
+    On each of four lines through a pixel, the plane of the next measured pixel on either side is extended
+    to it. For a pixel between a plane in front of it and one behind it, the score is the smaller of both
+    distances, on the line where this is largest. For an isolated pixel, far from planes on three or more
+    sides, it is the distance of the nearest plane.
 
     Returns:
-        (H, W) float32; 0 where nothing says that a pixel flies. Those above ``FARTHEST_SD`` do.
+        (H, W) float32; 0 for pixels that cannot be judged. Pixels above ``FARTHEST_SD`` are flying.
     """
     score = np.zeros(planes.inverse.shape, np.float32)
     rows, columns = map(np.ascontiguousarray, np.nonzero(beside_a_step(planes)))
@@ -40,7 +40,7 @@ def flying_score(planes: LocalPlanes) -> FloatArray:
 
 
 def beside_a_step(planes: LocalPlanes) -> BoolArray:
-    """(H, W) pixels beside one that is farther off than noise goes, or unknown: only they can fly."""
+    """Return (H, W) True next to unknown pixels or depth steps above the noise: only these pixels can fly."""
     inverse, window = planes.inverse, np.ones((3, 3), np.uint8)
     apart = np.maximum(cv2.dilate(inverse, window) - inverse, inverse - cv2.erode(inverse, window))
     return planes.known & (apart > FARTHEST_SD * planes.sd)
@@ -56,13 +56,13 @@ def _distances_sd(
     columns: IntArray,
     reach_px: int,
 ) -> FloatArray:
-    """(lines, 2, N) how far pixels are in front of the planes on either side, in standard deviations.
+    """Return (lines, 2, N) distances of pixels in front of the planes on either side, in standard deviations.
 
     Args:
         inverse, right, down, sd: (H, W) float32, as in ``LocalPlanes``.
-        rows: (N,) of the pixels.
-        columns: (N,) of the pixels.
-        reach_px: steps to go at most; NaN where all of them meet unknown pixels.
+        rows: (N,) rows of the pixels.
+        columns: (N,) columns of the pixels.
+        reach_px: most steps on a side; the distance is NaN if all of them meet unknown pixels.
     """
     found = np.full((len(LINES), 2, len(rows)), np.nan, np.float32)
     for line, (below, beside) in enumerate(LINES):
@@ -84,7 +84,7 @@ def _distances_sd(
 
 
 def judged(sides: FloatArray) -> FloatArray:
-    """(N,) scores from (lines, 2, N) signed distances on both sides; NaN where there is no surface."""
+    """Return (N,) scores from (lines, 2, N) signed distances on both sides, NaN where there is no surface."""
     known = np.isfinite(sides)
     off = np.abs(np.where(known, sides, 0.0))
     apart = np.prod(np.where(known, sides, 0.0), axis=1) < 0

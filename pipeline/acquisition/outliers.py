@@ -1,4 +1,4 @@
-"""The outlier filter of the thesis, and two that keep far surfaces (eqs. 3.5-3.6, SPEC 2)."""
+"""Outlier filters by neighbour distance: the thesis's, and two for far surfaces (eqs. 3.5-3.6, SPEC 2)."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from pipeline.types import BoolArray, FloatArray, PointCloud
 _MAD_TO_SIGMA = 1.4826
 _ROBUST_SIGMAS = 3.0
 _ROUNDING = 1e-9
-"""Relative slack of the threshold, so that a cloud of equal scores is not split by rounding."""
+"""Relative tolerance of the threshold, so that rounding does not split a cloud of equal scores."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outliers:
-    """Which points of a cloud are outliers, with the score that decided."""
+    """Outliers of a cloud, with the scores that decided."""
 
     keep: BoolArray
-    """(N,) False for the outliers."""
+    """(N,) False for outliers."""
     score: FloatArray
-    """(N,) in mode ``flying`` the distance from all surfaces around, standard deviations; else the mean
-    distance to the neighbours: metres in mode ``thesis``, pixels (d f / z) in the other two."""
+    """(N,) in mode ``flying`` distance from all surrounding surfaces, in standard deviations; else the mean
+    distance to the neighbours, in metres (mode ``thesis``) or pixels (d f / z, the other two modes)."""
     threshold: float
     """Largest score that is kept, in the unit of ``score``."""
 
@@ -37,7 +37,7 @@ class FilterResult:
     kept: PointCloud
     outliers: PointCloud
     keep: BoolArray
-    """(N,) True for the kept points of the cloud that was filtered."""
+    """(N,) True for the kept points of the unfiltered cloud."""
     score: FloatArray
     """(N,) as in ``Outliers``."""
     threshold: float
@@ -45,26 +45,26 @@ class FilterResult:
 
 
 def filter_outliers(cloud: PointCloud, config: AcquisitionConfig, focal_px: float) -> FilterResult:
-    """Split off the points that ``find_outliers`` finds."""
+    """Find outliers with ``find_outliers`` and split the cloud."""
     return split(cloud, find_outliers(cloud, config, focal_px))
 
 
 def split(cloud: PointCloud, found: Outliers) -> FilterResult:
-    """The kept points and the outliers of a cloud."""
+    """Split a cloud into kept points and outliers."""
     keep = found.keep
     return FilterResult(cloud.select(keep), cloud.select(~keep), keep, found.score, found.threshold)
 
 
 def find_outliers(cloud: PointCloud, config: AcquisitionConfig, focal_px: float) -> Outliers:
-    """The points whose mean distance to their N nearest neighbours is unusual.
+    """Find the points whose mean distance to their N nearest neighbours is unusual.
 
     Args:
-        cloud: camera frame, because the spacing of a back-projected depth map grows as z / f.
+        cloud: points in the camera frame, because the spacing of a back-projected depth map grows as z / f.
         config: mode, N and t.
         focal_px: focal length of the camera.
 
     Raises:
-        InputError: not more than N points, points behind the camera, or mode ``flying``.
+        InputError: there are at most N points, points behind the camera, or the mode is ``flying``.
     """
     if config.outlier_mode == "flying":
         raise InputError("Outlier mode 'flying' looks at a depth image, not at a cloud; try mode 'robust'.")

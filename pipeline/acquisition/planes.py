@@ -1,6 +1,6 @@
-"""The surfaces of a depth image pixel by pixel, and how uncertain its sensor is of them.
+"""Local planes of a depth image at every pixel, and the noise of its depth.
 
-All of it is in 1/z: planes are linear there, and where a sensor measures disparity, its steps are equal.
+All values are in 1/z: planes are linear in it, and a disparity sensor's steps are equal.
 """
 
 from __future__ import annotations
@@ -15,56 +15,56 @@ from pipeline.kernels.ordering import stable_order
 from pipeline.types import BoolArray, CameraIntrinsics, DepthMap, DepthNoise, FloatArray
 
 FARTHEST_SD = 3.0
-"""Standard deviations off a surface up to which a pixel is of it: the usual three, which noise alone passes
-on one side once in four hundred pixels and on both sides hardly ever."""
+"""Standard deviations from a surface up to which a pixel belongs to it: noise alone exceeds three on one
+side once in four hundred pixels, and hardly ever on both sides."""
 STEEPEST_DEG = 85.0
-"""Surfaces seen at a flatter angle send nothing back: Nguyen et al. 2012 found a Kinect's depth to end
-between 80 and 90 degrees. A depth step that would need one is an edge."""
+"""Largest angle of incidence of a measured surface: Nguyen et al. 2012 found that a Kinect's depth fails
+between 80 and 90 degrees. A depth step that would need a larger angle is an edge."""
 LATERAL_PX = 1.0
-"""How far beside its pixel a sensor may have measured: 0.8 pixels (Nguyen et al. 2012), and half a pixel of
-the grid. On a slanted surface that is an error of the depth, by which noise grows with the angle."""
+"""Lateral error of a measurement: 0.8 pixels (Nguyen et al. 2012) and half a pixel of the grid. On a
+slanted surface it becomes an error of the depth, so that noise grows with the angle."""
 PLANE_PX = 5
-"""Side of the window of a local plane: the smallest with two pixels on either side of its middle."""
+"""Side of a local plane's window: the smallest with two pixels on either side of the centre."""
 REACH = 0.005
-"""How far a surface is followed, as a share of the diagonal: 4 pixels of 640 x 480, as wide as the band
-without depth that sensors leave along an edge."""
+"""Distance up to which a surface is followed, as a share of the diagonal: 4 pixels at 640 x 480, the width
+of the band without depth that sensors leave along an edge."""
 BINS = 12
-"""Of depth, with as many pixels each, in which noise and steps are estimated."""
+"""Number of depth bins, with equally many pixels, in which noise and steps are estimated."""
 
 
 @dataclass(frozen=True, slots=True)
 class LocalPlanes:
-    """The plane around every pixel of a depth image."""
+    """The local plane at every pixel of a depth image."""
 
     inverse: FloatArray
     """(H, W) float32 1/z, 1/m; 0 where unknown."""
     right: FloatArray
-    """(H, W) float32 change of 1/z from a pixel to the next on its right, on the plane around it."""
+    """(H, W) float32 change of 1/z from a pixel to its right neighbour, on the local plane."""
     down: FloatArray
-    """(H, W) the same to the next below."""
+    """(H, W) float32 change of 1/z to the neighbour below."""
     sd: FloatArray
     """(H, W) float32 standard deviation of 1/z, 1/m."""
 
     @property
     def known(self) -> BoolArray:
-        """(H, W) where a depth was measured."""
+        """(H, W) True where a depth was measured."""
         return self.inverse > 0
 
     @property
     def reach_px(self) -> int:
-        """How far a surface is followed."""
+        """Distance in pixels up to which a surface is followed."""
         return max(2, round(REACH * float(np.hypot(*self.inverse.shape))))
 
 
 def local_planes(
     depth: DepthMap, intrinsics: CameraIntrinsics, noise: DepthNoise | None = None
 ) -> LocalPlanes:
-    """The planes of a depth image.
+    """Estimate the local planes of a depth image.
 
     Args:
         depth: (H, W) metric.
-        intrinsics: of its pixels, which say what step from pixel to pixel is too steep for a surface.
-        noise: the sensor's, from its calibration; None estimates it from the image.
+        intrinsics: the camera, from which follows which step between pixels is too steep for a surface.
+        noise: the sensor's calibrated noise; None estimates it from the image.
     """
     known = depth.valid & (depth.z_m > 0)
     inverse = (known / np.where(known, depth.z_m, 1.0)).astype(np.float32)
@@ -82,11 +82,11 @@ def local_planes(
 
 
 Steps = tuple[FloatArray, BoolArray]
-"""(H, W) differences of 1/z from every pixel to the next, and where both are of one surface."""
+"""(H, W) differences of 1/z from every pixel to the next, and True where both are on one surface."""
 
 
 def surface_steps(inverse: FloatArray, steepest: float) -> Iterator[Steps]:
-    """Steps to the right, then down; ``steepest`` is the largest on a surface, as a share of the depth."""
+    """Yield steps to the right, then down; ``steepest`` is the largest on a surface, per unit of depth."""
     for axis in (1, 0):
         following = np.roll(inverse, -1, axis)
         following[(slice(None), -1) if axis else -1] = 0.0
@@ -95,7 +95,7 @@ def surface_steps(inverse: FloatArray, steepest: float) -> Iterator[Steps]:
 
 
 def mean_around(step: FloatArray, smooth: BoolArray, size_px: tuple[int, int]) -> FloatArray:
-    """(H, W) mean of the steps on surfaces, in a window of ``size_px`` around every pixel; 0 without any."""
+    """Return (H, W) means of surface steps in a window of ``size_px`` around every pixel; 0 without any."""
     total, count = (
         cv2.boxFilter(layer, -1, size_px, anchor=(2, 2), normalize=False, borderType=cv2.BORDER_CONSTANT)
         for layer in (np.where(smooth, step, np.float32(0.0)), smooth.astype(np.float32))
@@ -104,17 +104,17 @@ def mean_around(step: FloatArray, smooth: BoolArray, size_px: tuple[int, int]) -
 
 
 def typical_step(inverse: FloatArray, both: tuple[Steps, Steps]) -> FloatArray:
-    """(H, W) median step at that depth between neighbours on a surface that differ at all.
+    """Return (H, W) median nonzero step between neighbours on a surface at each pixel's depth.
 
-    Where depth comes in steps it is one step, where it does not, about one standard deviation of the noise:
-    that of disparity, of millimetres, of stereo, whatever the image shows.
+    For quantised depth it is one step, otherwise about one standard deviation of the noise, for disparity,
+    millimetres and stereo alike.
     """
     differ = [smooth & (step != 0) for step, smooth in both]
     at = np.concatenate([inverse[where] for where in differ])
     size = np.concatenate([np.abs(step[where]) for (step, _), where in zip(both, differ, strict=True)])
     if not len(at):
         return np.zeros_like(inverse)
-    order = stable_order(at.view(np.int32))  # positive numbers are ordered as their bits are
+    order = stable_order(at.view(np.int32))  # positive floats are ordered like their bits
     parts = np.array_split(order, min(BINS, len(at)))
     middle, typical = ([np.median(of[part]) for part in parts] for of in (at, size))
     return np.interp(inverse, middle, typical)

@@ -1,4 +1,4 @@
-"""What a node sends of its images, in what form, and what is left of them at the sink (SPEC 6.5)."""
+"""Encoding of a node's images, and decoding of what reaches the sink (SPEC 6.5)."""
 
 from packetmesh.errors import InputError
 from pipeline.delivery.coding import Coding
@@ -19,14 +19,14 @@ _ALL: tuple[Coding, ...] = (
 )
 
 CODINGS: dict[str, Coding] = {coding.name: coding for coding in _ALL}
-"""By name, as in ``--coding``."""
+"""Codings by name, as in ``--coding``."""
 
 
 def coding_named(name: str) -> Coding:
-    """The coding of that name.
+    """Return the coding with this name.
 
     Raises:
-        InputError: there is none.
+        InputError: there is no such coding.
     """
     if name not in CODINGS:
         raise InputError(f"There is no coding '{name}'; try one of {', '.join(CODINGS)}")

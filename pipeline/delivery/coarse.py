@@ -1,4 +1,4 @@
-"""A coarse likeness of the images, small enough to be protected well: the base layer of SPEC 6.5."""
+"""Coarse colour and depth images, small enough for strong protection: the base layer of SPEC 6.5."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from pipeline.delivery.pictures import read_scan, write_scan
 from pipeline.types import ByteArray
 
 DEPTH_BLOCK = 8
-"""Pixels of a side that share one depth."""
+"""Side in pixels of the blocks that share one depth."""
 COLOR_BLOCK = 4
 COLOR_QUALITY = 75
 SAME_SURFACE = 0.05
-"""Neighbouring depths that differ by more, relatively, are not blended: nothing lies between two surfaces."""
+"""Neighbouring depths with a larger relative difference are not blended: no surface is between them."""
 
 
 def write_depth(depth: DepthArray) -> bytes:
-    """The medians of blocks as an RVL stream, 0 where most of a block has no depth."""
+    """Encode the medians of depth blocks as an RVL stream, 0 where most of a block has no depth."""
     height, width = depth.shape
     padded = np.pad(depth, ((0, -height % DEPTH_BLOCK), (0, -width % DEPTH_BLOCK)))
     shape = (padded.shape[0] // DEPTH_BLOCK, DEPTH_BLOCK, padded.shape[1] // DEPTH_BLOCK, DEPTH_BLOCK)
@@ -36,7 +36,7 @@ def write_depth(depth: DepthArray) -> bytes:
 
 
 def write_color(rgb: ByteArray) -> bytes:
-    """A small JPEG picture, without its header."""
+    """Encode a reduced colour image as JPEG, without its header."""
     height, width = rgb.shape[:2]
     size = (-(-width // COLOR_BLOCK), -(-height // COLOR_BLOCK))
     return write_scan(cv2.resize(rgb, size, interpolation=cv2.INTER_AREA), COLOR_QUALITY)
@@ -44,7 +44,7 @@ def write_color(rgb: ByteArray) -> bytes:
 
 @lru_cache(maxsize=16)
 def read_depth(stream: bytes, shape: tuple[int, int]) -> DepthArray:
-    """(H, W) depth blended between the blocks' centres, not to be written to; 0 where a block has none."""
+    """Decode (H, W) depth, interpolated between the blocks' centres; 0 where a block has none; read-only."""
     grid_shape = (-(-shape[0] // DEPTH_BLOCK), -(-shape[1] // DEPTH_BLOCK))
     grid = rvl.decode(np.frombuffer(stream, np.uint8), grid_shape[0] * grid_shape[1]).reshape(grid_shape)
     depth = _blended(grid.astype(np.float32), shape)
@@ -54,7 +54,7 @@ def read_depth(stream: bytes, shape: tuple[int, int]) -> DepthArray:
 
 @lru_cache(maxsize=16)
 def read_color(scan: bytes, shape: tuple[int, int]) -> ByteArray:
-    """(H, W, 3) RGB, not to be written to."""
+    """Decode (H, W, 3) RGB; read-only."""
     small = read_scan(scan, (-(-shape[0] // COLOR_BLOCK), -(-shape[1] // COLOR_BLOCK)), COLOR_QUALITY)
     rgb = cv2.resize(small, (shape[1], shape[0]), interpolation=cv2.INTER_CUBIC)
     rgb.setflags(write=False)
@@ -62,12 +62,12 @@ def read_color(scan: bytes, shape: tuple[int, int]) -> ByteArray:
 
 
 def _inside(size: int, blocks: int) -> NDArray[np.integer]:
-    """How many pixels of each block lie in the image, along one side."""
+    """Return how many pixels of each block are in the image, along one side."""
     return np.minimum(DEPTH_BLOCK, size - DEPTH_BLOCK * np.arange(blocks))
 
 
 def _blended(grid: NDArray[np.float32], shape: tuple[int, int]) -> DepthArray:
-    """Bilinear among those of the four nearest blocks that continue the surface of the pixel's own."""
+    """Interpolate bilinearly among those of the four nearest blocks that are on the pixel's surface."""
     (top, bottom, down), (left, right, across) = (
         _neighbours(size, blocks) for size, blocks in zip(shape, grid.shape, strict=True)
     )
@@ -85,7 +85,7 @@ def _blended(grid: NDArray[np.float32], shape: tuple[int, int]) -> DepthArray:
 
 
 def _neighbours(size: int, blocks: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
-    """Along one side, for each pixel: the block before it, the one behind it, and how near the latter is."""
+    """Return, for each pixel along one side, the blocks before and after it, and the weight of the latter."""
     position = (np.arange(size) + 0.5) / DEPTH_BLOCK - 0.5
     before = np.floor(position).astype(np.int64)
     share = (position - before).astype(np.float32)

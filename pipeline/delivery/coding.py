@@ -1,4 +1,4 @@
-"""A coding turns a node's images into bytes, and the bytes that arrived into what the sink knows of them."""
+"""Interface of codings: from a node's images to bytes, and from the received bytes to images."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ DepthArray = NDArray[np.uint16]
 
 @dataclass(frozen=True, slots=True)
 class Images:
-    """What a node sends: its colour and depth images as its camera gives them."""
+    """Colour and depth images that a node sends, as its camera delivers them."""
 
     rgb: ByteArray
     """(H, W, 3)."""
     depth: DepthArray
-    """(H, W) in whole units of the camera, usually millimetres; 0 where it measured nothing."""
+    """(H, W) in integer units of the camera, usually millimetres; 0 where nothing was measured."""
 
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """What the bytes that arrived say about a node's images; nothing is guessed."""
+    """Images that follow from the received bytes, without any guess."""
 
     rgb: ByteArray
-    """(H, W, 3), zero where nothing is known."""
+    """(H, W, 3), zero where the colour is unknown."""
     rgb_known: BoolArray
-    """(H, W) where the colour is known, finely or coarsely."""
+    """(H, W) True where the colour is known, finely or coarsely."""
     depth: DepthArray
-    """(H, W) as ``Images.depth``, 0 where nothing is known or was measured."""
+    """(H, W) as ``Images.depth``, 0 where it is unknown or was not measured."""
     coarse: DepthArray
-    """(H, W) depth known from a base layer only, 0 where the image itself arrived: a guess, not measured."""
+    """(H, W) depth from a base layer only, 0 where the image itself arrived: a guess, no measurement."""
 
     @staticmethod
     def nothing(shape: tuple[int, int]) -> Received:
-        """Of images of (H, W) pixels nothing is known; decoders fill its arrays."""
+        """Return an image of (H, W) pixels with nothing known; decoders fill its arrays."""
         return Received(
             rgb=np.zeros((*shape, 3), np.uint8),
             rgb_known=np.zeros(shape, np.bool_),
@@ -48,39 +48,39 @@ class Received:
 
 
 class Coding(Protocol):
-    """One way to write a node's images as bytes."""
+    """A way to write a node's images as bytes."""
 
     @property
     def name(self) -> str:
-        """As in ``--coding``."""
+        """Name, as in ``--coding``."""
         ...
 
     @property
     def title(self) -> str:
-        """A few words for people."""
+        """Title of a few words for users."""
         ...
 
     def encode(self, images: Images, packet_bytes: int) -> bytes:
-        """The bytes of a frame in the order in which they are sent.
+        """Return the bytes of a frame in the order of sending.
 
         Args:
             images: colour and depth of one instant.
-            packet_bytes: how many of them a packet carries; packet ``i`` has those from ``i * packet_bytes``.
+            packet_bytes: bytes per packet; packet ``i`` carries those from ``i * packet_bytes``.
         """
         ...
 
     def decode(
         self, data: ByteArray, arrived: BoolArray, shape: tuple[int, int], packet_bytes: int
     ) -> Received:
-        """What can be read of a frame of which some packets are missing.
+        """Decode what is possible of a frame of which some packets are missing.
 
         Args:
-            data: (S,) all of its bytes, zero where they have not arrived.
-            arrived: (S,) which of them have.
+            data: (S,) all bytes of the frame, zero where they have not arrived.
+            arrived: (S,) True for bytes that have arrived.
             shape: (H, W) of both images.
             packet_bytes: as in ``encode``.
 
         Returns:
-            Exactly the images, where a coding is lossless and everything has arrived.
+            The received images; equal to those sent if the coding is lossless and everything arrived.
         """
         ...

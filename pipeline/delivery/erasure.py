@@ -1,8 +1,8 @@
-"""A code against lost packets: any k of its symbols give the k that were meant.
+"""Erasure code against lost packets: any k of its symbols determine the k source symbols.
 
 A systematic Cauchy Reed-Solomon code over GF(2^16) (Bloemer et al., "An XOR-Based Erasure-Resilient Coding
-Scheme", 1995): symbols 0 to k-1 are the source itself; symbol i >= k is the sum over j of source j / (i + j),
-where sums are exclusive ors. Every square part of such a matrix can be inverted, hence any k symbols do.
+Scheme", 1995): symbols 0 to k-1 are the source; symbol i >= k is the sum over j of source j / (i + j), where
+addition is exclusive or. Every square submatrix is invertible, so any k symbols suffice.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ Words = NDArray[np.uint16]
 
 
 def repair_symbols(source: Words, ids: NDArray[np.integer]) -> Words:
-    """The (n, T) symbols of numbers ``ids`` (n,), each from k to 65535, for (k, T) ``source`` symbols."""
+    """Return (n, T) symbols with numbers ``ids`` (n,), each from k to 65535, of (k, T) ``source`` symbols."""
     return _weighted_sums(_cauchy(ids, np.arange(len(source))), source, *_tables())
 
 
 def recover(source_count: int, ids: NDArray[np.integer], symbols: Words) -> Words | None:
-    """The (k, T) source symbols, or nothing if there are too few.
+    """Return the (k, T) source symbols, or None if there are too few symbols.
 
     Args:
-        source_count: k.
+        source_count: number k of source symbols.
         ids: (n,) numbers of the symbols, all different.
-        symbols: (n, T).
+        symbols: (n, T) received symbols.
     """
     if len(ids) < source_count:
         return None
@@ -53,7 +53,7 @@ def _cauchy(rows: NDArray[np.integer], columns: NDArray[np.integer]) -> Words:
 
 @lru_cache(maxsize=1)
 def _tables() -> tuple[Words, NDArray[np.int32]]:
-    """Powers of x, twice around, and logarithms to the base x; that of 0 is never used."""
+    """Return the powers of x, repeated twice, and logarithms to base x; that of 0 is never used."""
     powers = np.empty(2 * _ORDER, np.uint16)
     logarithms = np.zeros(_ORDER + 1, np.int32)
     _fill(powers, logarithms)
@@ -77,7 +77,7 @@ def _fill(powers: Words, logarithms: NDArray[np.int32]) -> None:
 
 @_compiled
 def _add(target: Words, factor: int, symbol: Words, powers: Words, logarithms: NDArray[np.int32]) -> None:
-    """Adds ``factor`` times a symbol to another."""
+    """Add ``factor`` times a symbol to another."""
     if factor == 0:
         return
     shift = logarithms[factor]
@@ -98,7 +98,7 @@ def _weighted_sums(matrix: Words, symbols: Words, powers: Words, logarithms: NDA
 
 @_compiled
 def _solve(matrix: Words, sums: Words, powers: Words, logarithms: NDArray[np.int32]) -> Words:
-    """Gauss-Jordan elimination, in place; a Cauchy matrix never has a zero where a pivot is needed."""
+    """Solve by Gauss-Jordan elimination, in place; a Cauchy matrix never has a zero pivot."""
     size = matrix.shape[0]
     for pivot in range(size):
         inverse = powers[_ORDER - logarithms[matrix[pivot, pivot]]]

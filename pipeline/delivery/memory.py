@@ -1,4 +1,4 @@
-"""What the moments of a delivery share: a stage runs again only when images that it depends on have grown."""
+"""Cache for the moments of a delivery: a stage runs again only when images that it uses have changed."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from pipeline.types import RgbdFrame
 
 Result = TypeVar("Result")
 COLOR_ONLY, DEPTH_ONLY = ("inferred",), ("outliers",)
-"""Stages that read one of the two images only; so does placing the nodes by their sensor clouds."""
+"""Stages that use only one of the images; so does placing the nodes by their sensor clouds."""
 
 
 class Memory:
-    """The newest result of each stage of one delivery, whose settings never change: a cache of the chain."""
+    """Cache with the newest result of each stage of one delivery, whose settings never change."""
 
     def __init__(self, places_by_sensor: bool) -> None:
-        """``places_by_sensor``: registration reads measured depth only, no inferred depth."""
+        """Create an empty cache; ``places_by_sensor`` means that registration uses measured depth only."""
         self._places_by_sensor = places_by_sensor
         self._color: Hashable = None
         self._depth: Hashable = None
         self._kept: dict[Hashable, tuple[Hashable, object]] = {}
 
     def look_at(self, frames: Sequence[RgbdFrame]) -> bool:
-        """Take the frames of the next moment; returns whether any image has changed."""
+        """Set the frames of the next moment; returns whether any image has changed."""
         before = self._color, self._depth
         self._color = tuple((frame.name, _digest(frame.rgb), _digest(frame.rgb_known)) for frame in frames)
         self._depth = tuple(
@@ -37,7 +37,7 @@ class Memory:
     def remember(
         self, key: tuple[Hashable, ...], compute: Callable[[], Generator[Progress, None, Result]]
     ) -> Generator[Progress, None, Result]:
-        """As ``pipeline.stages.Cache.remember``, by what the stage reads of the frames."""
+        """Do as ``pipeline.stages.Cache.remember``, keyed by the images that the stage uses."""
         stage, images = key[0], self._images(key[0])
         kept = self._kept.get(stage)
         if kept is not None and kept[0] == images:

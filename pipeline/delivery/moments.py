@@ -1,4 +1,4 @@
-"""What the sink can rebuild of a scene at one moment, and what it has cost by then."""
+"""Moments of a delivery: what the sink can reconstruct at a time, and its cost until then."""
 
 from __future__ import annotations
 
@@ -22,51 +22,51 @@ from pipeline.types import BoolArray, ByteArray, FloatArray, RgbdFrame, Rig, Sur
 
 @dataclass(frozen=True, slots=True)
 class NodeArrival:
-    """How much of one node's images the sink knows."""
+    """Shares of one node's images that the sink knows."""
 
     name: str
     total_bytes: int
     delivered_bytes: int
     color_share: float
-    """Of its pixels with colour, 0 to 1."""
+    """Share of its pixels with colour, 0 to 1."""
     depth_share: float
-    """Of its measured pixels, those whose depth has arrived, 0 to 1."""
+    """Share of its measured pixels whose depth has arrived, 0 to 1."""
     coarse_share: float
-    """Of its pixels, those whose depth is known coarsely only, 0 to 1."""
+    """Share of its pixels whose depth is only coarsely known, 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What has arrived at one time, and what it is good for."""
+    """State of a delivery at one time."""
 
     t_s: float
-    """Since the first image was taken."""
+    """Time since the first image was taken."""
     sent_bytes: int
-    """On the air, frames that were sent again included."""
+    """Bytes sent over the air, retransmissions included."""
     delivered_bytes: int
-    """Of the images at the sink, each counted once."""
+    """Bytes of the images at the sink, each counted once."""
     packets_lost: int
-    """Attempts that failed."""
+    """Number of failed attempts."""
     radio_j: float
     """Energy of all nodes' radios until then."""
     energy_j: float
-    """The same with the computers and cameras that carry them."""
+    """Energy of all nodes' radios, computers and cameras until then."""
     nodes: tuple[NodeArrival, ...]
     T_world_camera: dict[str, FloatArray]
-    """(4, 4) registered poses of the nodes that were heard by then and found their place."""
+    """(4, 4) registered poses of the nodes that have been received and placed by then."""
     surface: SurfaceResult | None
-    """Measured by the rays of all cameras, heard or not; None where nothing can be rebuilt."""
+    """Surface measured by the rays of all cameras, received or not; None if nothing can be reconstructed."""
     truth: dict[str, float] | None
-    """The surface compared with the truth, where there are both."""
+    """Comparison of the surface with the truth, if both exist."""
 
 
 Rebuilt = tuple[SurfaceResult | None, dict[str, float] | None, dict[str, FloatArray]]
-"""The surface of a moment, its comparison with the truth, and where the nodes stand."""
+"""Surface of a moment, its comparison with the truth, and the nodes' poses."""
 NOTHING: Rebuilt = None, None, {}
 
 
 class Rebuilder:
-    """Rebuilds moments of one delivery, best by time: what has not changed since the last is kept."""
+    """Reconstructs moments of a delivery, fastest in order of time, because unchanged results are kept."""
 
     def __init__(self, sending: Sending) -> None:
         self.sending = sending
@@ -75,7 +75,7 @@ class Rebuilder:
         self._rebuilt = NOTHING
 
     def moment(self, index: int) -> Generator[Progress, None, Moment]:
-        """What there is at one of ``sending.times_ns``."""
+        """Reconstruct the moment at ``sending.times_ns[index]``."""
         received = received_at(self.sending, int(self.sending.times_ns[index]))
         frames = frames_at_sink(self.sending, received)
         if self._memory.look_at([frame for frame in frames if heard(frame)]):
@@ -127,7 +127,7 @@ def _rebuilt(
     spec = spec_of(sending, frames, present)
     try:
         results = yield from run(spec, memory, REBUILD)
-    except ReconstructionError:  # a handful of points has no surface yet
+    except ReconstructionError:  # a few points may have no surface yet
         return NOTHING
     placement, surface = results["placement"].value, results["after"].value
     everyone = whole_placement(sending.rig, present, placement)
@@ -141,7 +141,7 @@ def _rebuilt(
 
 
 def spec_of(sending: Sending, frames: Sequence[RgbdFrame], present: Sequence[int]) -> Spec:
-    """The chain on the nodes that were heard."""
+    """Return the spec of the chain for the nodes that have been received."""
     asked = sending.spec.spec
     rig = Rig(sending.rig.name, tuple(frames[index] for index in present))
     return Spec(LoadedRig(rig), asked.preset, asked.config)

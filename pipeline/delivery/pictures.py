@@ -1,4 +1,4 @@
-"""PNG and JPEG streams, and JPEG pictures without the header that both sides know already."""
+"""PNG and JPEG streams, and JPEG images without the header, which sender and sink both know."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from packetmesh.errors import InputError
 from pipeline.types import ByteArray
 
 COLOR_QUALITY = 90
-"""Of JPEG, 0 to 100 (SPEC 6.5)."""
-_PNG_LEVEL = 6  # OpenCV's own, 1, is thrice as fast and makes depth a quarter larger
+"""JPEG quality, 0 to 100 (SPEC 6.5)."""
+_PNG_LEVEL = 6  # OpenCV's default, 1, is three times as fast and makes depth a quarter larger
 _END_OF_IMAGE = b"\xff\xd9"
 _START_OF_SCAN = 0xDA
 
 
 def write_png(image: NDArray[np.unsignedinteger]) -> bytes:
-    """The PNG stream of (H, W) depths of 16 bits or of an (H, W, 3) RGB image."""
+    """Encode (H, W) depths of 16 bits or an (H, W, 3) RGB image as PNG."""
     return cv2.imencode(".png", _swapped(image), [cv2.IMWRITE_PNG_COMPRESSION, _PNG_LEVEL])[1].tobytes()
 
 
 def write_jpeg(rgb: ByteArray, quality: int = COLOR_QUALITY) -> bytes:
-    """The JPEG stream of an (H, W, 3) RGB image, colour at half resolution."""
+    """Encode an (H, W, 3) RGB image as JPEG, chroma at half resolution."""
     return cv2.imencode(".jpg", _swapped(rgb), [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
 
 
 def read_picture(stream: bytes) -> NDArray[np.unsignedinteger]:
-    """The image of a whole PNG or JPEG stream.
+    """Decode a complete PNG or JPEG stream.
 
     Raises:
-        InputError: it is none.
+        InputError: the stream is neither.
     """
     image = cv2.imdecode(np.frombuffer(stream, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None:
@@ -41,7 +41,7 @@ def read_picture(stream: bytes) -> NDArray[np.unsignedinteger]:
 
 
 def write_scan(rgb: ByteArray, quality: int = COLOR_QUALITY) -> bytes:
-    """A JPEG stream from behind its header, which is the same for all images of one size, to its end mark.
+    """Encode a JPEG stream and omit its header, equal for all images of one size, and its end marker.
 
     The header has over 600 bytes, more than a small tile's picture.
     """
@@ -50,9 +50,9 @@ def write_scan(rgb: ByteArray, quality: int = COLOR_QUALITY) -> bytes:
 
 @lru_cache(maxsize=4096)
 def read_scan(scan: bytes, shape: tuple[int, int], quality: int = COLOR_QUALITY) -> ByteArray:
-    """The image of (H, W) pixels of ``write_scan``, not to be written to.
+    """Decode an image of (H, W) pixels from ``write_scan``; read-only.
 
-    It is remembered: a sink that looks often meets the same tiles.
+    Results are cached, because a sink that decodes repeatedly meets the same tiles.
     """
     image = read_picture(_header(shape, quality) + scan + _END_OF_IMAGE)
     image.setflags(write=False)
@@ -61,7 +61,7 @@ def read_scan(scan: bytes, shape: tuple[int, int], quality: int = COLOR_QUALITY)
 
 @lru_cache(maxsize=32)
 def _header(shape: tuple[int, int], quality: int) -> bytes:
-    """All of a JPEG stream before the coded picture."""
+    """Return everything in a JPEG stream before the coded image."""
     stream = write_jpeg(np.zeros((*shape, 3), np.uint8), quality)
     position = 2
     while stream[position + 1] != _START_OF_SCAN:
@@ -70,5 +70,5 @@ def _header(shape: tuple[int, int], quality: int) -> bytes:
 
 
 def _swapped(image: NDArray) -> NDArray:
-    """Between RGB and OpenCV's BGR; depths as they are."""
+    """Convert between RGB and OpenCV's BGR; depths are returned unchanged."""
     return image if image.ndim == 2 else np.ascontiguousarray(image[..., ::-1])

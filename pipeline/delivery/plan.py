@@ -1,4 +1,4 @@
-"""Where a rig's nodes stand in a network, and how large what they send is."""
+"""Positions of a rig's nodes in a network, and the bytes that they send."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ SAME_PLACE_M = 1e-6
 
 
 def poses_known(rig: Rig) -> bool:
-    """Whether the nodes stand apart; a rig without pose files has all of them at one place."""
+    """Return whether the nodes' positions differ; a rig without pose files has all nodes at one place."""
     places_m = np.array([frame.T_world_camera[:3, 3] for frame in rig.frames])
     return len(places_m) == 1 or bool(np.ptp(places_m, axis=0).max() > SAME_PLACE_M)
 
 
 def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> NetworkConfig:
-    """The network with the rig's cameras as its nodes, each with one image of its own to send.
+    """Configure a network with the rig's cameras as nodes, each with one image to send.
 
-    Where ``nodes.places_m`` says nothing, nodes stand where their cameras do, seen from above, and the sink
-    behind them, ``nodes.spacing_m`` from their middle. Where the poses are unknown, too, they stand as
-    ``nodes.layout`` has it. Of a rig some of whose nodes are down, ``placed`` says where the others stand.
+    Nodes are at ``nodes.places_m`` if it is given; else below their cameras, seen from above, with the sink
+    ``nodes.spacing_m`` behind their centre; if the poses are unknown, by ``nodes.layout``. If some nodes of
+    a rig are down, ``placed`` gives the positions of the others.
 
     Args:
         rig: one to six nodes; the world's third axis points up.
-        sizes_bytes: of each node's encoded images.
-        network: a preset, or anything else that collects images from nodes that stand still.
+        sizes_bytes: bytes of each node's encoded images.
+        network: a preset, or any other network that collects images from fixed nodes.
 
     Raises:
-        InputError: the network's nodes drive.
+        InputError: the network's nodes are vehicles.
     """
     if network.scenario != "collection":
         raise InputError(
@@ -54,7 +54,7 @@ def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> 
 
 
 def places_of(rig: Rig, spacing_m: float) -> tuple[float, ...]:
-    """x and y in metres of every camera and, last, of the sink."""
+    """Return x and y in metres of every camera and, last, of the sink."""
     cameras_m: FloatArray = np.array([frame.T_world_camera[:2, 3] for frame in rig.frames])
     ahead = np.mean([frame.T_world_camera[:2, 2] for frame in rig.frames], axis=0)
     length = float(np.hypot(*ahead))
@@ -64,10 +64,10 @@ def places_of(rig: Rig, spacing_m: float) -> tuple[float, ...]:
 
 
 def placed(rig: Rig, network: NetworkConfig, senders: Sequence[int]) -> NetworkConfig:
-    """The network with a place for each of a rig's nodes that sends; whoever is down moves nobody else.
+    """Return the network with positions for the nodes that send; nodes that are down do not move the others.
 
     Raises:
-        InputError: ``nodes.places_m`` places another number of nodes than the rig has.
+        InputError: ``nodes.places_m`` has another number of nodes than the rig.
     """
     nodes, count = network.nodes, len(rig.frames)
     if nodes.places_m:

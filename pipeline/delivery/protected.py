@@ -1,9 +1,9 @@
-"""Two kinds of bytes in one stream of packets: a base that must not be lost, a body of which any part may be.
+"""Packets with two kinds of bytes: a protected base, and a body of which any part may be lost.
 
-The base is cut into symbols, with which repair symbols are made; any of them, as many as the base has, give
-it back (``erasure``). Its own symbols come first, so that a transfer that stops early has it; the repair
-symbols are spread over the whole stream, one packet in so many, so that a burst takes only few of them. Each
-such packet starts with the number of its symbol and the length of the base.
+The base is divided into symbols, from which repair symbols are computed; any of them, as many as the base
+has, restore it (``erasure``). Its own symbols come first, so that a transfer that stops early includes it;
+the repair symbols are spread over the stream at equal intervals, so that a burst hits few of them. Each
+of these packets starts with the number of its symbol and the length of the base.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import numpy as np
 from pipeline.types import BoolArray, ByteArray
 
 BASE_LOSS = 0.3
-"""Share of its packets that a base survives (SPEC 6.5)."""
+"""Share of its packets that a base may lose (SPEC 6.5)."""
 _UNIT_BYTES = (64, 8192)
-_LEAST_CERTAIN = 6  # a loss of three in ten takes all of these once in a thousand times
+_LEAST_CERTAIN = 6  # with a loss of three in ten, all of these are lost once in a thousand times
 _NUMBER_BYTES = 2
 _LENGTH_BYTES = 3
 _HEADER_BYTES = _NUMBER_BYTES + _LENGTH_BYTES
@@ -27,24 +27,24 @@ _WORD_BYTES = 2
 
 @dataclass(frozen=True, slots=True)
 class Unprotected:
-    """What arrived of a stream."""
+    """Received part of a stream."""
 
     base: bytes | None
-    """All of the base, if enough of its packets arrived."""
+    """The complete base, if enough of its packets arrived."""
     body: ByteArray
-    """(B,) zero where it has not arrived; empty without the base."""
+    """(B,) bytes of the body, zero where they have not arrived; empty without the base."""
     arrived: BoolArray
-    """(B,)"""
+    """(B,) True for bytes that have arrived."""
 
 
 def protect(base: bytes, body: bytes, packet_bytes: int, repair_every: int) -> bytes:
-    """One stream of whole packets with a base, its repair symbols and the body, with zeros at its end.
+    """Combine a base, its repair symbols and the body to a stream of whole packets, padded with zeros.
 
     Args:
         base: at least one byte, less than 16 MiB.
-        body: bytes.
-        packet_bytes: how many the network carries at once.
-        repair_every: of so many packets one holds a repair symbol; more where ``BASE_LOSS`` needs them.
+        body: bytes of any number.
+        packet_bytes: bytes per packet of the network.
+        repair_every: interval of repair symbols in packets; ``BASE_LOSS`` may need more of them.
     """
     from pipeline.delivery.erasure import repair_symbols
 
@@ -73,11 +73,11 @@ def protect(base: bytes, body: bytes, packet_bytes: int, repair_every: int) -> b
 
 
 def unprotect(data: ByteArray, arrived: BoolArray, packet_bytes: int, repair_every: int) -> Unprotected:
-    """What of ``protect``'s parts can be told from the bytes that arrived.
+    """Recover the base and the received part of the body from a stream of ``protect``.
 
     Args:
         data: (S,) all bytes of a stream, zero where they have not arrived.
-        arrived: (S,)
+        arrived: (S,) True for bytes that have arrived.
         packet_bytes: as in ``protect``.
         repair_every: as in ``protect``.
     """
@@ -105,7 +105,7 @@ def unprotect(data: ByteArray, arrived: BoolArray, packet_bytes: int, repair_eve
 
 
 def _unit_bytes(packet_bytes: int) -> int:
-    """Of a symbol with its header: a packet if possible, else some small packets or a part of one."""
+    """Return the bytes of a symbol with its header: one packet if possible, else several or a part of one."""
     least, most = _UNIT_BYTES
     return min(packet_bytes * max(1, -(-least // packet_bytes)), most)
 
@@ -115,7 +115,7 @@ def _symbol_bytes(unit_bytes: int) -> int:
 
 
 def _certainly_of_base(count: int, repair_every: int) -> BoolArray:
-    """(count,) units that belong to the base however long it is: here a reader finds out its length."""
+    """Return (count,) True for units that belong to a base of any length; a reader learns its length there."""
     every = min(repair_every, -(-count // _LEAST_CERTAIN))
     certain = np.zeros(count, np.bool_)
     certain[every - 1 :: every] = True
@@ -124,7 +124,7 @@ def _certainly_of_base(count: int, repair_every: int) -> BoolArray:
 
 
 def _of_base(source_count: int, count: int, repair_every: int) -> BoolArray:
-    """(count,) units that belong to a base of so many symbols; more at the end if else they were too few."""
+    """Return (count,) True for units of a base with ``source_count`` symbols; more at the end if needed."""
     of_base = _certainly_of_base(count, repair_every)
     of_base[:source_count] = True
     lacking = _enough(source_count) - np.count_nonzero(of_base)
@@ -134,7 +134,7 @@ def _of_base(source_count: int, count: int, repair_every: int) -> BoolArray:
 
 
 def _enough(source_count: int) -> int:
-    """Symbols of which, after the loss, so many arrive nearly always: bursts make few of them vary much."""
+    """Return how many symbols to send so that ``source_count`` nearly always arrive, even with bursts."""
     return math.ceil((source_count + 2 * math.sqrt(source_count) + 1) / (1 - BASE_LOSS))
 
 

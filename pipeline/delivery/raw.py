@@ -1,4 +1,4 @@
-"""Images as they are, pixel after pixel: whatever byte arrives can be used (SPEC 6.1, 6.4)."""
+"""Coding of images pixel after pixel, in which every received byte can be used (SPEC 6.1, 6.4)."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ _DEPTH_BYTES = 2
 _COLOR_BYTES = 3
 
 PixelOrder = NDArray[np.int32]
-"""(H * W,) indices of the pixels, in raster order, in the order in which they are sent."""
+"""(H * W,) raster indices of the pixels in the order of sending."""
 
 
 @dataclass(frozen=True, slots=True)
 class Raw:
-    """Depth as a 16-bit PGM file and colour as a PPM file, the pixels of both in one order."""
+    """Depth as a 16-bit PGM file and colour as a PPM file, with the pixels of both in one order."""
 
     name: str
     title: str
     order: Callable[[tuple[int, int]], PixelOrder]
-    """Of an image of (H, W) pixels."""
+    """Returns the pixel order for an image of (H, W) pixels."""
     color_first: bool = False
 
     def encode(self, images: Images, packet_bytes: int) -> bytes:
-        """As ``Coding.encode``; how many bytes a packet carries makes no difference."""
+        """Encode as ``Coding.encode``; ``packet_bytes`` has no effect."""
         shape = (images.depth.shape[0], images.depth.shape[1])
         order = self.order(shape)
         depth = _depth_header(shape) + images.depth.reshape(-1)[order].astype(">u2").tobytes()
@@ -40,7 +40,7 @@ class Raw:
     def decode(
         self, data: ByteArray, arrived: BoolArray, shape: tuple[int, int], packet_bytes: int
     ) -> Received:
-        """As ``Coding.decode``: a pixel is known when all of its bytes are."""
+        """Decode as ``Coding.decode``: a pixel is known when all of its bytes are."""
         order = self.order(shape)
         depth_file = len(_depth_header(shape)) + _DEPTH_BYTES * order.size
         color_file = len(_color_header(shape)) + _COLOR_BYTES * order.size
@@ -58,15 +58,15 @@ class Raw:
 
 @lru_cache(maxsize=4)
 def raster(shape: tuple[int, int]) -> PixelOrder:
-    """Row after row."""
+    """Return the order row after row."""
     return np.arange(shape[0] * shape[1], dtype=np.int32)
 
 
 @lru_cache(maxsize=4)
 def spread_rows(shape: tuple[int, int]) -> PixelOrder:
-    """Rows by their number with its bits reversed (0, 4, 2, 6, 1, ...).
+    """Return the rows ordered by their number with its bits reversed (0, 4, 2, 6, 1, ...).
 
-    The rows of a burst lie far apart, and what is there when a transfer stops covers the image evenly.
+    The rows of a burst are then far apart, and an interrupted transfer covers the image evenly.
     """
     height, width = shape
     rows = np.arange(height)
@@ -77,7 +77,7 @@ def spread_rows(shape: tuple[int, int]) -> PixelOrder:
 
 @lru_cache(maxsize=4)
 def tile_after_tile(shape: tuple[int, int]) -> PixelOrder:
-    """Tiles of 16 x 16 pixels, row after row, in raster order inside (SPEC 6.4)."""
+    """Return the order of 16 x 16 tiles, row after row, in raster order inside (SPEC 6.4)."""
     rows, columns = (np.arange(size) // 16 for size in shape)
     tiles = rows[:, None] * (columns[-1] + 1) + columns[None, :]
     return np.argsort(tiles.reshape(-1), kind="stable").astype(np.int32)
@@ -86,7 +86,7 @@ def tile_after_tile(shape: tuple[int, int]) -> PixelOrder:
 def _pixels(
     data: ByteArray, arrived: BoolArray, header_bytes: int, order: PixelOrder, pixel_bytes: int
 ) -> tuple[ByteArray, PixelOrder]:
-    """The (N, pixel_bytes) pixels of a file that arrived whole, and where in the raster they belong."""
+    """Return the (N, pixel_bytes) completely received pixels of a file, and their raster indices."""
     body = slice(header_bytes, header_bytes + pixel_bytes * order.size)
     parts = arrived[body].reshape(-1, pixel_bytes)
     whole = np.logical_and.reduce([parts[:, part] for part in range(pixel_bytes)])  # faster than ``all``

@@ -1,10 +1,10 @@
 """RVL, a lossless coding of depth images (A. D. Wilson, "Fast Lossless Depth Image Compression", ISS 2017).
 
-The values are read in one row: a run of zeros, a run of others, a run of zeros, and so on. Written are the
-length of each run and, for the others, the difference to the last one that was not zero (to 0 at the start),
-with its sign in the lowest bit (0, -1, 1, -2, 2, ... become 0, 1, 2, 3, 4, ...). Every such number is cut
-into groups of three bits, lowest first; a group and a bit that says whether more follow are a nibble. The
-paper fills 32-bit words from the top; here bytes are, which is the same with less padding.
+Values are read in raster order as alternating runs of zeros and of other values. Each run's length is
+written and, for other values, the difference to the last nonzero value (initially 0), with its sign in the
+lowest bit (0, -1, 1, -2, 2, ... become 0, 1, 2, 3, 4, ...). Every number is split into groups of three
+bits, lowest first; a group and a bit that says whether more follow form a nibble. The paper fills 32-bit
+words from the top; filling bytes, as here, is the same with less padding.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from packetmesh.errors import InputError
 from pipeline.types import ByteArray
 
 _BROKEN = -1
-_MOST_BITS = 18  # six nibbles: a difference has 17 bits, and its numbers stay far below 2^31
+_MOST_BITS = 18  # six nibbles: a difference has 17 bits
 _RUN_BITS = 30
 
 
 def encode(values: NDArray[np.uint16]) -> bytes:
-    """The RVL stream of depths, in the order of memory.
+    """Encode depths as an RVL stream, in the order of memory.
 
     Args:
-        values: (...) depths in whole units, 0 for none.
+        values: (...) depths in integer units, 0 where unknown.
     """
     row = np.ascontiguousarray(values, np.uint16).ravel()
     stream = np.zeros(4 * row.size + 16, np.uint8)
@@ -35,10 +35,10 @@ def encode(values: NDArray[np.uint16]) -> bytes:
 
 
 def decode(stream: ByteArray, count: int) -> NDArray[np.uint16]:
-    """The (count,) values of a whole stream.
+    """Decode the (count,) values of a complete stream.
 
     Raises:
-        InputError: the stream is not one of exactly that many values.
+        InputError: the stream does not have exactly that many values.
     """
     values, used_bytes = _read(stream, count)
     if len(values) < count or used_bytes != len(stream):
@@ -47,10 +47,10 @@ def decode(stream: ByteArray, count: int) -> NDArray[np.uint16]:
 
 
 def decode_start(stream: ByteArray, count: int) -> NDArray[np.uint16]:
-    """The (n,) values that the first bytes of a stream of ``count`` values tell, n from 0 to ``count``.
+    """Decode the (n,) values in the first bytes of a stream of ``count`` values, 0 <= n <= ``count``.
 
     Raises:
-        InputError: no stream of that many values starts so.
+        InputError: no stream of that many values starts like this.
     """
     return _read(stream, count)[0]
 
@@ -76,7 +76,7 @@ def _compiled(function: Any) -> Any:
 
 @_compiled
 def _encode(row: NDArray[np.uint16], stream: ByteArray) -> int:
-    """Fills ``stream``, which is zero, and returns the number of bytes."""
+    """Encode into ``stream``, which must be zero; returns the number of bytes."""
     nibbles = 0
     previous = 0
     index = 0
@@ -98,7 +98,7 @@ def _encode(row: NDArray[np.uint16], stream: ByteArray) -> int:
 
 @_compiled
 def _put(stream: ByteArray, nibbles: int, number: int) -> int:
-    """Writes one number behind so many nibbles; returns how many there are then."""
+    """Write a number after ``nibbles`` nibbles; returns the new number of nibbles."""
     while True:
         nibble = number & 7
         number >>= 3
@@ -112,7 +112,7 @@ def _put(stream: ByteArray, nibbles: int, number: int) -> int:
 
 @_compiled
 def _decode(stream: ByteArray, values: NDArray[np.uint16]) -> tuple[int, int]:
-    """Fills ``values``, which are zero; returns how many are known (or ``_BROKEN``) and the nibbles read."""
+    """Decode into ``values``, which must be zero; returns the count (or ``_BROKEN``) and the nibbles read."""
     previous = 0
     index = 0
     nibbles = 0
@@ -142,9 +142,9 @@ def _decode(stream: ByteArray, values: NDArray[np.uint16]) -> tuple[int, int]:
 
 @_compiled
 def _get(stream: ByteArray, nibbles: int, most_bits: int) -> tuple[int, int]:
-    """Reads one number behind so many nibbles: -1 if the stream ends in it, -2 if it has too many bits.
+    """Read the number after ``nibbles`` nibbles: -1 if the stream ends in it, -2 if it has too many bits.
 
-    Of a number in which the stream ends one nibble more is counted than there is.
+    If the stream ends within a number, the returned position is one nibble beyond the end.
     """
     number = 0
     shift = 0

@@ -1,4 +1,4 @@
-"""A rig's images on their way: what every node sends, and what of it is at the sink at any time."""
+"""Transmission of a rig's images: the bytes of every node, and when they reach the sink."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ MOMENTS = 40
 
 @dataclass(frozen=True, slots=True)
 class DeliverySpec:
-    """Everything that decides what is delivered, and what is made of it."""
+    """Everything that determines a delivery and its reconstructions."""
 
     spec: Spec
     """The rig, and the settings of its reconstruction."""
     network: NetworkConfig = field(default_factory=lambda: PRESETS["office"])
     coding: str = "raw"
-    """A name of ``pipeline.delivery.CODINGS``."""
+    """Name in ``pipeline.delivery.CODINGS``."""
     moments: int = MOMENTS
     down: tuple[str, ...] = ()
-    """Names of nodes that have failed and send nothing."""
+    """Names of failed nodes, which send nothing."""
 
     def __post_init__(self) -> None:
         if self.moments < 1:
@@ -44,7 +44,7 @@ class DeliverySpec:
 
 @dataclass(frozen=True, slots=True)
 class Sending:
-    """The images on their way: what every node sends, and when which bytes of it arrive."""
+    """The sent images: bytes of every node, and their times of arrival."""
 
     spec: DeliverySpec
     rig: Rig
@@ -54,13 +54,13 @@ class Sending:
     trace: NetworkTrace
     arrivals: Arrivals
     times_ns: NDArray[np.int64]
-    """(M,) of the moments."""
+    """(M,) times of the moments."""
     spent: Spent
-    """(M,) until each of them."""
+    """(M,) bytes, losses and energy until each moment."""
 
     @property
     def packet_bytes(self) -> int:
-        """How many bytes of a stream a packet carries."""
+        """Bytes of a stream per packet."""
         return packet_bytes_of(self.trace.config)
 
 
@@ -68,7 +68,7 @@ def send(spec: DeliverySpec) -> Sending:
     """Encode every node's images and run the network that carries them.
 
     Raises:
-        InputError: as ``iterate_delivery``.
+        InputError: as for ``iterate_delivery``.
     """
     coding, rig = coding_named(spec.coding), spec.spec.source.load()
     packet_bytes = packet_bytes_of(spec.network)
@@ -85,10 +85,10 @@ def send(spec: DeliverySpec) -> Sending:
 
 
 def senders_of(rig: Rig, down: Sequence[str]) -> list[int]:
-    """Which of a rig's nodes send, by their order in the network.
+    """Return the indices of the rig's nodes that send, in their order in the network.
 
     Raises:
-        InputError: a node that is down is not one of the rig's, or none is left.
+        InputError: a node that is down is not in the rig, or none is left.
     """
     names = [frame.name for frame in rig.frames]
     for name in down:
@@ -101,17 +101,17 @@ def senders_of(rig: Rig, down: Sequence[str]) -> list[int]:
 
 
 def packet_bytes_of(network: NetworkConfig) -> int:
-    """How many bytes of a node's images a packet carries."""
+    """Return the bytes of a node's images per packet."""
     return network.nodes.payload_bytes - network.nodes.header_bytes
 
 
 def moment_times_ns(came: Arrivals, trace: NetworkTrace, count: int) -> NDArray[np.int64]:
-    """(M,) times after which equal shares of the bytes that ever arrive have arrived.
+    """Return (M,) times at which equal shares of all bytes that ever arrive have arrived.
 
     Args:
-        came: what arrives when.
-        trace: of the run; its end is the only moment if nothing arrives.
-        count: how many moments; fewer where several would be the same.
+        came: arrivals at the sink.
+        trace: trace of the run; if nothing arrives, its end is the only moment.
+        count: number of moments; fewer if several coincide.
     """
     if not len(came.t_ns):
         return np.array([trace.horizon_ns])
@@ -121,7 +121,7 @@ def moment_times_ns(came: Arrivals, trace: NetworkTrace, count: int) -> NDArray[
 
 
 def arrived_bytes(sending: Sending, t_ns: int) -> list[BoolArray]:
-    """(S,) for each node, which bytes of its stream are at the sink at a time."""
+    """Return, for each node, (S,) True for the bytes of its stream that have reached the sink at a time."""
     came, marks = sending.arrivals, []
     there = came.t_ns <= t_ns
     for node, stream in enumerate(sending.streams):
@@ -134,7 +134,7 @@ def arrived_bytes(sending: Sending, t_ns: int) -> list[BoolArray]:
 
 
 def received_at(sending: Sending, t_ns: int) -> list[Received]:
-    """What the sink can decode of each node's images at a time."""
+    """Decode each node's images from the bytes that have reached the sink at a time."""
     return [
         sending.coding.decode(np.where(there, stream, 0), there, frame.rgb.shape[:2], sending.packet_bytes)
         for frame, stream, there in zip(
@@ -144,5 +144,5 @@ def received_at(sending: Sending, t_ns: int) -> list[Received]:
 
 
 def frames_at_sink(sending: Sending, received: Sequence[Received]) -> list[RgbdFrame]:
-    """Every node's frame as far as it has arrived."""
+    """Return every node's frame from its received images."""
     return [frame_at_sink(*both) for both in zip(sending.rig.frames, received, strict=True)]

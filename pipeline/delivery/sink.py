@@ -1,4 +1,4 @@
-"""A node's frame as the sink knows it, from the bytes that have arrived (SPEC 6.4, 6.5)."""
+"""Frames of nodes as the sink knows them, from the received bytes (SPEC 6.4, 6.5)."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from pipeline.kernels.masks import nearest_colors
 from pipeline.types import DepthMap, RgbdFrame
 
 UNITS_PER_M = (1000.0, 5000.0, 10_000.0, 256.0, 100.0)
-"""What a depth camera counts in: the first that holds an image's depths exactly is what is sent."""
+"""Units per metre of depth cameras: the first that represents an image's depths exactly is sent."""
 MOST_UNITS = np.iinfo(np.uint16).max
 LEAST_DEPTH_SHARE = 0.02
-"""Share of pixels with depth from which on a node counts as heard."""
+"""Least share of pixels with depth for a node to be used."""
 
 
 def units_per_m(depth: DepthMap) -> float:
-    """In what units a depth image is whole numbers; millimetres if in none."""
+    """Return the units per metre in which a depth image has integer values; millimetres if there are none."""
     z_m = depth.z_m[depth.valid].astype(np.float64)
     for units in UNITS_PER_M:
         counts = np.rint(z_m * units)
@@ -31,10 +31,10 @@ def units_per_m(depth: DepthMap) -> float:
 
 
 def images_of(frame: RgbdFrame) -> Images:
-    """What a node sends of a frame: colour as it is, depth in whole units.
+    """Return the images that a node sends of a frame: colour unchanged, depth in integer units.
 
     Raises:
-        InputError: a depth that 16 bits cannot hold.
+        InputError: a depth exceeds 16 bits.
     """
     units = units_per_m(frame.depth)
     counts = np.rint(np.where(frame.depth.valid, frame.depth.z_m, 0.0).astype(np.float64) * units)
@@ -47,11 +47,11 @@ def images_of(frame: RgbdFrame) -> Images:
 
 
 def frame_at_sink(frame: RgbdFrame, received: Received) -> RgbdFrame:
-    """The frame as far as it has arrived: unknown depth is invalid, unknown colour filled in for the network.
+    """Return the received frame: unknown depth is invalid, unknown colour is filled in for the depth network.
 
     Args:
-        frame: the node's own, of which the name, the intrinsics and the believed pose are known at the sink.
-        received: what its bytes say.
+        frame: the node's frame, of which the sink knows name, intrinsics and given pose.
+        received: the decoded images.
     """
     known, units = received.rgb_known, units_per_m(frame.depth)
     return replace(
@@ -64,12 +64,12 @@ def frame_at_sink(frame: RgbdFrame, received: Received) -> RgbdFrame:
 
 
 def heard(frame: RgbdFrame) -> bool:
-    """Whether enough of a frame's depth has arrived to place its points."""
+    """Return whether enough of a frame's depth has arrived to place its points."""
     return frame.depth.coverage >= LEAST_DEPTH_SHARE
 
 
 def _depth_map(counts: DepthArray, units: float) -> DepthMap:
-    """As ``pipeline.io.images.read_depth`` has it, to the bit."""
+    """Convert counts to depth with the same bits as ``pipeline.io.images.read_depth``."""
     z_m = (counts / units).astype(np.float32)
     z_m[counts == 0] = np.nan
     return DepthMap(z_m)

@@ -1,4 +1,4 @@
-"""Images cut into tiles, each of which can be read alone, with or without a coarse base layer (SPEC 6.5)."""
+"""Coding in tiles that can be decoded independently, with or without a coarse base layer (SPEC 6.5)."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from pipeline.delivery.protected import protect, unprotect
 from pipeline.types import BoolArray, ByteArray
 
 TILE = 32
-"""Pixels of a tile's side."""
+"""Side of a tile in pixels."""
 _LENGTH_BYTES = 4
 
 
 @dataclass(frozen=True, slots=True)
 class Tiled:
-    """RVL depth tiles, then JPEG colour tiles; the lengths of all, and the base layer, are protected.
+    """RVL depth tiles, then JPEG colour tiles; their lengths and the base layer are protected.
 
-    A depth tile is written as it is: its difference to the base layer's depth takes more bytes, as a camera's
-    depths come in steps. Its rows run to and fro: neighbours in the stream are neighbours in the image.
-    All depth comes before all colour, and tiles far apart in the image follow each other.
+    Depth tiles are not coded as differences to the base layer, which would take more bytes, as its depths
+    are quantised. Rows alternate in direction, so that neighbours in the stream are neighbours in the image.
+    All depth comes before all colour, and consecutive tiles are far apart in the image.
     """
 
     name: str
     title: str
     base: bool
-    """Whether there is a base layer, to which lost tiles fall back."""
+    """Whether there is a base layer, which replaces lost tiles."""
     repair_every: int
-    """Of so many packets one repairs what is protected."""
+    """Interval in packets of those that repair the protected part."""
 
     def encode(self, images: Images, packet_bytes: int) -> bytes:
-        """As ``Coding.encode``; a multiple of ``packet_bytes`` unless packets are very small or large."""
+        """Encode as ``Coding.encode``; whole packets unless ``packet_bytes`` is very small or large."""
         from pipeline.delivery import coarse, rvl
         from pipeline.delivery.pictures import write_scan
 
@@ -50,7 +50,7 @@ class Tiled:
     def decode(
         self, data: ByteArray, arrived: BoolArray, shape: tuple[int, int], packet_bytes: int
     ) -> Received:
-        """As ``Coding.decode``; of a depth tile also the rows before its first gap."""
+        """Decode as ``Coding.decode``; of a depth tile also the values before its first gap."""
         from pipeline.delivery import coarse, rvl
         from pipeline.delivery.pictures import read_scan
 
@@ -80,14 +80,14 @@ class Tiled:
 
 
 def _areas(shape: tuple[int, ...]) -> Iterator[tuple[slice, slice]]:
-    """Where the tiles lie, row after row; those at the right and lower edge may be smaller."""
+    """Yield the areas of the tiles, row after row; those at the right and lower edge may be smaller."""
     for top in range(0, shape[0], TILE):
         for left in range(0, shape[1], TILE):
             yield slice(top, min(top + TILE, shape[0])), slice(left, min(left + TILE, shape[1]))
 
 
 def _order(count: int) -> NDArray[np.int64]:
-    """(2 * count,) tiles as they are sent, depth before colour, in steps of the golden section of all."""
+    """Return (2 * count,) tiles in order of sending, depth before colour, in steps of the golden section."""
     step = round(0.382 * count) or 1
     while np.gcd(step, count) != 1:
         step += 1
@@ -98,7 +98,7 @@ def _order(count: int) -> NDArray[np.int64]:
 def _streams(
     body: ByteArray, arrived: BoolArray, lengths: NDArray[np.uint16], order: NDArray[np.int64]
 ) -> Iterator[tuple[int, ByteArray]]:
-    """Each tile of which there is something, with its bytes before its first gap."""
+    """Yield each tile that has arrived at least in part, with its bytes before the first gap."""
     ends = np.cumsum(lengths[order], dtype=np.int64)
     starts = ends - lengths[order]
     gaps = np.append(np.flatnonzero(~arrived), arrived.size)
@@ -109,14 +109,14 @@ def _streams(
 
 
 def _to_and_fro(tile: NDArray[np.uint16]) -> NDArray[np.uint16]:
-    """A tile with every second row turned around."""
+    """Return a tile with every second row reversed."""
     turned = tile.copy()
     turned[1::2] = turned[1::2, ::-1]
     return turned
 
 
 def _fill_start(tile: NDArray[np.uint16], values: NDArray[np.uint16]) -> None:
-    """Writes the first values of ``_to_and_fro`` where they belong."""
+    """Write the first values of ``_to_and_fro`` at their positions in the tile."""
     turned = _to_and_fro(tile)
     turned.reshape(-1)[: values.size] = values
     tile[:] = _to_and_fro(turned)

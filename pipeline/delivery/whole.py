@@ -1,4 +1,4 @@
-"""Depth and colour as two common files: one missing byte, and nothing of the file is shown (SPEC 6.5)."""
+"""Coding of depth and colour as two common files, each lost if a byte is missing (SPEC 6.5)."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ _LENGTH_BYTES = 4
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """How one image becomes a stream and comes back."""
+    """Encoder and decoder of one image."""
 
     write: Callable[[Any], bytes]
     read: Callable[[bytes, tuple[int, int]], Any]
-    """From the stream and the image's (H, W)."""
+    """Decodes the stream, given the image's (H, W)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Whole:
     """A depth stream, then a colour stream.
 
-    Each carries its own length, depth in front of it and colour behind it, so that either one can be found
-    and read without the other.
+    The length of the depth stream is in front of it and that of the colour stream after it, so that either
+    can be found and decoded without the other.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Whole:
     color: Format
 
     def encode(self, images: Images, packet_bytes: int) -> bytes:
-        """As ``Coding.encode``; how many bytes a packet carries makes no difference."""
+        """Encode as ``Coding.encode``; ``packet_bytes`` has no effect."""
         depth, color = self.depth.write(images.depth), self.color.write(images.rgb)
         lengths = [len(stream).to_bytes(_LENGTH_BYTES, "big") for stream in (depth, color)]
         return lengths[0] + depth + color + lengths[1]
@@ -45,7 +45,7 @@ class Whole:
     def decode(
         self, data: ByteArray, arrived: BoolArray, shape: tuple[int, int], packet_bytes: int
     ) -> Received:
-        """As ``Coding.decode``; nothing of a stream with a gap."""
+        """Decode as ``Coding.decode``; a stream with a gap is not decoded."""
         received = Received.nothing(shape)
         head, tail = slice(0, _LENGTH_BYTES), slice(data.size - _LENGTH_BYTES, data.size)
         if arrived[head].all():

@@ -1,4 +1,4 @@
-"""Inferred depth: the network, its metric alignment with the sensor, and its errors (SPEC 3)."""
+"""Inferred depth: network, metric alignment with the sensor, completion, confidence and errors (SPEC 3)."""
 
 from pipeline.depth.alignment import AlignmentResult, align_depth
 from pipeline.depth.completion import CompletedDepth, complete

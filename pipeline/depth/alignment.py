@@ -1,4 +1,4 @@
-"""Making inferred depth metric against the sensor's, pixel by pixel (SPEC 3.5)."""
+"""Alignment of inferred depth with the sensor's, to make it metric (SPEC 3.5)."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ LOCAL_WIDTH_PX = 320
 LOCAL_SIGMAS_PX = (4.0, 12.0, 40.0)
 LOCAL_CLIP = 0.5
 LOCAL_PRIOR = 1e-4
-"""Weight of "no correction" beside the Gaussians', so that it fades out far from any sensor depth."""
+"""Weight of "no correction" relative to the Gaussians', so that the correction fades far from sensor depth."""
 
 
 @dataclass(frozen=True, slots=True)
 class AlignmentResult:
-    """Inferred depth in metres, and how well it agrees with the sensor where both exist."""
+    """Inferred depth in metres, and its agreement with the sensor where both exist."""
 
     depth: DepthMap
-    """On the pixel grid of both maps; NaN where the mapping gives no positive depth."""
+    """Aligned depth on the pixel grid of both maps; NaN where the mapping gives no positive depth."""
     mode: AlignmentMode
     coefficients: dict[str, float]
     """``scale`` of the median mode; ``a`` and ``b`` of z' = a z + b (m) or 1/z' = a/z + b (1/m)."""
@@ -36,7 +36,7 @@ class AlignmentResult:
     inliers: float
     """Share of the shared pixels whose aligned depth is within 5 % of the sensor's, 0 to 1."""
     disparity: bool = False
-    """Whether the network knows disparity up to scale and shift."""
+    """Whether the network's output is disparity up to scale and shift."""
 
 
 def align_depth(
@@ -45,12 +45,12 @@ def align_depth(
     """Map inferred depth to the sensor's metres.
 
     Args:
-        inferred: (H, W) dense depth, right up to a scale or so.
+        inferred: (H, W) dense depth, correct up to approximately a scale.
         sensor: (H, W) metric depth with holes.
-        mode: ``none`` takes the network's metres as they are; ``median`` scales; ``affine_depth`` and
-            ``affine_inverse`` fit a line robustly; ``local`` adds a smooth correction to the first line.
-        disparity: whether the network knows disparity up to scale and shift, so that ``local`` corrects
-            that line instead of depth's.
+        mode: ``none`` keeps the network's metres; ``median`` scales; ``affine_depth`` and ``affine_inverse``
+            fit a line robustly; ``local`` adds a smooth correction to the line of ``affine_depth``.
+        disparity: whether the network's output is disparity up to scale and shift; then ``local`` corrects
+            the line of ``affine_inverse`` instead.
 
     Raises:
         InputError: the two maps differ in size.
@@ -87,18 +87,18 @@ Aligned = tuple[FloatArray, dict[str, float]]
 
 
 def unchanged(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.random.Generator) -> Aligned:
-    """The network's own metres."""
+    """Return the network's own metres."""
     return z, {}
 
 
 def median(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.random.Generator) -> Aligned:
-    """z' = z median(p) / median(z)."""
+    """Scale by medians: z' = z median(p) / median(z)."""
     scale = float(np.median(p[overlap]) / np.median(z[overlap]))
     return scale * z, {"scale": scale}
 
 
 def affine_depth(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.random.Generator) -> Aligned:
-    """z' = a z + b; the median scale when the pixels determine no positive slope."""
+    """Fit z' = a z + b; uses the median scale if the pixels determine no positive slope."""
     a, b = fit_line(z[overlap], p[overlap], rng)
     if not a > 0.0:
         a, b = median(z, p, overlap, rng)[1]["scale"], 0.0
@@ -106,9 +106,9 @@ def affine_depth(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.rando
 
 
 def affine_inverse(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.random.Generator) -> Aligned:
-    """1/z' = a/z + b, right for networks that know disparity up to scale and shift.
+    """Fit 1/z' = a/z + b, the right model for networks that give disparity up to scale and shift.
 
-    Depths beyond three times the sensor's farthest have a disparity near zero and become unknown.
+    Depths beyond three times the sensor's farthest become unknown, because their disparity is near zero.
     """
     a, b = fit_line(1.0 / z[overlap], 1.0 / p[overlap], rng)
     if not a > 0.0:
@@ -119,19 +119,19 @@ def affine_inverse(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.ran
 
 
 def local(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.random.Generator) -> Aligned:
-    """The affine fit times exp(C), C the smoothed logarithmic residual: removes low-frequency bias."""
+    """Multiply the affine fit by exp(C), C the smoothed logarithmic residual: removes low-frequency bias."""
     line, coefficients = affine_depth(z, p, overlap, rng)
     return corrected(line, p, overlap), coefficients
 
 
 def local_inverse(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.random.Generator) -> Aligned:
-    """The same from the line between disparities."""
+    """Do the same as ``local`` with the affine fit of disparities."""
     line, coefficients = affine_inverse(z, p, overlap, rng)
     return corrected(line, p, overlap), coefficients
 
 
 def corrected(line: FloatArray, p: FloatArray, overlap: BoolArray) -> FloatArray:
-    """An aligned depth times exp(C)."""
+    """Multiply an aligned depth by exp(C)."""
     usable = overlap & positive(line)
     residual = np.zeros(line.shape, np.float32)
     residual[usable] = np.clip(np.log(p[usable] / line[usable]), -LOCAL_CLIP, LOCAL_CLIP)
@@ -139,11 +139,11 @@ def corrected(line: FloatArray, p: FloatArray, overlap: BoolArray) -> FloatArray
 
 
 def masked_blur(residual: FloatArray, known: BoolArray) -> FloatArray:
-    """sum_s G_s*(m r) / sum_s G_s*m with Gaussians of 4, 12 and 40 px at 320 px width.
+    """Compute sum_s G_s*(m r) / sum_s G_s*m with Gaussians of 4, 12 and 40 px at 320 px width.
 
     Args:
         residual: (H, W) float32, zero where unknown.
-        known: (H, W) the mask m.
+        known: (H, W) mask m of known pixels.
     """
     rows, columns = residual.shape
     small = LOCAL_WIDTH_PX, max(1, round(rows * LOCAL_WIDTH_PX / columns))
@@ -157,7 +157,7 @@ def masked_blur(residual: FloatArray, known: BoolArray) -> FloatArray:
 
 
 def positive(depth_m: FloatArray) -> BoolArray:
-    """True where a depth is finite and in front of the camera."""
+    """Return True where a depth is finite and in front of the camera."""
     return (depth_m > 0.0) & (depth_m < np.inf)
 
 

@@ -1,4 +1,4 @@
-"""A sensor's depth completed: colours and depth with holes in, dense depth and its spread out (SPEC 3.6)."""
+"""Completion of a sensor's depth by a network, from colours and depth with holes to dense depth (SPEC 3.6)."""
 
 from __future__ import annotations
 
@@ -16,32 +16,32 @@ from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 
 SHIPPED_COMPLETION = Path(__file__).resolve().parents[2] / "assets" / "depth" / "completion.onnx"
 LARGEST_MISMATCH = 0.1
-"""Logarithmic depth; a measured pixel that differs more from the grid's depth there is on another surface."""
+"""A measured pixel that differs more from the grid, in logarithmic depth, is on another surface."""
 
 
 @dataclass(frozen=True, slots=True)
 class CompletedDepth:
-    """What the completion network makes of one frame."""
+    """Output of the completion network for one frame."""
 
     depth: DepthMap
-    """(H, W) metres; the sensor's own where it measured."""
+    """(H, W) metres; measured depth is unchanged."""
     log_scale: FloatArray
-    """(H, W) float32, the network's own logarithm of how far it may be off, in logarithmic depth."""
+    """(H, W) float32, the network's estimate of its error: log of the scale of logarithmic depth."""
 
 
 def complete(sensor: DepthMap, rgb: ByteArray, model: Path = SHIPPED_COMPLETION) -> CompletedDepth:
-    """Continue measured depth into its holes.
+    """Extend measured depth into its holes.
 
-    The network says how depth differs between neighbours near and far, and how sure it is of each difference;
-    the depth that fits these best meets what was measured (``pipeline.depth.slopes``).
+    The network predicts depth differences between near and distant pixels, and the certainty of each; the depth
+    that fits these best is adapted to the measured depth (``pipeline.depth.slopes``).
 
     Args:
         sensor: (H, W) metric depth with holes; at least one pixel is measured.
-        rgb: (H, W, 3) uint8, the colours on the same grid.
+        rgb: (H, W, 3) uint8 colours on the same grid.
         model: ONNX file of the completion network.
 
     Raises:
-        InputError: the images differ in size, or nothing is measured.
+        InputError: the images differ in size, or no pixel is measured.
     """
     if rgb.shape != (*sensor.z_m.shape, 3):
         raise InputError(
@@ -65,7 +65,7 @@ def complete(sensor: DepthMap, rgb: ByteArray, model: Path = SHIPPED_COMPLETION)
 
 
 def enlarged(plane: FloatArray, shape: tuple[int, int]) -> FloatArray:
-    """(H, W) a plane of the grid at full size, its cells' middles in place."""
+    """Enlarge a plane of the grid to (H, W) so that the cells' centres keep their places."""
     rows, columns = shape
     step = cell_px(columns)
     height, width = plane.shape
@@ -74,7 +74,7 @@ def enlarged(plane: FloatArray, shape: tuple[int, int]) -> FloatArray:
 
 
 def meeting(log_z: FloatArray, sensor: DepthMap, rgb: ByteArray) -> FloatArray:
-    """(H, W) metres: completed depth bent so that it meets the measured pixels around every hole."""
+    """Correct completed depth so that it meets the measured pixels around every hole; returns (H, W) metres."""
     measured_log = np.log(np.where(sensor.valid, sensor.z_m, 1.0)).astype(np.float32)
     mismatch = np.where(sensor.valid, measured_log - log_z, np.float32(0.0))
     usable: BoolArray = sensor.valid & (np.abs(mismatch) < LARGEST_MISMATCH)

@@ -17,32 +17,32 @@ from pipeline.depth.extension import extrapolated
 from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 
 COMPLETED_FROM = 0.0125
-"""Distance from a rim at which completed and aligned depth weigh the same, in shares of the diagonal; of 0,
-5, 10, 20 and 40 px at 640 x 480 the best on validation rooms (``fit_confidence`` prints the errors)."""
+"""Distance from a rim, as a share of the diagonal, at which completed and aligned depth weigh the same: of
+0, 5, 10, 20 and 40 px at 640 x 480 the best on validation rooms (``fit_confidence`` prints the errors)."""
 COMPLETED_ODDS = (-1.92, -1.24, 0.20, -0.08, -0.68)
-"""The same odds of completed depth in the sensor's own holes: constant, and per feature of
+"""Log odds of completed depth in the sensor's own holes: constant, and per feature of
 ``features_of_completion``. ``python -m lab.training fit_confidence`` fits them on validation rooms."""
 HIDDEN_ODDS = (-4.22, -1.78, 0.24, -0.67, -0.92)
-"""And where the sensor had measured: what is dark, shiny or far is not there, and the rest is easier to
-continue. Fitted with them, on hidden depth."""
+"""Log odds where measured depth was hidden for a test: without dark, shiny or far surfaces, these holes are
+easier to complete. Fitted in the same way, on hidden depth."""
 TYPICAL_LOG_SCALE = -2.7
 LEAST_DIFFERENCE = 0.005
 RELIEF_APART = 0.02
-"""Separation at which the network's relief is compared with the sensor's, in shares of the diagonal."""
+"""Distance of the pixels whose depth differences are compared with the sensor's, as a share of the diagonal."""
 RELIEF_STEP = 0.15
-"""Logarithmic depth steps of the sensor above this are edges and are left out."""
+"""Larger steps of the sensor's logarithmic depth are edges and are left out."""
 RELIEF_AFTER_LOCAL = 0.3
-"""Share of the relief that holds after ``local`` alignment, measured on hidden sensor depth: it has bent
-the depth to the sensor's wherever there is any, so agreement there is no evidence about the holes."""
+"""Share of the network's relief that is right after ``local`` alignment, measured on hidden sensor depth;
+agreement with the sensor is no evidence there, because alignment has fitted the depth to the sensor."""
 FLYING_WINDOW = 0.005
-"""Half width of the window that shows both surfaces of a step, in shares of the diagonal."""
+"""Half width, as a share of the diagonal, of the window that includes both surfaces of a step."""
 FLYING_STEP = 0.12
 FLYING_SLOPE = 0.03
 FLYING_BETWEEN = 0.2
 FLYING_MEASURED = 0.02
-"""Logarithmic depths: the step in the window, the least one within 3 x 3 pixels, and how near to a measured
-depth a pixel continues that surface; between them the share of the step off either side. On hidden depth
-seven of ten pixels that this removes are more than 5 % wrong, of the others one in twelve."""
+"""In logarithmic depth: least step in the window; least step within 3 x 3 pixels; distance from either side,
+as a share of the step; and distance from measured depth within which a pixel continues that surface. On
+hidden depth 7 of 10 removed pixels are more than 5 % wrong, of the others 1 in 12."""
 ALIGNED_ODDS = (-10.20, -1.06, -1.83)
 """Log odds of aligned depth being within 5 % of the truth: constant, and per feature of
 ``features_of_alignment``. ``python -m lab.training fit_confidence`` fits them on validation rooms."""
@@ -50,16 +50,16 @@ ALIGNED_ODDS = (-10.20, -1.06, -1.83)
 
 @dataclass(frozen=True, slots=True)
 class JudgedDepth:
-    """Inferred depth after the tests of confidence, reach and flying pixels, with their results."""
+    """Inferred depth after the tests of confidence, reach and flying pixels, with the results of these tests."""
 
     depth: DepthMap
     """(H, W) metres, without flying pixels, pixels out of reach and those below the least confidence."""
     confidence: FloatArray
-    """(H, W) float32, estimated probability of lying within 5 % of the truth; NaN without inferred depth."""
+    """(H, W) float32, estimated probability of an error within 5 % of the truth; NaN without inferred depth."""
     flying: BoolArray
-    """(H, W) pixels that hang between two surfaces."""
+    """(H, W) True for pixels between two surfaces."""
     out_of_reach: BoolArray
-    """(H, W) inferred pixels farther from sensor depth than the reach."""
+    """(H, W) True for inferred pixels farther from sensor depth than the reach."""
 
 
 def judge(
@@ -71,20 +71,20 @@ def judge(
     completed: CompletedDepth | None = None,
     hidden: BoolArray | None = None,
 ) -> JudgedDepth:
-    """Join aligned depth to the rims of the sensor's holes and drop what cannot be relied on.
+    """Join aligned depth to the rims of the sensor's holes and remove unreliable pixels.
 
     Args:
         alignment: (H, W) inferred depth in metres.
         sensor: (H, W) metric depth with holes.
         rgb: (H, W, 3) uint8, the colours of both.
-        reach: farthest distance of a pixel from sensor depth, in shares of the image's diagonal.
-        least_confidence: lowest confidence that stays, 0 to 1.
-        completed: (H, W) takes the aligned depth's place in the sensor's holes, the more the farther from
-            their rims.
-        hidden: (H, W) holes where the sensor had measured, which are known to be easier; none if left out.
+        reach: largest distance of a pixel from sensor depth, as a share of the image's diagonal.
+        least_confidence: least confidence of the pixels that are kept, 0 to 1.
+        completed: (H, W) completed depth, which replaces aligned depth in the sensor's holes with a weight that
+            grows with the distance from their rims.
+        hidden: (H, W) True where measured depth was hidden, whose holes are easier; None if there is none.
 
     Raises:
-        InputError: images of different sizes, a negative reach, or a confidence outside 0 to 1.
+        InputError: the images differ in size, the reach is negative, or a confidence is outside 0 to 1.
     """
     shape = alignment.depth.z_m.shape
     if sensor.z_m.shape != shape or rgb.shape != (*shape, 3):
@@ -114,7 +114,7 @@ def judge(
 
 
 def distance_to_measured(measured: BoolArray) -> FloatArray:
-    """(H, W) distance to the nearest measured pixel in shares of the diagonal; infinite if there is none."""
+    """Return (H, W) distances to the nearest measured pixel as shares of the diagonal; infinite without any."""
     if not measured.any():
         return np.full(measured.shape, np.inf, np.float32)
     distance_px = cv2.distanceTransform((~measured).astype(np.uint8), cv2.DIST_L2, 5)
@@ -122,10 +122,10 @@ def distance_to_measured(measured: BoolArray) -> FloatArray:
 
 
 def confidence_of(alignment: AlignmentResult, sensor: DepthMap, distance: FloatArray) -> FloatArray:
-    """(H, W) confidence of aligned depth.
+    """Return (H, W) confidence of aligned depth.
 
-    At pixels with sensor depth it is the share of those around that agree with the sensor within 5 %;
-    elsewhere it falls with the distance and with what a smooth correction leaves of the residual nearby.
+    At pixels with sensor depth it is the share of surrounding pixels that agree with the sensor within 5 %;
+    elsewhere it falls with the distance from them and with the residual there after a smooth correction.
     """
     z_m, p_m = alignment.depth.z_m, sensor.z_m
     known = positive(z_m) & positive(p_m)
@@ -136,10 +136,10 @@ def confidence_of(alignment: AlignmentResult, sensor: DepthMap, distance: FloatA
 
 
 def features_of_alignment(alignment: AlignmentResult, sensor: DepthMap, distance: FloatArray) -> FloatArray:
-    """(2, H, W) what tells whether aligned depth is right.
+    """Return (2, H, W) features that predict whether aligned depth is right.
 
-    Logs of the distance in shares of the diagonal and of what a smooth correction leaves of the residual
-    nearby.
+    They are the logs of the distance, as a share of the diagonal, and of the nearby residual after a smooth
+    correction.
     """
     residual, known = _log_residual(alignment, sensor), positive(alignment.depth.z_m) & positive(sensor.z_m)
     rough = np.abs(residual - masked_blur(residual, known)) * known
@@ -148,7 +148,7 @@ def features_of_alignment(alignment: AlignmentResult, sensor: DepthMap, distance
 
 
 def _log_residual(alignment: AlignmentResult, sensor: DepthMap) -> FloatArray:
-    """(H, W) float32, clipped; 0 where one of both is unknown."""
+    """Return (H, W) float32 clipped log residuals; 0 where either depth is unknown."""
     z_m, p_m = alignment.depth.z_m, sensor.z_m
     known = positive(z_m) & positive(p_m)
     residual = np.log(np.where(known, p_m, 1.0) / np.where(known, z_m, 1.0))
@@ -167,10 +167,10 @@ def joined(
     distance: FloatArray,
     completed_from: float = COMPLETED_FROM,
 ) -> DepthMap:
-    """Aligned depth at measured pixels and beside them, completed depth inside the holes.
+    """Combine aligned depth at and near measured pixels with completed depth inside the holes.
 
-    Narrow gaps are the aligned depth's, which is continued at full size; the weight of completed depth is
-    d^2 / (d^2 + d0^2) at the distance d from measured depth, and both are averaged as logarithms.
+    Narrow gaps get aligned depth, which has full resolution; the weight of completed depth is
+    d^2 / (d^2 + d0^2) at the distance d from measured depth, and logarithms of both are averaged.
     """
     usable = positive(aligned.z_m)
     share = distance**2 / (distance**2 + completed_from**2)
@@ -183,17 +183,17 @@ def joined(
 def odds_of_completion(
     aligned: DepthMap, completed: CompletedDepth, distance: FloatArray, hidden: BoolArray | None = None
 ) -> FloatArray:
-    """(H, W) log odds of completed depth; in (H, W) ``hidden`` the sensor had measured."""
+    """Return (H, W) log odds of completed depth; ``hidden`` (H, W) marks hidden measured depth."""
     features = features_of_completion(aligned, completed, distance)
     own = _odds(COMPLETED_ODDS, features)
     return own if hidden is None else np.where(hidden, _odds(HIDDEN_ODDS, features), own)
 
 
 def features_of_completion(aligned: DepthMap, completed: CompletedDepth, distance: FloatArray) -> FloatArray:
-    """(4, H, W) what tells whether completed depth is right.
+    """Return (4, H, W) features that predict whether completed depth is right.
 
-    The network's log scale and its square, log of the distance in shares of the diagonal, and log of how far
-    completed and aligned depth are apart; where nothing is aligned, nothing dissents.
+    They are the network's log scale and its square, the log of the distance as a share of the diagonal, and the
+    log of the difference between completed and aligned depth, which counts as 0 without aligned depth.
     """
     scale = completed.log_scale - TYPICAL_LOG_SCALE
     ratio = np.where(positive(aligned.z_m), aligned.z_m, completed.depth.z_m) / completed.depth.z_m
@@ -202,7 +202,7 @@ def features_of_completion(aligned: DepthMap, completed: CompletedDepth, distanc
 
 
 def flying_pixels(depth: DepthMap, sensor: DepthMap) -> BoolArray:
-    """(H, W) flying pixels: on a steep step, off both of its sides, and near no measured depth around."""
+    """Return (H, W) True for flying pixels: on a steep step, off both its sides, and near no measured depth."""
     measured = positive(sensor.z_m)
     complete_m = np.where(measured, sensor.z_m, depth.z_m)
     half_px = max(1, round(FLYING_WINDOW * np.hypot(*measured.shape)))
@@ -224,7 +224,7 @@ def flying_pixels(depth: DepthMap, sensor: DepthMap) -> BoolArray:
 
 
 def log_range(z_m: FloatArray, side_px: int) -> tuple[FloatArray, FloatArray]:
-    """(H, W) logarithms of the least and greatest depth within a square; unknown pixels do not count."""
+    """Return (H, W) logarithms of the least and greatest known depth within a square window."""
     known, window = positive(z_m), np.ones((side_px, side_px), np.uint8)
     log_z = np.log(np.where(known, z_m, 1.0)).astype(np.float32)
     least = cv2.erode(np.where(known, log_z, np.float32(np.inf)), window)
@@ -233,20 +233,20 @@ def log_range(z_m: FloatArray, side_px: int) -> tuple[FloatArray, FloatArray]:
 
 
 def meet_rims(alignment: AlignmentResult, sensor: DepthMap, rgb: ByteArray) -> DepthMap:
-    """Bend aligned depth in the sensor's holes so that it continues what was measured around them.
+    """Correct aligned depth in the sensor's holes so that it continues the measured depth around them.
 
-    z' = z^g exp(C), with g the share of the network's relief that the sensor confirms in this frame and
-    C = log p - g log z continued from the measured pixels with its slope, along like colours (joint
-    bilateral weights, Kopf et al. 2007), from the rims inwards. A good network is followed, a poor one
-    only in so far as it is right.
+    z' = z^g exp(C), where g is the share of the network's relief that the sensor confirms in this frame, and
+    C = log p - g log z is extended from the measured pixels with its slope, along similar colours (joint
+    bilateral weights, Kopf et al. 2007), from the rims inwards. So a poor network is followed only as far as
+    it is right.
 
     Args:
         alignment: (H, W) inferred depth in metres.
         sensor: (H, W) metric depth with holes.
-        rgb: (H, W, 3) the colours of both.
+        rgb: (H, W, 3) colours of both.
 
     Returns:
-        Depth where the aligned depth is known; at pixels with sensor depth it is the aligned depth itself.
+        Depth where the aligned depth is known; at pixels with sensor depth it is the aligned depth unchanged.
     """
     depth = alignment.depth
     usable = positive(depth.z_m)
@@ -262,7 +262,7 @@ def meet_rims(alignment: AlignmentResult, sensor: DepthMap, rgb: ByteArray) -> D
 
 
 def confirmed_relief(log_z: FloatArray, log_p: FloatArray, known: BoolArray) -> float:
-    """Slope of the sensor's depth differences over the inferred ones, 0 to 1, edges left out."""
+    """Return the slope of the sensor's depth differences over the inferred ones, 0 to 1, without edges."""
     apart_px = max(1, round(RELIEF_APART * np.hypot(*known.shape)))
     product, square = 0.0, 1e-12
     for near, far in (

@@ -1,22 +1,22 @@
-"""A depth network's input and the meaning of its output, as its file, a preset or flags give them.
+"""Convention of a depth network: its input and the meaning of its output, by file, preset or flags.
 
-An ONNX file holds it in its ``metadata_props``. All keys are optional text, plain or JSON:
+An ONNX file stores it in its ``metadata_props``. All keys are optional text, plain or JSON:
 
-    preset             the preset that gives what the other keys leave open
+        preset             preset with the values of the other keys
     depth_kind         metric: metres; relative: depth up to scale; inverse: disparity up to scale and shift
     depth_range_m      0.1,100: the output is a sigmoid between the disparities of these depths (monodepth2)
     input_size_px      320x256: width and height; 518: any size whose shorter side is that long
     input_multiple_px  14: the sides of such a size are multiples of it
-    input_fit_px       320x240: the box in the middle of the input that the image is fitted into
-    input_resize       fit (aspect kept, the rest reflected) or stretch
-    input_scale        255 or 1: what pixel values are divided by
-    input_mean         0.485,0.456,0.406: red, green, blue; subtracted after that
-    input_deviation    0.229,0.224,0.225: red, green, blue; divided by after that
-    input_normalised   inside (the graph subtracts and divides by itself) or outside
+        input_fit_px       320x240: the centre box of the input into which the image is fitted
+        input_resize       fit (keeps the aspect and pads by reflection) or stretch
+        input_scale        255 or 1: divisor of pixel values
+        input_mean         0.485,0.456,0.406: red, green, blue; subtracted afterwards
+        input_deviation    0.229,0.224,0.225: red, green, blue; divisor afterwards
+        input_normalised   inside (the graph itself subtracts and divides) or outside
     input_channels     RGB or BGR
     input_layout       NCHW or NHWC
 
-The shapes in the graph overrule size and layout wherever they are fixed.
+If the shapes in the graph are fixed, they override size and layout.
 """
 
 from __future__ import annotations
@@ -41,48 +41,48 @@ from pipeline.depth.signature import Layout, Signature, signature_of
 Channels = Literal["RGB", "BGR"]
 Resize = Literal["fit", "stretch"]
 MOST_SIDE_PX = 4096
-"""Of an input; more would fill the memory."""
+"""Largest side of an input; more would exhaust the memory."""
 Values = dict[str, Any]
 """Fields of ``Convention`` by name, as far as they are known."""
 Reader = Callable[[str], Values]
-"""The fields that a metadata value decides; raises ValueError with an example of a right value."""
+"""Parses a metadata value to fields; raises a ValueError with an example of a correct value."""
 
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """From an 8-bit RGB image to the network's input, and from its output to depth."""
+    """Conversion of an 8-bit RGB image to the network's input, and of its output to depth."""
 
     kind: ModelKind
     width_px: int
-    """Of the input; of its shorter side if ``height_px`` is None."""
+    """Width of the input, or its shorter side if ``height_px`` is None."""
     height_px: int | None
-    """None: any size with the image's aspect, in multiples of ``multiple_px``."""
+    """Height of the input; None allows any size with the image's aspect, in multiples of ``multiple_px``."""
     multiple_px: int = 1
     mean: tuple[float, ...] = IMAGENET_MEAN
     """(3,) red, green, blue; of pixel values divided by ``scale``."""
     deviation: tuple[float, ...] = IMAGENET_DEVIATION
     """(3,) red, green, blue."""
     scale: float = 255.0
-    """What pixel values are divided by: 255 or 1."""
+    """Divisor of pixel values: 255 or 1."""
     layout: Layout = "NCHW"
     channels: Channels = "RGB"
     normalised_inside: bool = False
-    """The graph subtracts the mean and divides by the deviation itself."""
+    """Whether the graph itself subtracts the mean and divides by the deviation."""
     resize: Resize = "stretch"
     fit_px: tuple[int, int] | None = None
-    """Width and height of the middle box that "fit" fits the image into; None: the whole input."""
+    """Width and height of the centre box into which "fit" fits the image; None is the whole input."""
     depth_range_m: tuple[float, float] | None = None
-    """Nearest and farthest depth between whose disparities the output is a sigmoid; None: it is none."""
+    """Nearest and farthest depth, if the output is a sigmoid between their disparities; else None."""
 
     @property
     def gives_disparity(self) -> bool:
-        """Whether the output grows towards the camera."""
+        """Whether the output is larger for nearer pixels."""
         return self.kind == "inverse" or self.depth_range_m is not None
 
 
 @dataclass(frozen=True, slots=True)
 class Overrides:
-    """Parts of the convention that flags set; None leaves a part to the file or the preset."""
+    """Parts of the convention set by flags; None leaves a part to the file or the preset."""
 
     kind: ModelKind | None = None
     size_px: tuple[int, int] | None = None
@@ -93,7 +93,7 @@ class Overrides:
 
     @staticmethod
     def of(config: DepthConfig) -> Overrides:
-        """The overrides that the settings hold."""
+        """Return the overrides in the settings."""
         size_px = None
         if config.input_width_px is not None and config.input_height_px is not None:
             size_px = config.input_width_px, config.input_height_px
@@ -111,13 +111,13 @@ PRESETS: dict[NetworkPreset, Convention] = {
         "inverse", 640, 192, multiple_px=32, normalised_inside=True, depth_range_m=(0.1, 100.0)
     ),
 }
-"""Known networks, each as its own repository prepares its images:
+"""Known networks, each with the image preparation of its own repository:
 
-packetmesh: the file that ships (SPEC 3.2).
-midas-small: MiDaS v2.1 small as ``torch.hub`` exports it (isl-org/MiDaS, midas/transforms.py). Files that
-``tf/make_onnx_model.py`` made normalise by themselves: add normalisation=unit for those.
+packetmesh: the network that comes with PacketMesh (SPEC 3.2).
+midas-small: MiDaS v2.1 small as exported by ``torch.hub`` (isl-org/MiDaS, midas/transforms.py). Files made
+by ``tf/make_onnx_model.py`` normalise their input themselves: add normalisation=unit for those.
 depth-anything-v2-small: ``Resize(518, lower_bound, multiple of 14)`` (depth_anything_v2/util/transform.py).
-depth-anything-v2-metric: the same; metres up to 20 (Hypersim) or 80 (Virtual KITTI).
+depth-anything-v2-metric: the same; depth in metres up to 20 (Hypersim) or 80 (Virtual KITTI).
 monodepth2: 640 x 192, values from 0 to 1, ``disp_to_depth(disp, 0.1, 100)``; its encoder normalises.
 """
 
@@ -125,17 +125,17 @@ monodepth2: 640 x 192, values from 0 to 1, ``disp_to_depth(disp, 0.1, 100)``; it
 def convention_of(
     session: Any, preset: str | None = None, overrides: Overrides | None = None, name: str = "The network"
 ) -> Convention:
-    """What a network expects: flags before the preset, a preset before the file's own metadata.
+    """Return a network's convention: flags override a preset, which replaces the file's metadata.
 
     Args:
-        session: of onnxruntime.
-        preset: a name of ``PRESETS``; it replaces all metadata.
-        overrides: from flags.
-        name: of the network in errors.
+        session: onnxruntime session.
+        preset: name in ``PRESETS``; it replaces all metadata.
+        overrides: parts set by flags.
+        name: name of the network for error messages.
 
     Raises:
-        InputError: an unknown preset, metadata without sense, a graph that is no depth network, or a
-            network whose kind of output is given nowhere.
+        InputError: an unknown preset, invalid metadata, a graph that is no depth network, or an unknown kind
+            of output.
     """
     signature = signature_of(session, name)
     given = overrides or Overrides()
@@ -155,10 +155,10 @@ def convention_of(
 
 
 def preset_named(name: str) -> Convention:
-    """The convention of that name.
+    """Return the convention of this preset.
 
     Raises:
-        InputError: there is none.
+        InputError: there is no such preset.
     """
     for known, convention in PRESETS.items():
         if known == name:
@@ -167,10 +167,10 @@ def preset_named(name: str) -> Convention:
 
 
 def from_metadata(metadata: Mapping[str, str], name: str) -> Values:
-    """The fields of ``Convention`` that a file's metadata set.
+    """Return the fields of ``Convention`` that a file's metadata set.
 
     Raises:
-        InputError: a key of ours with a value that it does not take.
+        InputError: one of our keys has an invalid value.
     """
     values: Values = {}
     for key, read in READERS.items():
@@ -184,7 +184,7 @@ def from_metadata(metadata: Mapping[str, str], name: str) -> Values:
 
 
 def metadata_of(convention: Convention) -> dict[str, str]:
-    """The metadata that make ``convention_of`` give this convention; what an export writes into its file."""
+    """Return the metadata from which ``convention_of`` reads this convention, for exporting a network."""
     size = [side for side in (convention.width_px, convention.height_px) if side is not None]
     metadata = {
         "depth_kind": convention.kind,
@@ -206,7 +206,7 @@ def metadata_of(convention: Convention) -> dict[str, str]:
 
 
 def _in_graph(values: Values, signature: Signature, size_px: tuple[int, int] | None, name: str) -> Convention:
-    """The convention with size and layout as the graph has them."""
+    """Build the convention, with size and layout from the graph where it fixes them."""
     if signature.layout is not None:
         values["layout"] = signature.layout
     fixed = (signature.width_px, signature.height_px)
@@ -227,7 +227,7 @@ def _in_graph(values: Values, signature: Signature, size_px: tuple[int, int] | N
 
 
 def _divided(size_px: tuple[int, int], multiple_px: int, name: str) -> None:
-    """Refuses a size that a person gave if the network's strides do not divide it."""
+    """Raise an error for an input size that the network's strides do not divide."""
     if any(side % multiple_px for side in size_px):
         nearest = tuple(multiple_px * max(1, round(side / multiple_px)) for side in size_px)
         raise InputError(
@@ -237,10 +237,10 @@ def _divided(size_px: tuple[int, int], multiple_px: int, name: str) -> None:
 
 
 def _possible(convention: Convention, name: str) -> Convention:
-    """The convention, if an image can be brought to it.
+    """Return the convention after checking that images can be converted to it.
 
     Raises:
-        InputError: a size without sense, or a nearest depth beyond the farthest.
+        InputError: the size is impossible, or the nearest depth is beyond the farthest.
     """
     size = (convention.width_px, convention.height_px or convention.width_px)
     box, (near_m, far_m) = convention.fit_px or size, convention.depth_range_m or (0.0, 1.0)
@@ -287,7 +287,7 @@ def _choice(field: str, choices: tuple[str, ...], suggestion: str) -> Reader:
 def _numbers(
     field: str, count: int, suggestion: str, separator: str = ",", of: type = float, above: float = 0.0
 ) -> Reader:
-    """Reads a tuple of finite numbers above a bound."""
+    """Return a reader of a tuple of finite numbers above a bound."""
 
     def read(text: str) -> Values:
         try:
@@ -332,11 +332,11 @@ READERS: dict[str, Reader] = {
     "input_channels": _choice("channels", get_args(Channels), "RGB or BGR"),
     "input_layout": _choice("layout", get_args(Layout), "NCHW or NHWC"),
 }
-"""Metadata keys in the order they are read: what follows a preset refines it."""
+"""Parsers by metadata key, in order: keys after a preset override parts of it."""
 
 
 def _plain(text: str) -> str:
-    """Text that may be a JSON string, number or list, without its quotes and brackets."""
+    """Return text without the quotes and brackets of a JSON string or list."""
     try:
         value = json.loads(text)
     except ValueError:

@@ -1,4 +1,4 @@
-"""A field known at some pixels continued into others, with its slope and along like colours (SPEC 3.5)."""
+"""Extension of a partly known field into unknown pixels, with its slope and along similar colours (SPEC 3.5)."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ from pipeline.kernels.kdtree import compiled
 from pipeline.types import BoolArray, ByteArray, FloatArray, IntArray
 
 FILL_WIDTH_PX = 320
-"""Corrections are continued into holes at this width, then brought to full size along the colours."""
+"""Width at which holes are filled, before upsampling along the colours."""
 WINDOW_PX = 3
 SPACE_SIGMA_PX = 1.7
 SLOPE_SIGMA_PX = 6.0
-"""Pixels at the filling width; three numbers that fill hidden sensor depth best."""
+"""In pixels at the filling width; these three numbers reconstruct hidden sensor depth best."""
 COLOR_SIGMA = 7.0
 """Root mean square of the three channels' differences, in grey levels."""
 LEAST_WEIGHT = 1e-6
 SLOPE_SHARE = 0.5
-"""Share of the slope around a hole that goes on inside it."""
+"""Share of the slope around a hole that is continued inside it."""
 SLOPE_DECAY = 0.97
-"""What is left of it after every pass inwards."""
+"""Factor of the slope after each ring of pixels inwards."""
 LARGEST_SLOPE = 0.03
-"""Logarithmic depth a pixel; steeper is an edge."""
+"""In logarithmic depth per pixel; steeper is an edge."""
 
 
 def extrapolated(field: FloatArray, known: BoolArray, rgb: ByteArray) -> FloatArray:
-    """(H, W) the field where it is known; elsewhere inpainted at ``FILL_WIDTH_PX`` and upsampled.
+    """Return the (H, W) field, where it is unknown inpainted at ``FILL_WIDTH_PX`` and upsampled.
 
     Args:
         field: (H, W) float32.
-        known: (H, W) where it means something; at least one pixel.
+        known: (H, W) True where the field is known; at least one pixel.
         rgb: (H, W, 3) uint8.
     """
     step = max(1, round(known.shape[1] / FILL_WIDTH_PX))
@@ -46,12 +46,12 @@ def extrapolated(field: FloatArray, known: BoolArray, rgb: ByteArray) -> FloatAr
 
 
 def inpainted(field: FloatArray, known: BoolArray, colors: FloatArray) -> FloatArray:
-    """The field with its unknown pixels filled from the rims inwards, a pass for every ring of pixels.
+    """Fill the unknown pixels of a field from the rims inwards, one ring of pixels per pass.
 
     Args:
         field: (H, W) float32.
-        known: (H, W) where it means something; at least one pixel.
-        colors: (H, W, 3) in units in which a difference of one leaves 1/e of a weight.
+        known: (H, W) True where the field is known; at least one pixel.
+        colors: (H, W, 3), scaled so that a difference of one reduces a weight to 1/e.
     """
     values = np.stack([field, *slopes(field, known)], axis=-1)
     reach_px = np.arange(-WINDOW_PX, WINDOW_PX + 1)
@@ -88,7 +88,7 @@ def _inpaint(values: FloatArray, known: BoolArray, colors: FloatArray, space: Fl
 
 @compiled
 def _reach_beside(reached: BoolArray, v: int, u: int, waiting: IntArray, count: int) -> int:
-    """Put the pixels beside one that nobody has reached yet into ``waiting``, and return the new count."""
+    """Append the unreached neighbours of a pixel to ``waiting``; returns the new count."""
     for y in range(max(v - 1, 0), min(v + 2, reached.shape[0])):
         for x in range(max(u - 1, 0), min(u + 2, reached.shape[1])):
             if not reached[y, x]:
@@ -108,7 +108,7 @@ def _predict(
     u: int,
     predicted: FloatArray,
 ) -> None:
-    """Write (3,) field and slopes at a pixel from the known pixels around, with (7, 7) weights of places."""
+    """Write (3,) field and slopes at a pixel, predicted from known pixels with (7, 7) spatial weights."""
     total = field = slope_down = slope_right = 0.0
     for y in range(max(v - WINDOW_PX, 0), min(v + WINDOW_PX + 1, known.shape[0])):
         for x in range(max(u - WINDOW_PX, 0), min(u + WINDOW_PX + 1, known.shape[1])):
@@ -126,13 +126,13 @@ def _predict(
 
 @compiled
 def _likeness(color: FloatArray, other: FloatArray) -> float:
-    """Weight of the difference of two colours, never quite zero."""
+    """Return the weight of two colours' difference, never quite zero."""
     red, green, blue = color[0] - other[0], color[1] - other[1], color[2] - other[2]
     return np.exp(-(red * red + green * green + blue * blue)) + LEAST_WEIGHT
 
 
 def slopes(field: FloatArray, known: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """(H, W) slope down and slope to the right that are trusted to go on, zero where none is near."""
+    """Return the (H, W) slopes down and to the right that are to be continued, zero where none is near."""
     found = []
     for axis in (0, 1):
         before, after = (np.roll(field, way, axis) for way in (1, -1))
@@ -155,15 +155,15 @@ def _upsample(
     coarse_colors: FloatArray,
     step: int,
 ) -> None:
-    """Write the coarse field into a field's unknown pixels, bilinear with the weights of like colours raised.
+    """Fill a field's unknown pixels from the coarse field, bilinearly with larger weights for similar colours.
 
     Args:
         field: (H, W) float32.
-        known: (H, W) pixels to leave.
-        colors: (H, W, 3).
-        coarse: (h, w) every ``step``-th pixel from ``step // 2`` on.
-        coarse_colors: (h, w, 3).
-        step: pixels a coarse pixel.
+        known: (H, W) True for pixels that are not changed.
+        colors: (H, W, 3) colours of the field's pixels.
+        coarse: (h, w) values at every ``step``-th pixel, starting at ``step // 2``.
+        coarse_colors: (h, w, 3) colours at these pixels.
+        step: pixels per coarse pixel.
     """
     for row in range(known.shape[0]):
         for column in range(known.shape[1]):

@@ -1,6 +1,6 @@
-"""Baselines that fill depth without a network: inpainting, the nearest depth, joint bilateral filtering.
+"""Baselines that fill depth without a network: inpainting, nearest depth, joint bilateral filtering.
 
-The Hide tool compares the network's fill with them.
+The Hide tool compares the network's depth with them.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from pipeline.types import ByteArray, DepthMap, FloatArray
 
 INPAINT_RADIUS_PX = 5.0
 FULL_SCALE = 60_000.0
-"""The farthest depth in the 16-bit numbers that are inpainted: a step is 0.1 mm at 6 m. Telea's method
-rounds and moves by whole steps, so metres as floating-point numbers come out wrong by up to one metre."""
+"""Farthest depth in the 16-bit numbers that are inpainted: a step is 0.1 mm at 6 m. Telea's method rounds to
+whole steps, so floating-point metres would be wrong by up to one metre."""
 WINDOW_PX = 7
 """Half width of the joint bilateral window."""
 SPACE_SIGMA_PX = 3.5
 COLOR_SIGMA = 7.0
 """Root mean square of the three channels' differences, in grey levels."""
 LEAST_WEIGHT = 1e-6
-"""What the colour leaves at least of a neighbour's weight, so that no pixel stays without depth."""
+"""Least factor of a neighbour's weight by colour, so that every pixel gets a depth."""
 
 
 def inpainted(method: int, sensor: DepthMap, rgb: ByteArray) -> DepthMap:
-    """OpenCV's inpainting of 16-bit depth; measured pixels keep their bits. The colours are not used.
+    """Inpaint depth as 16-bit numbers with OpenCV; measured pixels are unchanged, colours are not used.
 
     ``method`` is fast marching (Telea 2004) or Navier-Stokes (Bertalmio et al. 2001).
     """
@@ -40,7 +40,7 @@ def inpainted(method: int, sensor: DepthMap, rgb: ByteArray) -> DepthMap:
 
 
 def nearest(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
-    """Every pixel takes the depth of the nearest measured pixel; the colours are not used."""
+    """Give every pixel the depth of the nearest measured pixel; colours are not used."""
     require_depth(sensor)
     _, labels = cv2.distanceTransformWithLabels(
         (~sensor.valid).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
@@ -51,10 +51,10 @@ def nearest(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
 
 
 def joint_bilateral(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
-    """Means of the known depths around, weighted by distance and similarity of colour, from the rims inwards.
+    """Average the surrounding known depths, weighted by distance and colour similarity, from the rims inwards.
 
-    Joint bilateral upsampling (Kopf et al. 2007) as an iteration: each pass fills the unknown pixels that
-    have a known one within 3 pixels, from all known ones within 7.
+    Iterated joint bilateral upsampling (Kopf et al. 2007): each pass fills the unknown pixels that have a
+    known one within 3 pixels, from all known ones within 7.
     """
     require_depth(sensor)
     pad = ((WINDOW_PX, WINDOW_PX), (WINDOW_PX, WINDOW_PX))
@@ -74,7 +74,7 @@ def joint_bilateral(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
 def weighted_means(
     z_m: FloatArray, known: np.ndarray, colors: FloatArray, rows: np.ndarray, columns: np.ndarray
 ) -> FloatArray:
-    """(N,) bilateral means of the known depths around the pixels at ``rows`` and ``columns`` (N,)."""
+    """Return (N,) bilateral means of the known depths around the pixels at ``rows`` and ``columns`` (N,)."""
     here = colors[rows, columns]
     total, weights = np.zeros((2, len(rows)), np.float32)
     for down in range(-WINDOW_PX, WINDOW_PX + 1):
@@ -89,7 +89,7 @@ def weighted_means(
 
 
 def require_depth(sensor: DepthMap) -> None:
-    """Raise InputError when there is nothing to fill from."""
+    """Raise an InputError if no pixel is measured."""
     if not sensor.valid.any():
         raise InputError("The sensor depth has no valid pixel to fill from; use another frame.")
 
@@ -100,4 +100,4 @@ PEERS: dict[str, Callable[[DepthMap, ByteArray], DepthMap]] = {
     "nearest": nearest,
     "joint-bilateral": joint_bilateral,
 }
-"""Dense depth from the sensor's alone, or guided by colour; measured pixels stay as they are."""
+"""Fillers that return dense depth from the sensor's alone, or guided by colour; measured depth is unchanged."""

@@ -1,4 +1,4 @@
-"""The depth network at run time: one RGB image to one dense depth map, through onnxruntime."""
+"""Inference of a dense depth map from an RGB image by a depth network, through onnxruntime."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SHIPPED_MODEL = Path(__file__).resolve().parents[2] / "assets" / "depth" / "resn
 
 
 class DepthNetwork:
-    """A loaded depth network, the shipped one or any other; one object serves many images and threads."""
+    """A loaded depth network, ours or any other; one object can serve many images and threads."""
 
     def __init__(
         self,
@@ -27,16 +27,16 @@ class DepthNetwork:
         preset: str | None = None,
         overrides: Overrides | None = None,
     ) -> None:
-        """Load the ONNX file; None takes the one that ships.
+        """Load the ONNX file; None loads the network that comes with PacketMesh.
 
         Args:
             model_path: any depth network (``pipeline.depth.conventions``).
-            preset: a name of ``conventions.PRESETS``; None takes the convention in the file.
+            preset: name in ``conventions.PRESETS``; None uses the convention in the file.
             overrides: parts of the convention that replace the file's or the preset's.
 
         Raises:
-            InputError: the file is missing, is not ONNX, is damaged, is no depth network, or neither
-                it nor the caller gives its convention.
+            InputError: the file is missing, no ONNX, damaged or no depth network, or neither it nor the caller
+                gives its convention.
         """
         if model_path is None and preset not in (None, "packetmesh"):
             raise InputError(f"The preset {preset} is for a network of that kind: name its ONNX file as well")
@@ -47,12 +47,12 @@ class DepthNetwork:
 
     @classmethod
     def of(cls, config: DepthConfig) -> DepthNetwork:
-        """The network that the settings name; raises as the constructor."""
+        """Load the network that the settings name; raises as the constructor."""
         return cls(config.model, config.preset, Overrides.of(config))
 
     @property
     def provider(self) -> str:
-        """The execution provider that really runs the network."""
+        """The execution provider that runs the network."""
         return self._session.get_providers()[0]
 
     @property
@@ -61,19 +61,19 @@ class DepthNetwork:
         return dict(self._session.get_modelmeta().custom_metadata_map)
 
     def infer(self, rgb: ByteArray, crop: bool = False) -> DepthMap:
-        """Depth on the pixel grid of ``rgb`` (SPEC 3.2): metric if the network gives metres, else relative.
+        """Infer depth on the pixel grid of ``rgb`` (SPEC 3.2): metric if the network gives metres, else relative.
 
-        A network of the kind ``inverse`` gives disparity d up to scale and shift; its depth here is 1/d,
-        which the alignment ``affine_inverse`` makes metric. Where d is zero or negative the network sees
-        nothing near (most clip there) and the depth is NaN.
+        A network of the kind ``inverse`` gives disparity d up to scale and shift; the returned depth is 1/d, which
+        the alignment ``affine_inverse`` makes metric. Where d is zero or negative, as most networks clip
+        far pixels, the depth is NaN.
 
         Args:
             rgb: (H, W, 3) uint8, any size.
-            crop: infer the thesis's centre crop only, 304 x 228 of 320 x 240; NaN outside of it.
+            crop: infer only the thesis's centre crop, 304 x 228 of 320 x 240; NaN outside.
 
         Raises:
-            InputError: ``rgb`` is not an 8-bit colour image, or the network does not take it.
-            ReconstructionError: the network gives no positive depth at all.
+            InputError: ``rgb`` is not an 8-bit colour image, or the network cannot process it.
+            ReconstructionError: the network gives no positive depth.
         """
         if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8 or not rgb.size:
             raise InputError(
@@ -95,7 +95,7 @@ class DepthNetwork:
         return DepthMap(z, kind="metric" if self.convention.kind == "metric" else "relative")
 
     def _run(self, tensor: FloatArray) -> FloatArray:
-        """(H, W) float32 output for the input of one image."""
+        """Run the network on the input of one image; returns (H, W) float32."""
         signature = self._signature
         try:
             given = {signature.input_name: tensor.astype(signature.dtype, copy=False)}
@@ -116,7 +116,7 @@ class DepthNetwork:
 
 
 def network_image(region: ByteArray, convention: Convention, crop: bool) -> tuple[ByteArray, int, int]:
-    """The image at the network's size, and how many rows and columns of its middle are not padding."""
+    """Resize the image for the network; returns it with the number of rows and columns that are not padding."""
     rows, columns = region.shape[:2]
     width_px, height_px = convention.width_px, convention.height_px
     if height_px is None:
@@ -124,7 +124,7 @@ def network_image(region: ByteArray, convention: Convention, crop: bool) -> tupl
     if convention.height_px is None or convention.resize == "stretch":
         return resized(region, width_px, height_px), height_px, width_px
     box = convention.fit_px or (width_px, height_px)
-    if crop:  # a part of the image fills the same part of the box, so that scale does not change
+    if crop:  # the crop fills the same part of the box as of the image: the scale does not change
         rows_of_box, columns_of_box = centre_crop(box[1], box[0])
         box = columns_of_box.stop - columns_of_box.start, rows_of_box.stop - rows_of_box.start
     small = fitted(region, *box)
@@ -132,7 +132,7 @@ def network_image(region: ByteArray, convention: Convention, crop: bool) -> tupl
 
 
 def network_input(image: ByteArray, convention: Convention) -> FloatArray:
-    """(H, W, 3) uint8 RGB to the network's float32 tensor of one image."""
+    """Convert an (H, W, 3) uint8 RGB image to the network's float32 tensor of one image."""
     values: FloatArray = image.astype(np.float32) / np.float32(convention.scale)
     if not convention.normalised_inside:
         mean, deviation = np.array([convention.mean, convention.deviation], np.float32)
@@ -143,9 +143,9 @@ def network_input(image: ByteArray, convention: Convention) -> FloatArray:
 
 
 def depth_of(output: FloatArray, size_px: tuple[int, int], convention: Convention) -> FloatArray:
-    """Depth of (width, height) pixels from a network's output, interpolated where noise is even.
+    """Convert a network's output to depth of (width, height) pixels.
 
-    Depth is resized as its logarithm, disparity as it is; what is not positive becomes NaN.
+    Depth is resized as its logarithm, disparity directly, so that its noise is uniform; values <= 0 become NaN.
     """
     if convention.depth_range_m is not None:
         near, far = (1.0 / depth_m for depth_m in convention.depth_range_m)

@@ -1,4 +1,4 @@
-"""Errors of a depth map against a true one (SPEC 3.4)."""
+"""Errors of a depth map against the truth (SPEC 3.4)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NEAREST_M = 0.1
 
 @dataclass(frozen=True, slots=True)
 class DepthErrors:
-    """The usual errors of one image; lower is better except for the deltas."""
+    """Common error measures of one image; lower is better except for the deltas."""
 
     rmse_m: float
     """sqrt(mean (p - g)^2)."""
@@ -35,12 +35,12 @@ class DepthErrors:
 
 
 def depth_errors(predicted_m: FloatArray, truth_m: FloatArray, cap_m: float = 10.0) -> DepthErrors:
-    """Errors over the pixels where both depths are known and the truth lies in (0.1 m, ``cap_m``).
+    """Compute errors over the pixels with both depths known and the truth in (0.1 m, ``cap_m``).
 
     Args:
         predicted_m: (H, W), metres, NaN where unknown.
         truth_m: (H, W), metres, NaN where unknown.
-        cap_m: farthest true depth that counts, metres.
+        cap_m: largest true depth that is compared, metres.
 
     Raises:
         InputError: the sizes differ, or no pixel can be compared.

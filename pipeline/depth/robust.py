@@ -1,4 +1,4 @@
-"""A straight line through points of which many are wrong (SPEC 3.5, items 2 and 3)."""
+"""Robust fit of a straight line to points with many outliers (SPEC 3.5, items 2 and 3)."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ SEARCHED_OUTLIER_SHARE = 0.4
 
 
 def fit_line(x: FloatArray, y: FloatArray, rng: np.random.Generator) -> tuple[float, float]:
-    """Slope and intercept of y = a x + b by Tukey's biweight, iteratively reweighted.
+    """Fit slope and intercept of y = a x + b with Tukey's biweight, iteratively reweighted.
 
-    Starts from least squares, or from the best of 200 random pairs of points when more than 40 % of
-    the points lie farther than 5 % of y from the least-squares line.
+    The start is least squares, or the best of 200 random pairs of points if more than 40 % of the points
+    are farther than 5 % of y from the least-squares line.
 
     Args:
-        x: (N,).
-        y: (N,) positive.
-        rng: draws the random pairs.
+        x: (N,) abscissas.
+        y: (N,) ordinates, positive.
+        rng: random generator of the pairs.
     """
     stride = -(-len(x) // MAX_SAMPLES)
     x, y = x[::stride], y[::stride]
@@ -45,7 +45,7 @@ def fit_line(x: FloatArray, y: FloatArray, rng: np.random.Generator) -> tuple[fl
 
 
 def weighted_line(x: FloatArray, y: FloatArray, weights: FloatArray) -> tuple[float, float]:
-    """Weighted least squares; a horizontal line when all x are equal."""
+    """Fit a line by weighted least squares; it is horizontal if all x are equal."""
     total = float(weights.sum())
     if not total > 0.0:
         return 0.0, float(np.median(y))
@@ -62,7 +62,7 @@ def weighted_line(x: FloatArray, y: FloatArray, weights: FloatArray) -> tuple[fl
 
 
 def best_random_line(x: FloatArray, y: FloatArray, rng: np.random.Generator) -> tuple[float, float]:
-    """Of 200 lines through two random points, the rising one with the most points within 5 % of y."""
+    """Return, of 200 lines through two random points, the rising one with the most points within 5 % of y."""
     first, second = rng.integers(len(x), size=(2, DRAWS))
     run = x[second] - x[first]
     slopes = np.where(run != 0.0, (y[second] - y[first]) / np.where(run != 0.0, run, 1.0), -1.0)
@@ -75,7 +75,7 @@ def best_random_line(x: FloatArray, y: FloatArray, rng: np.random.Generator) -> 
 
 @compiled
 def _points_near(slopes: FloatArray, intercepts: FloatArray, x: FloatArray, y: FloatArray) -> IntArray:
-    """(L,) how many of (N,) points are within ``INLIER_BAND`` of each of (L,) lines."""
+    """Count, for each of (L,) lines, the (N,) points within ``INLIER_BAND`` of it."""
     counts = np.zeros(len(slopes), np.int64)
     for line in range(len(slopes)):
         for i in range(len(x)):

@@ -1,4 +1,4 @@
-"""ONNX networks opened to be run, kept while they are used, and bounded in time and memory."""
+"""Sessions of ONNX networks, cached while they are used, with limits on time and memory."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from pipeline.types import FloatArray
 PREFERRED_PROVIDERS = ("CUDAExecutionProvider", "CPUExecutionProvider")
 THREADS = 2
 MOST_SECONDS = 60.0
-"""For opening a network, and for one image."""
+"""Time limit for loading a network, and for one image."""
 MOST_BYTES = 1_500_000_000
-"""Beside twice its file, the weights as they come and as they are packed to be run."""
+"""Memory limit in addition to twice the file's size, for its weights and their packed copy."""
 
 
 def modified_ns(model_path: Path) -> int:
-    """When a network's file was last written."""
+    """Return when a network's file was last written."""
     if not model_path.is_file():
         raise InputError(f"There is no depth network at {model_path}: name an ONNX file, or none at all.")
     return model_path.stat().st_mtime_ns
@@ -31,10 +31,10 @@ def modified_ns(model_path: Path) -> int:
 
 @lru_cache(maxsize=2)
 def open_session(model_path: Path, modified_ns: int) -> onnxruntime.InferenceSession:
-    """A session with few, non-spinning threads; the last two are kept: opening takes as long as inferring.
+    """Open a session with few, non-spinning threads; the last two are cached, as opening is as slow as inference.
 
     Raises:
-        InputError: no ONNX network, or one that takes too much time or memory.
+        InputError: the file is no ONNX network, or needs too much time or memory.
     """
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = THREADS
@@ -57,11 +57,11 @@ def open_session(model_path: Path, modified_ns: int) -> onnxruntime.InferenceSes
 def run_session(
     session: onnxruntime.InferenceSession, model_path: Path, output: str, image: dict[str, FloatArray]
 ) -> FloatArray:
-    """The output of that name for one image.
+    """Run the network on one image; returns the named output.
 
     Raises:
-        Exception: onnxruntime's, where the network cannot take the image.
-        MemoryError, TimeoutError: it takes too much memory or time.
+        Exception: an onnxruntime error, if the network cannot process the image.
+        MemoryError, TimeoutError: the network needs too much memory or time.
     """
     options = onnxruntime.RunOptions()
     late = threading.Event()
@@ -84,7 +84,7 @@ def run_session(
 
 @contextmanager
 def _bounded(model_path: Path, end: Callable[[], object]) -> Iterator[None]:
-    """Within the time, after which ``end`` is called, and the memory."""
+    """Limit memory in the body, and call ``end`` after the time limit."""
     timer = threading.Timer(MOST_SECONDS, end)
     timer.daemon = True
     timer.start()

@@ -1,4 +1,4 @@
-"""What an ONNX graph maps to what, checked to be one image to one depth map."""
+"""Inputs and outputs of an ONNX graph, checked to be one image and one depth map."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ ACCEPTED = (
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """The image that goes in and the depth that comes out; None where the graph leaves it free."""
+    """Input image and output depth of a network; None where the graph leaves a size or layout open."""
 
     input_name: str
     output_name: str
-    """Of several depth maps the largest, or the first if their sizes are free."""
+    """Largest of several depth maps, or the first if their sizes are open."""
     dtype: str
     """float32 or float16."""
     layout: Layout | None
@@ -32,7 +32,7 @@ class Signature:
 
 
 def signature_of(session: Any, name: str) -> Signature:
-    """The signature of an onnxruntime session, whose network is called ``name`` in errors.
+    """Read the signature of an onnxruntime session; ``name`` is the network's name in errors.
 
     Raises:
         InputError: the graph does not map one image to one depth map.
@@ -59,7 +59,7 @@ def _layout(shape: Shape) -> Layout | None:
 
 
 def _is_image(shape: Shape) -> bool:
-    """Rank 4, one image, and three channels where they are fixed."""
+    """Return whether a shape has rank 4, one image, and three channels unless these are open."""
     if len(shape) != 4 or not _may_be(shape[0], 1):
         return False
     return _layout(shape) is not None or not (_is_fixed(shape[1]) and _is_fixed(shape[3]))
@@ -68,7 +68,7 @@ def _is_image(shape: Shape) -> bool:
 def _is_depth(shape: Shape) -> bool:
     if len(shape) == 4:
         return _may_be(shape[0], 1) and (_may_be(shape[1], 1) or _may_be(shape[3], 1))
-    if len(shape) == 2:  # a fixed number beside a free one is a list of classes
+    if len(shape) == 2:  # a fixed and an open size mean a list of classes
         return 1 not in shape and _is_fixed(shape[0]) == _is_fixed(shape[1])
     return len(shape) == 3 and _may_be(shape[0], 1)
 

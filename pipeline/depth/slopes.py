@@ -1,8 +1,8 @@
-"""Depth from measured pixels and predicted differences: a linear system over a coarse grid.
+"""Depth from measured pixels and predicted differences, by a linear system on a coarse grid.
 
-A network that says how logarithmic depth differs between pixels, and how sure it is, leaves the depth itself
-to least squares: measured pixels are fixed, every difference is a spring (the optimisation layer of OGNI-DC,
-Zuo and Deng 2024; several distances, as in OMNI-DC, Zuo et al. 2025).
+A network predicts differences of logarithmic depth between pixels, and their certainty; least squares finds
+the depth: measured pixels are fixed, every difference is a spring (the optimisation layer of OGNI-DC, Zuo
+and Deng 2024; several distances, as in OMNI-DC, Zuo et al. 2025).
 """
 
 from __future__ import annotations
@@ -23,33 +23,33 @@ DISTANCES = (1, 4, 16)
 CHANNELS_IN = 8
 CHANNELS_OUT = 2 + 4 * len(DISTANCES)
 MULTIPLE = 16
-"""The network takes sides of this multiple; what is added is unknown and black."""
+"""The network's sides are multiples of this; padding is unknown and black."""
 SLOPE_CLIP = 0.05
 SLOPE_SIGMA = 2.0
 LARGEST = 1.5
-"""Logarithmic depths are clipped this far from their median on their way into the network."""
+"""Largest deviation of logarithmic depth from its median in the network's input; larger ones are clipped."""
 LOG_SCALES = (-7.0, 2.0)
-"""Of a difference's Laplace distribution, in logarithmic depth."""
+"""Range of the log scale of a difference's Laplace distribution, in logarithmic depth."""
 STEPS = 200
 TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """A sensor's depth and its colours on the coarse grid."""
+    """A sensor's depth and colours on the coarse grid."""
 
     log_z: FloatArray
     """(H, W) float32 logarithmic depth; zero where unknown."""
     known: BoolArray
-    """(H, W)."""
+    """(H, W) True where the depth is known."""
     rgb: ByteArray
-    """(H, W, 3)."""
+    """(H, W, 3) mean colours."""
 
 
 def coarse(z_m: FloatArray, known: BoolArray, rgb: ByteArray) -> Grid:
-    """Colours averaged over cells of the grid; of each cell's measured depths the middle-most in place.
+    """Reduce colours to means over the grid's cells, and depth to the measured pixel nearest to a cell's centre.
 
-    What the last cells lack of an image that is no whole number of them is unknown.
+    Image sizes that are no multiple of the cell are padded with unknown depth.
     """
     rows, columns = known.shape
     step = cell_px(columns)
@@ -70,17 +70,17 @@ def coarse(z_m: FloatArray, known: BoolArray, rgb: ByteArray) -> Grid:
 
 
 def cell_px(width_px: int) -> int:
-    """Side of a cell in an image of this width."""
+    """Return the side of a cell in pixels, for an image of this width."""
     return max(1, round(width_px / GRID_WIDTH_PX))
 
 
 def network_input(grid: Grid) -> tuple[FloatArray, FloatArray]:
-    """What the network sees, and the fill from which it starts.
+    """Compute the network's input, and the depth from which the solution starts.
 
     Returns:
-        (8, H, W) float32 on a grid of multiples of 16: colours, mask, the nearest logarithmic depth less the
-        frame's median, the distance to it, and the slope measured there; and (H, W) the nearest
-        logarithmic depth, H and W those of the grid.
+        (8, H, W) float32, padded to multiples of 16: colours, mask, nearest logarithmic depth minus the
+            frame's median, distance to it, and the slope measured there; and (H, W) nearest logarithmic depth
+            on the unpadded grid.
     """
     rows, columns = grid.known.shape
     mask = grid.known.astype(np.float32)
@@ -107,7 +107,7 @@ def network_input(grid: Grid) -> tuple[FloatArray, FloatArray]:
 
 
 def measured_slopes(grid: Grid) -> tuple[FloatArray, FloatArray]:
-    """(H, W) slopes of logarithmic depth along x and y, blurred over measured pixels on one surface."""
+    """Return (H, W) slopes of logarithmic depth along x and y, blurred over measured pixels on one surface."""
     slopes = []
     for axis in (1, 0):
         first = tuple(slice(None, -1) if a == axis else slice(None) for a in (0, 1))
@@ -124,14 +124,14 @@ def measured_slopes(grid: Grid) -> tuple[FloatArray, FloatArray]:
 
 
 def solved(grid: Grid, start: FloatArray, output: FloatArray) -> FloatArray:
-    """The logarithmic depth that fits the network's answer best, weighted by how sure it is.
+    """Compute the logarithmic depth that fits the network's output best, weighted by its certainty.
 
     Minimises sum (s(p) - start(p) - m0)^2 / v0 + sum (s(p + d) - s(p) - m)^2 / v over the unknown pixels, by
-    conjugate gradients; v = 2 b^2 is the variance of Laplace's distribution of scale b.
+    conjugate gradients; v = 2 b^2 is the variance of a Laplace distribution with scale b.
 
     Args:
-        grid: what is measured stays as it is.
-        start: (H, W) of ``network_input``.
+        grid: grid whose measured depth is kept.
+        start: (H, W) start from ``network_input``.
         output: (14, H', W') of the network: m0, log b0, then m and log b of every difference.
 
     Returns:
@@ -151,7 +151,7 @@ def solved(grid: Grid, start: FloatArray, output: FloatArray) -> FloatArray:
 
 
 def _balance(grid: Grid, guess: FloatArray, said: FloatArray) -> tuple[csr_matrix, FloatArray]:
-    """The linear system (N, N) and its right side (N,) in the unknown pixels' depth."""
+    """Build the linear system (N, N) and its right side (N,) for the unknown pixels' depth."""
     rows, columns = grid.known.shape
     count = len(guess)
     place = np.full(grid.known.shape, -1)
@@ -175,12 +175,12 @@ def _balance(grid: Grid, guess: FloatArray, said: FloatArray) -> tuple[csr_matri
 
 
 def _stiffness(log_scale: FloatArray) -> FloatArray:
-    """Inverse variance of Laplace's distribution."""
+    """Return the inverse variance of a Laplace distribution."""
     return 0.5 * np.exp(-2.0 * np.clip(log_scale, *LOG_SCALES))
 
 
 def _ends(rows: int, columns: int) -> Iterator[tuple[tuple[slice, ...], tuple[slice, ...]]]:
-    """Where the near and the far ends of the differences lie: of every distance, along x then y."""
+    """Yield the areas of the differences' near and far ends, for each distance along x, then y."""
     for distance in DISTANCES:
         yield np.s_[:, : max(0, columns - distance)], np.s_[:, distance:]
         yield np.s_[: max(0, rows - distance), :], np.s_[distance:, :]

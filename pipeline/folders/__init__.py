@@ -1,1 +1,1 @@
-"""What commands leave on disk: a reconstruction, a delivery, a registered pair."""
+"""Output folders of commands: a reconstruction, a delivery, a registered pair."""

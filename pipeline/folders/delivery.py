@@ -1,4 +1,4 @@
-"""What a delivery leaves on disk: the run folder of what arrived in the end, and a table of moments."""
+"""Output folder of a delivery: the run folder of all that arrived, and a table of moments."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pipeline.folders.run import (
 
 
 def delivery_metrics(delivery: Delivery) -> dict[str, Any]:
-    """The numbers of a delivery: every length in metres, every share from 0 to 1."""
+    """Return the metrics of a delivery: lengths in metres, shares from 0 to 1."""
     lossless = delivery.lossless
     return {
         "moments": [_moment(moment) for moment in delivery.moments],
@@ -33,15 +33,15 @@ def delivery_metrics(delivery: Delivery) -> dict[str, Any]:
 
 
 def raw_bytes(delivery: Delivery) -> int:
-    """Bytes of all colour images at 8 bits a channel and all depth images at 16 bits."""
+    """Return the bytes of all colour images at 8 bits per channel and all depth images at 16 bits."""
     return sum(5 * frame.rgb.shape[0] * frame.rgb.shape[1] for frame in delivery.sending.rig.frames)
 
 
 def write_delivery_folder(delivery: Delivery, metrics: dict[str, Any], preset: str, folder: Path) -> None:
-    """Write everything but the hand-out into ``folder``, each file whole or not at all.
+    """Write everything but the report into ``folder``, each file whole or not at all.
 
-    Of what had arrived in the end there is what ``packetmesh reconstruct`` writes; where that was too
-    little for a surface, only config.json, metrics.json and moments.csv.
+    Writes what ``packetmesh reconstruct`` writes, for all that arrived; if that was too little for a
+    surface, only config.json, metrics.json and moments.csv.
 
     Raises:
         InputError: the folder cannot be written.
@@ -63,7 +63,7 @@ def write_delivery_folder(delivery: Delivery, metrics: dict[str, Any], preset: s
 
 
 def summary(delivery: Delivery) -> str:
-    """What arrived and what it is good for, in a sentence."""
+    """Describe in a sentence what arrived and how good its surface is."""
     last, sent = delivery.moments[-1], sum(len(stream) for stream in delivery.sending.streams)
     if not last.delivered_bytes:
         return f"of {sent:,} bytes none arrived within {last.t_s:.3g} s"
@@ -105,7 +105,7 @@ def _f_score(truth: dict[str, float] | None) -> float | None:
 
 
 def _write_table(moments: tuple[Moment, ...], path: Path) -> None:
-    """One row a moment; shares from 0 to 1, empty where there is no surface or no truth."""
+    """Write one row per moment; shares from 0 to 1, empty without surface or truth."""
     rows = [_row(moment) for moment in moments]
     with atomic_path(path) as sibling, sibling.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(rows[0]))

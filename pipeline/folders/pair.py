@@ -1,4 +1,4 @@
-"""What the registration of two clouds leaves on disk: pose, numbers, steps and the moved cloud."""
+"""Output folder of the registration of two clouds: pose, metrics, steps and the moved cloud."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _STEP_COLUMNS = (
 
 
 def answer_metrics(answers: Iterable[Answer], with_truth: bool) -> dict[str, dict[str, Any]]:
-    """The numbers by method, as ``metrics.json`` has them."""
+    """Return the metrics by method, as stored in ``metrics.json``."""
     names = ["T_target_source", "iterations", "stop_reason", "rmse_m", "average_hausdorff_m", "elapsed_s"]
     if with_truth:
         names.append("point_error_m")
@@ -34,17 +34,17 @@ def answer_metrics(answers: Iterable[Answer], with_truth: bool) -> dict[str, dic
 
 
 def _draws(answer: Answer) -> dict[str, Any]:
-    """How far the draws of the points agree, where there were several."""
+    """Return how well the random draws of points agree, if there were several."""
     if answer.draws == 1:
         return {}
     return {"draws": answer.draws, "spread_m": answer.spread_m, "draws_agree": answer.agreed}
 
 
 def chosen_pose(answers: Sequence[Answer]) -> FloatArray:
-    """The (4, 4) pose of the only answer, or of CEICP-A, or of the first method that has one.
+    """Return the (4, 4) pose of CEICP-A if it found one, else of the first method that did.
 
     Raises:
-        ReconstructionError: no method determined the pose; the sentence says why.
+        ReconstructionError: no method determined the pose; the message says why.
     """
     good = [answer for answer in answers if not answer.failed]
     if not good:
@@ -66,12 +66,12 @@ def write_register_folder(
     """Write config.json, steps.csv, transform.txt, aligned.ply and metrics.json, each whole or not at all.
 
     Args:
-        folder: made if it is missing.
-        answers: of all methods that ran.
-        source: the cloud as it was read, to be moved by ``chosen_pose``.
+        folder: created if it is missing.
+        answers: answers of all methods that ran.
+        source: the source cloud as it was read; ``chosen_pose`` is applied to it.
         config: settings of the registration.
-        command: how the command line was called; ``config.json`` holds it beside the settings.
-        with_truth: whether ``metrics.json`` holds errors against a true pose.
+        command: arguments of the command line, stored in ``config.json`` with the settings.
+        with_truth: whether ``metrics.json`` contains errors against a true pose.
 
     Raises:
         InputError: the folder cannot be written.
@@ -89,7 +89,7 @@ def write_register_folder(
 
 
 def _write_steps(path: Path, answers: Iterable[Answer]) -> None:
-    """One line an iteration; the pose after it row by row, blanks between its numbers."""
+    """Write one line per iteration; the pose after it is written row by row, separated by blanks."""
     with atomic_path(path) as sibling, sibling.open("w", newline="") as file:
         table = csv.writer(file)
         table.writerow(["method", "elapsed_s", "pairs", *_STEP_COLUMNS, "T_target_source"])

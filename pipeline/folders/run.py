@@ -1,4 +1,4 @@
-"""What a reconstruction leaves on disk: its settings, its numbers, its clouds and its surfaces."""
+"""Output folder of a reconstruction: settings, metrics, clouds and surfaces."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MESH_FILES = ("surface_before.ply", "surface_after.ply", "surface.glb")
 
 
 def clear_run_folder(folder: Path) -> None:
-    """Delete what an earlier run left there, whole or interrupted, the metrics first.
+    """Delete the files of an earlier run, complete or interrupted, the metrics first.
 
     Raises:
         InputError: the folder cannot be written.
@@ -49,14 +49,14 @@ def write_run_folder(
 ) -> list[Path]:
     """Write everything but the report into ``folder``, each file whole or not at all.
 
-    The metrics come last: where they are, everything is there, and of one run. A surface without a
-    triangle, where the ball falls through everywhere, leaves no mesh file.
+    The metrics are written last: if they exist, all files exist and belong to one run. A surface without
+    triangles, if the ball rests nowhere, gets no mesh file.
 
     Args:
-        reconstruction: what is written.
-        metrics: its numbers.
-        folder: where; made when it is missing.
-        config: how the run was asked for; None takes ``config_of``.
+        reconstruction: the reconstruction to write.
+        metrics: its metrics.
+        folder: output folder, created if it is missing.
+        config: record of the run's settings; None uses ``config_of``.
 
     Returns:
         The files written.
@@ -82,26 +82,26 @@ def write_run_folder(
 
 
 def write_baseline(name: str, surface: SurfaceResult, reconstruction: Reconstruction, folder: Path) -> None:
-    """Write the surface of a baseline over the same points beside the run's own, as PLY and GLB."""
+    """Write the surface of a baseline next to the run's own, as PLY and GLB."""
     texture = dressed(reconstruction.rig, reconstruction.placement, surface)
     write_mesh(folder / f"surface_{name}.ply", surface)
     write_mesh(folder / f"surface_{name}.glb", surface, texture)
 
 
 def config_of(spec: Spec) -> dict[str, Any]:
-    """What is recorded of how a run was asked for; as a file, it is itself a preset."""
+    """Return the record of a run's settings; its file can be used as a preset."""
     return {"scene": spec.source.title, "preset": spec.preset, "settings": settings(spec.config)}
 
 
 def clouds_of(clouds: MergedClouds) -> dict[str, PointCloud]:
-    """The clouds of a run by the names of their files."""
+    """Return the clouds of a run by the names of their files."""
     fused = clouds.fused
     inferred = fused.select(fused.source == PointSource.INFERRED) if fused.source is not None else fused
     return dict(zip(CLOUD_FILES, (clouds.sensor, inferred, fused), strict=True))
 
 
 def metrics_of(reconstruction: Reconstruction) -> dict[str, Any]:
-    """The numbers of a run; every length in metres, every share from 0 to 1."""
+    """Return the metrics of a run: lengths in metres, shares from 0 to 1."""
     before, after, placement = reconstruction.before, reconstruction.after, reconstruction.placement
     truth = None
     if reconstruction.truth_before or reconstruction.truth_after:
@@ -171,17 +171,17 @@ def _registration(item: NodeRegistration, reconstruction: Reconstruction) -> dic
 
 
 def _agreement(found: Agreement) -> dict[str, float]:
-    """Of what two cameras both measured."""
+    """Return the agreement of two cameras' measurements as metrics."""
     return {"overlap_share": found.overlap_share, "within_2pct_share": found.within_2pct_share}
 
 
 def _place(verdict: NodeVerdict) -> dict[str, Any]:
-    """Whether a node found its place, and how well it fits all others there."""
+    """Return whether a node's pose was found, and its agreement with all other nodes."""
     return {"placed": verdict.placed, "sentence": verdict.sentence} | _agreement(verdict.agreement)
 
 
 def surface_metrics(surface: SurfaceResult) -> dict[str, Any]:
-    """The measures of one surface by name."""
+    """Return the measures of a surface by name."""
     return {
         "radii_m": surface.radii_m,
         "vertices": len(surface.vertices_m),

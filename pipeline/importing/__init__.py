@@ -1,4 +1,4 @@
-"""Other people's recordings as rig folders: colour and depth images in the layouts of the field."""
+"""Import of recordings from other programs and data sets as rig folders."""
 
 from pipeline.importing.import_rig import ImportReport, is_recording, iterate_import
 

@@ -1,4 +1,4 @@
-"""Bags of ROS 1 and ROS 2 (.bag, .db3, .mcap or a bag's folder): cameras, and the moments they share."""
+"""Import of ROS 1 and ROS 2 bags (.bag, .db3, .mcap or a bag's folder): cameras and simultaneous images."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from pipeline.kernels.geometry import inverse
 from pipeline.types import MAX_NODES, CameraIntrinsics, FloatArray
 
 PROGRESS_EVERY = 20
-"""Images that are looked at before progress is told."""
+"""Number of images between progress reports."""
 LARGEST_GAP_S = 0.05
-"""Between images that are taken as of one moment: more than a frame at 30 Hz."""
+"""Largest time difference of images that count as simultaneous: more than one frame at 30 Hz."""
 _SUFFIXES = (".bag", ".db3", ".mcap")
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _TRANSPORTS = ("compressed", "compressedDepth")
@@ -37,27 +37,27 @@ _TRANSPORTS = ("compressed", "compressedDepth")
 
 @dataclass(frozen=True, slots=True)
 class BagNodes:
-    """The nodes that a bag gives."""
+    """The nodes read from a bag."""
 
     nodes: tuple[tuple[float, NodeImages], ...]
-    """With the time of each, seconds."""
+    """Time in seconds, and images, of each node."""
     candidates: int
-    """Colour images of the first camera."""
+    """Number of colour images of the first camera."""
     units_per_metre: float
     notes: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class _Topic:
-    """The images of one topic."""
+    """Times of the images of one topic."""
 
     connection: Any
     frame: str
     camera: CameraIntrinsics | None
     times_s: FloatArray
-    """(N,) when each was taken, by its header."""
+    """(N,) time of each image, from its header."""
     recorded_ns: list[int]
-    """(N,) when each came into the bag, by which it is found again."""
+    """(N,) time at which each image was recorded, by which the bag finds it."""
 
     @property
     def name(self) -> str:
@@ -65,15 +65,15 @@ class _Topic:
 
 
 def is_bag(path: Path) -> bool:
-    """Whether it is a bag's file or the folder of a ROS 2 bag."""
+    """Return whether a path is a bag's file or the folder of a ROS 2 bag."""
     return (path.is_file() and path.suffix in _SUFFIXES) or (path / "metadata.yaml").is_file()
 
 
 def iterate_bag(path: Path, frames: int, depth_scale: float | None) -> Generator[Progress, None, BagNodes]:
-    """Of several cameras the images of one moment, of one camera ``frames`` moments spread over the bag.
+    """Read several cameras' images of one moment, or ``frames`` evenly spread moments of a single camera.
 
     Raises:
-        InputError: no bag, no colour, depth or camera_info, or clocks that disagree.
+        InputError: no bag, no colour, depth or camera_info, or no images of one time.
     """
     with _opened(path) as reader:
         topics = yield from _image_topics(reader)
@@ -113,7 +113,7 @@ def _opened(path: Path) -> Iterator[Any]:
 
 
 def _image_topics(reader: Any) -> Generator[Progress, None, tuple[list[_Topic], list[_Topic]]]:
-    """Colour and depth, in the order of their names."""
+    """Return the colour topics and the depth topics, sorted by name."""
     found: tuple[list[_Topic], list[_Topic]] = ([], [])
     connections = [own for own in reader.connections if own.msgtype in _IMAGES]
     images, seen = max(1, sum(connection.msgcount for connection in connections)), 0
@@ -146,9 +146,9 @@ def _camera_info(reader: Any, topic: str) -> CameraIntrinsics | None:
 def _pairs(
     path: Path, colors: list[_Topic], depths: list[_Topic]
 ) -> tuple[list[tuple[_Topic, _Topic]], list[str]]:
-    """Each depth topic with the colour topic of its frame, or else of the most similar name; one a colour.
+    """Pair each depth topic with the colour topic of its frame, or else of the most similar name.
 
-    With a sentence for each topic that is left out.
+    Every colour topic is used once. Also returns a sentence for each topic that is left out.
     """
     for topics, what in ((colors, "colour"), (depths, "depth")):
         if not topics:
@@ -177,13 +177,13 @@ def _pairs(
 
 
 def _common(first: str, second: str) -> int:
-    """Parts that two topics' names begin with alike."""
+    """Return the number of equal leading parts of two topics' names."""
     same = [a == b for a, b in zip(first.split("/"), second.split("/"), strict=False)]
     return same.index(False) if False in same else len(same)
 
 
 def _moments(path: Path, pairs: list[tuple[_Topic, _Topic]], frames: int) -> list[FloatArray]:
-    """(cameras, 2) times of colour and depth of each chosen moment."""
+    """Return the (cameras, 2) times of colour and depth for each chosen moment."""
     reference_s = pairs[0][0].times_s
     times_s = np.stack(
         [np.stack([_nearest(topic.times_s, reference_s) for topic in pair], axis=1) for pair in pairs], axis=1
@@ -210,7 +210,7 @@ def _nearest(times_s: FloatArray, wanted_s: FloatArray) -> FloatArray:
 
 
 def _static_transforms(reader: Any) -> tuple[dict[str, dict[str, FloatArray]], dict[str, str]]:
-    """T_a_b of all frames a and b that static transforms link, metres; and the parent of each frame."""
+    """Return T_a_b, metres, of all frames linked by static transforms, and the parent of each frame."""
     parents: dict[str, str] = {}
     links: dict[str, dict[str, FloatArray]] = {}
     connections = [own for own in reader.connections if own.topic.lstrip("/") == "tf_static"]
@@ -224,7 +224,7 @@ def _static_transforms(reader: Any) -> tuple[dict[str, dict[str, FloatArray]], d
 
 
 def _root(frame: str, parents: dict[str, str]) -> str:
-    """The frame above all, which by ROS's convention (REP 103) has z up."""
+    """Return a frame's topmost ancestor, which by ROS's convention (REP 103) has z up."""
     above = [frame]
     while above[-1] in parents and parents[above[-1]] not in above:
         above.append(parents[above[-1]])

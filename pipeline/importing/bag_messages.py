@@ -1,4 +1,4 @@
-"""Images, cameras and transforms as ROS messages hold them."""
+"""Conversion of ROS messages to images, cameras and transforms."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ _DEPTHS: dict[str, np.dtype[Any]] = {
 }
 _COMPRESSED_DEPTH = "compressedDepth"
 _CONFIG_BYTES = 12
-"""Before the PNG or RVL of compressed depth: its format and two numbers by which 32FC1 is quantised."""
+"""Header before the PNG or RVL data of compressed depth: format and two parameters that quantise 32FC1."""
 
 
 def is_depth(message: Any) -> bool:
-    """Whether an Image or CompressedImage holds depth."""
+    """Return whether an Image or CompressedImage contains depth."""
     if hasattr(message, "format"):
         return _COMPRESSED_DEPTH in message.format
     return message.encoding in _DEPTHS
 
 
 def stamp_s(raw: bytes, is_ros2: bool) -> float:
-    """Time in the header of a message, before anything else of it is read.
+    """Read the time from a message's header without deserialising the message.
 
-    It comes after a sequence number of ROS 1, or after four bytes that describe ROS 2's encoding.
+    It follows the sequence number in ROS 1, or four bytes that describe the encoding in ROS 2.
     """
     order = ">" if is_ros2 and raw[1] == 0 else "<"
     seconds, nanoseconds = struct.unpack_from(f"{order}II", raw, 4)
@@ -45,10 +45,10 @@ def stamp_s(raw: bytes, is_ros2: bool) -> float:
 
 
 def color_of(message: Any, topic: str) -> ByteArray:
-    """(H, W, 3) RGB of an Image or CompressedImage.
+    """Return an Image or CompressedImage as (H, W, 3) RGB.
 
     Raises:
-        InputError: an encoding that is not known, or a damaged image.
+        InputError: the encoding is unknown, or the image is damaged.
     """
     if hasattr(message, "format"):
         bgr = cv2.imdecode(np.asarray(message.data), cv2.IMREAD_COLOR)
@@ -65,10 +65,10 @@ def color_of(message: Any, topic: str) -> ByteArray:
 
 
 def depth_values_of(message: Any, topic: str) -> NDArray[Any]:
-    """(H, W) values: whole millimetres of 16UC1, metres in floating point of 32FC1 (REP 118).
+    """Return (H, W) values: integer millimetres of 16UC1, or floating-point metres of 32FC1 (REP 118).
 
     Raises:
-        InputError: an encoding that is not known, or a damaged image.
+        InputError: the encoding is unknown, or the image is damaged.
     """
     if hasattr(message, "format"):
         return _compressed_depth(message, topic)
@@ -77,10 +77,10 @@ def depth_values_of(message: Any, topic: str) -> NDArray[Any]:
 
 
 def camera_in(message: Any, topic: str) -> CameraIntrinsics:
-    """Of a CameraInfo, whose fields ROS 1 writes in capitals.
+    """Return the camera of a CameraInfo, whose field names are capitals in ROS 1.
 
     Raises:
-        InputError: a lens that is not Brown-Conrady of five coefficients, or no calibration.
+        InputError: the lens is not Brown-Conrady with five coefficients, or not calibrated.
     """
     d = np.asarray(message.d if hasattr(message, "d") else message.D, float)
     matrix = np.asarray(message.k if hasattr(message, "k") else message.K, float).reshape(3, 3)
@@ -95,7 +95,7 @@ def camera_in(message: Any, topic: str) -> CameraIntrinsics:
 
 
 def transform_in(message: Any) -> FloatArray:
-    """(4, 4) T_parent_child of a TransformStamped, metres."""
+    """Return the (4, 4) T_parent_child of a TransformStamped, metres."""
     q, t = message.transform.rotation, message.transform.translation
     rotation = Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix()
     return rigid(rotation, np.array([t.x, t.y, t.z]))
@@ -118,7 +118,7 @@ def _compressed_depth(message: Any, topic: str) -> NDArray[Any]:
 
 
 def _rvl(data: bytes) -> np.ndarray | None:
-    """Depth after the configuration, width and height; None if it is damaged."""
+    """Decode RVL depth after the configuration, width and height; None if it is damaged."""
     try:
         width_px, height_px = struct.unpack_from("<II", data, _CONFIG_BYTES)
         return decode_rvl(data[_CONFIG_BYTES + 8 :], width_px, height_px)
@@ -127,7 +127,7 @@ def _rvl(data: bytes) -> np.ndarray | None:
 
 
 def _rows(message: Any, type_: np.dtype, channels: int, topic: str) -> np.ndarray:
-    """(H, W * channels) values without what pads the rows."""
+    """Return the (H, W * channels) values without the padding of the rows."""
     wanted = message.width * channels * type_.itemsize
     if message.step < wanted or len(message.data) < message.step * message.height:
         raise InputError(f"An image of {topic} is shorter than its size says; try to record again")

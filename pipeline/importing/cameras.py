@@ -1,4 +1,4 @@
-"""The camera of a recording: a file beside the images, or what the data set is known to have used."""
+"""Camera of a recording, from a file next to the images or from the data set's documentation."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from pipeline.io.intrinsics import read_intrinsics
 from pipeline.types import CameraIntrinsics
 
 PRIMESENSE = CameraIntrinsics.pinhole(525.0, 525.0, 319.5, 239.5, 640, 480)
-"""The factory's numbers for a Kinect or an Asus Xtion, which ROS and Open3D assume, too."""
+"""Factory intrinsics of a Kinect or Asus Xtion, which ROS and Open3D also assume."""
 
 
 def camera_of(
     folder: Path, color: Path, given: Path | None, default: CameraIntrinsics | None, default_name: str
 ) -> tuple[CameraIntrinsics, tuple[str, ...]]:
-    """The camera of a recording and a note if it had to be assumed.
+    """Return the camera of a recording, and a note if it had to be assumed.
 
     Args:
-        folder: of the recording; its JSON files, then its and its parent's \\*intrinsic\\*.txt are looked at.
+        folder: folder of the recording; JSON files in it, then \\*intrinsic\\*.txt in it and above are tried.
         color: one of the colour images.
-        given: intrinsics that the person names, which come first.
-        default: if there is no such file.
-        default_name: whose that is, for the note.
+        given: intrinsics file given by the user, which is preferred.
+        default: camera to assume if there is no such file.
+        default_name: description of the default, for the note.
 
     Raises:
-        InputError: none of these gives a camera, or it is for images of another size.
+        InputError: no camera is found, or it is for images of another size.
     """
     height_px, width_px = read_color(color).shape[:2]
     size_px = width_px, height_px
@@ -49,7 +49,7 @@ def _in_files(folder: Path, size_px: tuple[int, int]) -> CameraIntrinsics | None
     for path in sorted(folder.glob("*.json")):
         try:
             return read_intrinsics(path)
-        except InputError:  # JSON of something else
+        except InputError:  # JSON of another kind
             continue
     for path in [*sorted(folder.glob("*intrinsic*.txt")), *sorted(folder.parent.glob("*intrinsic*.txt"))]:
         return read_intrinsics(path, size_px)

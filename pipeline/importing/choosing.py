@@ -1,4 +1,4 @@
-"""Which few frames of a long recording make a rig: apart from each other, and yet of the same things."""
+"""Choice of a few frames of a long recording for a rig: different views that still overlap."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from pipeline.kernels.geometry import apply, inverse, pixel_rays, scaled
 from pipeline.types import CameraIntrinsics, FloatArray
 
 LEAST_OVERLAP = 0.5
-"""Share of a chosen frame that another chosen one sees, too: registration needs about half."""
+"""Share of a chosen frame that another chosen frame also sees; registration needs about half."""
 MOST_COMPARED = 150
-"""Frames, spread over the recording, between which a choice is made; the work grows with its square."""
+"""Most frames, spread over the recording, that are compared; the work grows with the square."""
 _GRID_PX = 12
 _DEPTHS = (0.6, 1.0, 1.6)
-"""Of the points that stand for what a camera sees, in typical depths."""
+"""Depths, in typical depths, of the points that represent what a camera sees."""
 
 
 def choose(sequence: Sequence, count: int, typical_depth_m: float) -> tuple[int, ...]:
-    """Indices of at most ``count`` candidates, in the order of time.
+    """Choose at most ``count`` candidates; returns their indices in order of time.
 
-    With poses: starts from the view that shares most with all others, then takes the one that shares least
-    with those chosen, but no less than ``LEAST_OVERLAP`` with one of them. Without poses: spread evenly.
+    With poses: the first view has the largest overlap with all others; each next one has the smallest overlap
+    with the chosen views, but at least ``LEAST_OVERLAP`` with one of them. Without poses: spread evenly.
 
     Args:
-        sequence: whose images are not read.
-        count: frames wanted.
-        typical_depth_m: how far away things are.
+        sequence: the recording; its images are not read.
+        count: number of frames to choose.
+        typical_depth_m: typical distance of the scene.
     """
     number = len(sequence.candidates)
     if count >= number:
@@ -42,11 +42,11 @@ def choose(sequence: Sequence, count: int, typical_depth_m: float) -> tuple[int,
 
 
 def apart_but_overlapping(shared: FloatArray, count: int) -> list[int]:
-    """Indices of at most ``count`` views; fewer where no other one overlaps with those chosen.
+    """Choose at most ``count`` views; fewer if no other view overlaps with those chosen.
 
     Args:
         shared: (N, N) symmetric overlaps, 0 to 1.
-        count: of views, at least one.
+        count: number of views, at least one.
     """
     chosen = [int(shared.sum(axis=0).argmax())]
     while len(chosen) < min(count, len(shared)):
@@ -60,15 +60,15 @@ def apart_but_overlapping(shared: FloatArray, count: int) -> list[int]:
 
 
 def overlaps(T_world_camera: FloatArray, camera: CameraIntrinsics, typical_depth_m: float) -> FloatArray:
-    """(N, N) share of what one view sees that the other sees, too; the smaller of both directions.
+    """Compute (N, N) shares of each view that another view also sees; the smaller of both directions.
 
-    What a view sees is stood for by points on a grid of its rays at three depths. A point that the other
-    view sees counts by the cosine between both rays to it: a surface that faces one is oblique to the other.
+    A view is represented by points on a grid of its rays at three depths. A point that the other view sees
+    counts by the cosine between the two rays, because a surface that faces one is oblique to the other.
 
     Args:
-        T_world_camera: (N, 4, 4), metres.
-        camera: of all views.
-        typical_depth_m: how far away things are.
+        T_world_camera: (N, 4, 4) poses, metres.
+        camera: camera of all views.
+        typical_depth_m: typical distance of the scene.
     """
     small = scaled(camera, _GRID_PX / max(camera.width_px, camera.height_px))
     rays = pixel_rays(small).reshape(-1, 3)
@@ -81,7 +81,7 @@ def overlaps(T_world_camera: FloatArray, camera: CameraIntrinsics, typical_depth
 
 
 def _seen(points_m: FloatArray, T_other_own: FloatArray, camera: CameraIntrinsics) -> float:
-    """Share of one view's (N, 3) points that another sees, weighted by the cosine between the rays."""
+    """Return the share of one view's (N, 3) points that another sees, weighted by the cosine between rays."""
     other_m = apply(T_other_own, points_m)
     x, y, z = other_m.T
     ahead = z > 1e-6
@@ -97,5 +97,5 @@ def _seen(points_m: FloatArray, T_other_own: FloatArray, camera: CameraIntrinsic
 
 
 def _spread(number: int, count: int) -> tuple[int, ...]:
-    """``count`` of so many indices, evenly."""
+    """Return ``count`` indices spread evenly over ``number``."""
     return tuple(np.linspace(0, number - 1, count).round().astype(int).tolist())

@@ -1,4 +1,4 @@
-"""COLMAP's text models: where photographs were taken from, with dense or measured depth.
+"""Import of COLMAP's text models: poses of photographs, with dense or measured depth.
 
 Schönberger and Frahm, "Structure-from-Motion Revisited", CVPR 2016; https://colmap.github.io/format.html.
 """
@@ -23,9 +23,9 @@ from pipeline.kernels.geometry import inverse, rigid, scaled
 from pipeline.types import CameraIntrinsics, FloatArray
 
 CENTRE_PX = 0.5
-"""Where COLMAP puts the middle of the first pixel; here it is 0 (SPEC 1.1)."""
+"""Coordinate of the first pixel's centre in COLMAP; here it is 0 (SPEC 1.1)."""
 LEAST_POINTS = 20
-"""Points with measured depth that tell how long a unit of the model is."""
+"""Least number of points with measured depth that determine the model's scale."""
 _PARAMETERS = {
     "SIMPLE_PINHOLE": ("fx", "cx", "cy"),
     "PINHOLE": ("fx", "fy", "cx", "cy"),
@@ -41,7 +41,7 @@ _DEPTH_FOLDERS = ("depth", "depths", "depth_images")
 
 @dataclass(frozen=True, slots=True)
 class _Image:
-    """One line of images.txt and the one after it."""
+    """An image from two lines of images.txt."""
 
     camera: int
     name: str
@@ -52,18 +52,18 @@ class _Image:
 
 
 def is_colmap(folder: Path) -> bool:
-    """Whether it has cameras.txt and images.txt, itself or in sparse/."""
+    """Return whether a folder contains a model's cameras and images, directly or in sparse/."""
     return _model_folder(folder, ".txt") is not None or _model_folder(folder, ".bin") is not None
 
 
 def read_colmap(folder: Path, intrinsics: Path | None) -> Sequence:
-    """The registered images that have depth, of the camera that took the most of them.
+    """Read the registered images with depth, of the camera that took most of them.
 
-    Depth comes from ``stereo/depth_maps``, in the model's own unit, or from images of a depth sensor in
-    ``depth/`` with the names of the photographs, which then say how long a unit of the model is.
+    Depth is read from ``stereo/depth_maps``, in the model's unit, or from a depth sensor's images in
+    ``depth/`` with the names of the photographs, which then determine the model's scale.
 
     Raises:
-        InputError: a binary or damaged model, a camera model without our distortion, or no depth.
+        InputError: the model is binary or damaged, its camera model is not supported, or depth is missing.
     """
     model = _model_folder(folder, ".txt")
     if model is None:
@@ -118,10 +118,10 @@ def read_colmap(folder: Path, intrinsics: Path | None) -> Sequence:
 
 
 def read_depth_map(path: Path) -> FloatArray:
-    """(H, W) depth of ``stereo/depth_maps``, in the model's unit; 0 where it is unknown.
+    """Read an (H, W) depth map from ``stereo/depth_maps``, in the model's unit; 0 where it is unknown.
 
     Raises:
-        InputError: it is damaged, too large, of more than one channel or without any depth.
+        InputError: it is damaged, too large, has several channels or no depth.
     """
     data = read_bytes(path, MAX_IMAGE_BYTES, "depth map")
     words = data[:64].split(b"&", 3)
@@ -139,7 +139,7 @@ def read_depth_map(path: Path) -> FloatArray:
 
 
 def _metres_a_unit(file: Path, frames: list[tuple[_Image, Path]], units_per_metre: float) -> float:
-    """The median ratio of the depth that a sensor measured at the model's points to their depth in it."""
+    """Return the metres per unit of the model: median ratio of measured depth to depth of model points."""
     points = _points(file)
     ratios = [np.empty(0)]
     for image, depth in frames[:: -(-len(frames) // 20)]:
@@ -151,7 +151,7 @@ def _metres_a_unit(file: Path, frames: list[tuple[_Image, Path]], units_per_metr
         z = (places @ image.T_camera_model[:3, :3].T + image.T_camera_model[:3, 3])[:, 2]
         units = read_depth_units(depth)
         height_px, width_px = units.shape
-        pixels = np.array([(y, x) for x, y, _ in seen]).astype(int)  # COLMAP's pixel 0 is from 0 to 1
+        pixels = np.array([(y, x) for x, y, _ in seen]).astype(int)  # COLMAP's pixel 0 extends from 0 to 1
         inside = ((pixels >= 0) & (pixels < (height_px, width_px))).all(axis=1) & (z > 0)
         measured = units[tuple(pixels[inside].T)] / units_per_metre
         ratios.append((measured / z[inside])[measured > 0])
@@ -165,7 +165,7 @@ def _metres_a_unit(file: Path, frames: list[tuple[_Image, Path]], units_per_metr
 
 
 def _depth_camera(camera: CameraIntrinsics, depth: Path) -> CameraIntrinsics | None:
-    """The camera of depth that is smaller than its photograph; None where both have the same size."""
+    """Return the camera of a depth image smaller than its photograph; None if both have the same size."""
     shape = read_depth_map(depth).shape if depth.suffix == ".bin" else read_depth_units(depth).shape
     if shape == (camera.height_px, camera.width_px):
         return None
@@ -179,7 +179,7 @@ def _depth_camera(camera: CameraIntrinsics, depth: Path) -> CameraIntrinsics | N
 
 
 def _cameras(file: Path) -> dict[int, CameraIntrinsics]:
-    """Those whose model we have, by their numbers."""
+    """Read the cameras with supported models, by their ids."""
     cameras, others = {}, set()
     for line in _lines(file):
         words = line.split()
@@ -204,7 +204,7 @@ def _cameras(file: Path) -> dict[int, CameraIntrinsics]:
 
 
 def _images(file: Path) -> Iterator[_Image]:
-    """Every other line is of an image; the one after it may be empty."""
+    """Yield the images: each has two lines, of which the second may be empty."""
     lines = [line for line in _text(file).splitlines() if not line.startswith("#")]
     for line, points in zip(lines[::2], [*lines[1::2], ""], strict=False):
         words = line.split(maxsplit=9)
@@ -219,7 +219,7 @@ def _images(file: Path) -> Iterator[_Image]:
 
 
 def _points(file: Path) -> dict[int, FloatArray]:
-    """(3,) places in the model's unit by the numbers of the points."""
+    """Read (3,) positions of the points by their ids, in the model's unit."""
     rows = [line.split(maxsplit=4)[:4] for line in _lines(file)]
     values = _numbers([word for row in rows for word in row], 4, file)
     return {int(row[0]): row[1:] for row in values}
@@ -234,7 +234,7 @@ def _text(file: Path) -> str:
 
 
 def _numbers(words: list[str], columns: int, file: Path) -> FloatArray:
-    """(N, columns) of so many words."""
+    """Convert words to (N, columns) numbers."""
     try:
         values = np.array(words, dtype=np.float64).reshape(-1, columns)
     except ValueError:
@@ -253,7 +253,7 @@ def _model_folder(folder: Path, suffix: str) -> Path | None:
 
 
 def _beside(folder: Path, places: tuple[str, ...], name: str) -> Path | None:
-    """A file of that name in one of the places; none outside the folder."""
+    """Find a file in the first of several subfolders that has it; None if no subfolder has it."""
     named_inside(folder, name, "images.txt")
     return next((path for place in places if (path := folder / place / name).is_file()), None)
 

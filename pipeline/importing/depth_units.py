@@ -1,4 +1,4 @@
-"""What the values of a recording's depth images mean."""
+"""Depth images of recordings, converted to metres."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ _ROTATED_SHARE = 0.95
 
 
 def depth_in(path: Path, sequence: Sequence) -> ReadDepth:
-    """One depth image of a recording.
+    """Read one depth image of a recording.
 
     Raises:
-        InputError: it cannot be read, or holds nothing within 65 m.
+        InputError: it cannot be read, or has no depth within 65 m.
     """
     if path.suffix == ".bin":
         return depth_of(str(path), read_depth_map(path), sequence.units_per_metre, sequence.scale_stated)
@@ -43,16 +43,16 @@ def depth_in(path: Path, sequence: Sequence) -> ReadDepth:
 
 
 def depth_of(name: str, values: NDArray[Any], units_per_metre: float, stated: bool) -> ReadDepth:
-    """(H, W) values at a scale, without what a rig's folder cannot hold.
+    """Convert (H, W) values to metres, without depths that a rig's folder cannot store.
 
     Args:
-        name: of the image, for the error.
-        values: some of them known.
-        units_per_metre: the scale.
-        stated: whether a person gave it.
+        name: name of the image, for the error.
+        values: depth values, some of them known.
+        units_per_metre: depth units per metre.
+        stated: whether the user gave the scale.
 
     Raises:
-        InputError: nothing within 65 m.
+        InputError: there is no depth within 65 m.
     """
     known = known_in(values)
     z_m = (values / units_per_metre).astype(np.float32)
@@ -66,10 +66,10 @@ def depth_of(name: str, values: NDArray[Any], units_per_metre: float, stated: bo
 
 
 def has_rotated_bits(units: NDArray[Any]) -> bool:
-    """Whether (H, W) values look like millimetres rotated by three bits: below 8.192 m multiples of eight."""
+    """Return whether (H, W) values look like millimetres rotated by 3 bits: multiples of 8 below 8.192 m."""
     return units.dtype == np.uint16 and bool((units[units > 0] % 8 == 0).mean() >= _ROTATED_SHARE)
 
 
 def unrotated(units: NDArray[Any]) -> NDArray[np.uint16]:
-    """(H, W) millimetres of SUN RGB-D's uint16 values."""
+    """Return (H, W) millimetres from SUN RGB-D's uint16 values."""
     return ((units >> 3) | (units << 13)).astype(np.uint16)

@@ -1,4 +1,4 @@
-"""From a recording to a rig folder."""
+"""Import of a recording as a rig folder."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from pipeline.kernels.geometry import rigid
 from pipeline.types import MAX_NODES, AnyPath, FloatArray
 
 MOST_TILT_DEG = 35.0
-"""Of the cameras' mean upward direction from the world's; more is another world, which is turned."""
+"""Largest angle of the cameras' mean upward direction to +z; beyond it the world is rotated upright."""
 
 
 @dataclass(frozen=True, slots=True)
 class ImportedFrame:
-    """One frame of a recording that became a node."""
+    """A frame of a recording that became a node."""
 
     node: str
     color: str
@@ -37,28 +37,28 @@ class ImportedFrame:
 
     @staticmethod
     def of(node: NodeImages, index: int, time_s: float | None) -> ImportedFrame:
-        """What is told of a node that was written."""
+        """Describe a node that was written."""
         median_m = float(np.nanmedian(node.depth.z_m))
         return ImportedFrame(f"node_{index:02d}", node.color_name, node.depth_name, time_s, median_m)
 
 
 @dataclass(frozen=True, slots=True)
 class ImportReport:
-    """What was found, what was taken, and what had to be assumed."""
+    """Result of an import: kind of recording, chosen frames, and assumptions."""
 
     kind: str
     folder: str
     candidates: int
-    """Frames of the recording that were looked at."""
+    """Number of frames of the recording that were considered."""
     depth_scale: float
-    """Depth units in a metre that were used."""
+    """Depth units per metre that were used."""
     frames: tuple[ImportedFrame, ...]
     notes: tuple[str, ...]
-    """One sentence each."""
+    """Notes, one sentence each."""
 
 
 def is_recording(path: Path) -> bool:
-    """Whether ``iterate_import`` knows its kind."""
+    """Return whether ``iterate_import`` can read a path."""
     return is_bag(path) or (path.is_dir() and kind_of(path) is not None)
 
 
@@ -69,17 +69,17 @@ def iterate_import(
     depth_scale: float | None = None,
     intrinsics: AnyPath | None = None,
 ) -> Generator[Progress, None, ImportReport]:
-    """Write a few frames of another program's recording as a rig folder, all of it or nothing.
+    """Import a few frames of another program's recording as a rig folder, completely or not at all.
 
     Args:
-        path: the recording's folder, or one that holds nothing else.
+        path: the recording's folder, or a folder with only this recording.
         out: the rig's folder, new or empty.
-        frames: how many nodes the rig gets, 1 to 6; fewer where the recording has no more that overlap.
-        depth_scale: depth units in a metre; without it what the kind of recording uses.
-        intrinsics: of the colour camera; without it those beside the images, or the kind's own.
+        frames: number of nodes, 1 to 6; fewer if not as many frames overlap.
+        depth_scale: depth units per metre; by default that of the kind of recording.
+        intrinsics: intrinsics file of the colour camera; by default the recording's, or those of its kind.
 
     Raises:
-        InputError: no recording, one that cannot be used, or a folder that cannot be written.
+        InputError: the path is no usable recording, or the folder cannot be written.
     """
     if not 1 <= frames <= MAX_NODES:
         raise InputError(f"A rig of {frames} frames cannot be; try 1 to {MAX_NODES}")
@@ -140,7 +140,7 @@ def _from_bag(
 
 
 def _scale_note(written: list[ImportedFrame], units_per_metre: float) -> str:
-    """The depth scale in words."""
+    """Return a sentence on the depth scale."""
     median_m = float(np.median([frame.median_depth_m for frame in written]))
     return f"Depth: {units_per_metre:g} units in a metre, which makes the median depth {median_m:.3g} m"
 
@@ -160,9 +160,9 @@ def _node_of(candidate: Candidate, sequence: Sequence, T_up_world: FloatArray | 
 
 
 def _upright(candidates: list[Candidate]) -> FloatArray | None:
-    """The turn that makes the cameras' mean upward direction +z; None where the world's z is up as it is.
+    """Return the rotation that makes the cameras' mean upward direction +z; None if z is already up.
 
-    Many recordings have the first camera's axes as the world's; a rig's world has z up.
+    Many recordings use the first camera's axes as world axes, but a rig's world has z up.
     """
     poses = [candidate.T_world_camera for candidate in candidates if candidate.T_world_camera is not None]
     if not poses:

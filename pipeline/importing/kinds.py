@@ -1,4 +1,4 @@
-"""The kinds of recordings that are known, and how each is recognised."""
+"""Supported kinds of recordings, and the recognition of each."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class Kind:
 
     name: str
     looks_like: str
-    """What is in its folder, for people."""
+    """Description of its folder for users."""
     recognised: Callable[[Path], bool]
-    """Whether a folder is of this kind, from the names of its files alone."""
+    """Returns whether a folder is of this kind, from the names of its files alone."""
     read: Callable[[Path, Path | None], Sequence]
-    """The frames of a folder; the second path is of intrinsics that the person names."""
+    """Reads the frames of a folder; the second argument is an intrinsics file given by the user."""
 
 
 KINDS = (
@@ -47,14 +47,14 @@ KINDS = (
         numbered.read_open3d,
     ),
 )
-"""In the order in which they are tried: each is told from those after it."""
+"""Kinds in the order of recognition: the first match counts."""
 
 
 def recognise(path: Path) -> tuple[Kind, Path]:
-    """The kind of a recording and its folder: ``path``, or the only one in it that is of a kind.
+    """Return the kind of a recording and its folder: ``path``, or the only recording in it.
 
     Raises:
-        InputError: no folder, of no kind, or with several recordings in it.
+        InputError: the path is no folder, of no kind, or contains several recordings.
     """
     if not path.exists():
         raise InputError(f"{path} does not exist; check the path")
@@ -74,7 +74,7 @@ def recognise(path: Path) -> tuple[Kind, Path]:
 
 
 def kind_of(folder: Path) -> Kind | None:
-    """What a folder is a recording of; None if it is none."""
+    """Return the kind of recording in a folder; None if it contains none."""
     return next((kind for kind in KINDS if kind.recognised(folder)), None)
 
 

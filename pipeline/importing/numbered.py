@@ -1,4 +1,4 @@
-"""Recordings whose files are numbered: 7-Scenes, Redwood and Open3D, ScanNet, SUN RGB-D."""
+"""Import of recordings with numbered files: 7-Scenes, Redwood and Open3D, ScanNet, SUN RGB-D."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from pipeline.kernels.geometry import inverse
 from pipeline.types import CameraIntrinsics, FloatArray
 
 MOST_CANDIDATES = 600
-"""Of a longer recording every so manieth frame is looked at."""
+"""Most frames that are considered; longer recordings are subsampled."""
 COLOR_FOLDERS = ("color", "rgb", "image", "images")
 _COLOR_SUFFIXES = (".jpg", ".jpeg", ".png", ".ppm")
 _SEVEN_SCENES = CameraIntrinsics.pinhole(585.0, 585.0, 320.0, 240.0, 640, 480)
 
 
 def is_seven_scenes(folder: Path) -> bool:
-    """Whether it has frame-000000.color.png or the like."""
+    """Return whether a folder contains frame-000000.color.png or similar files."""
     return next(folder.glob("frame-*.color.*"), None) is not None
 
 
 def read_seven_scenes(folder: Path, intrinsics: Path | None) -> Sequence:
-    """Frames of 7-Scenes (Shotton et al., CVPR 2013), 3DMatch or BundleFusion; depth in millimetres."""
+    """Read frames of 7-Scenes (Shotton et al., CVPR 2013), 3DMatch or BundleFusion; depth in millimetres."""
     found = []
     colors, thinned = _thinned(sorted(folder.glob("frame-*.color.*")))
     for color in colors:
@@ -47,12 +47,12 @@ def read_seven_scenes(folder: Path, intrinsics: Path | None) -> Sequence:
 
 
 def is_scannet(folder: Path) -> bool:
-    """Whether it has color/, depth/, pose/ and intrinsic/."""
+    """Return whether a folder contains color/, depth/, pose/ and intrinsic/."""
     return all((folder / name).is_dir() for name in ("color", "depth", "pose", "intrinsic"))
 
 
 def read_scannet(folder: Path, intrinsics: Path | None) -> Sequence:
-    """Frames of a ScanNet scene as its SensReader exports it (Dai et al., CVPR 2017); millimetres."""
+    """Read a ScanNet scene as exported by its SensReader (Dai et al., CVPR 2017); depth in millimetres."""
     pairs, thinned = _thinned(_paired(folder / "color", folder / "depth"))
     found = [
         Candidate(color, depth, _pose_or_none(folder / "pose" / f"{color.stem}.txt"))
@@ -83,12 +83,12 @@ FRAMES = ("color", "depth")
 
 
 def is_open3d(folder: Path) -> bool:
-    """Whether it has depth/ and color/, rgb/ or image/."""
+    """Return whether a folder contains depth/ and color/, rgb/ or image/."""
     return (folder / "depth").is_dir() and _color_folder(folder) is not None
 
 
 def read_open3d(folder: Path, intrinsics: Path | None) -> Sequence:
-    """Frames of Redwood (Choi et al., CVPR 2015) or Open3D's recorder; millimetres, poses in a .log file."""
+    """Read Redwood (Choi et al., CVPR 2015) or Open3D recordings; depth in mm, poses in a .log file."""
     color_folder = _color_folder(folder)
     assert color_folder is not None
     pairs, thinned = _thinned(list(enumerate(_paired(color_folder, folder / "depth"))))
@@ -102,10 +102,10 @@ def read_open3d(folder: Path, intrinsics: Path | None) -> Sequence:
 
 
 def read_trajectory_log(file: Path) -> dict[int, FloatArray]:
-    """T_world_camera by the number of the frame, from Redwood's format: a line of three integers, four rows.
+    """Read T_world_camera by frame number from Redwood's format: a line of three integers, then four rows.
 
     Raises:
-        InputError: it is not of this format.
+        InputError: the file has another format.
     """
     data = read_bytes(file, 100 * MAX_TEXT_BYTES, "trajectory")
     try:
@@ -119,13 +119,13 @@ def read_trajectory_log(file: Path) -> dict[int, FloatArray]:
 
 
 def is_sunrgbd(folder: Path) -> bool:
-    """Whether it has image/ and depth_bfx/, or image/ and depth/ with intrinsics.txt."""
+    """Return whether a folder contains image/ and depth_bfx/, or image/ and depth/ with intrinsics.txt."""
     depth = (folder / "depth_bfx").is_dir() or (folder / "depth").is_dir()
     return (folder / "image").is_dir() and depth and (folder / "intrinsics.txt").is_file()
 
 
 def read_sunrgbd(folder: Path, intrinsics: Path | None) -> Sequence:
-    """The one frame of a SUN RGB-D folder (Song et al., CVPR 2015); its depth merged if it is there."""
+    """Read the frame of a SUN RGB-D folder (Song et al., CVPR 2015), with merged depth if available."""
     colors = [path for path in sorted((folder / "image").iterdir()) if path.suffix.lower() in _COLOR_SUFFIXES]
     depths = [path for name in ("depth_bfx", "depth") for path in _depths(folder / name, "*")]
     _some(colors, folder, "an image in image/")
@@ -135,7 +135,7 @@ def read_sunrgbd(folder: Path, intrinsics: Path | None) -> Sequence:
 
 
 def _paired(colors: Path, depths: Path) -> list[tuple[Path, Path]]:
-    """Images whose names have the same number, in its order."""
+    """Pair the images whose names have the same number, in order of the number."""
     by_number = [
         _by_number(path for path in folder.iterdir() if path.suffix.lower() in suffixes)
         for folder, suffixes in ((colors, _COLOR_SUFFIXES), (depths, DEPTH_SUFFIXES))
@@ -146,19 +146,19 @@ def _paired(colors: Path, depths: Path) -> list[tuple[Path, Path]]:
 
 
 def _depths(folder: Path, pattern: str) -> list[Path]:
-    """Depth images by name."""
+    """List the depth images, sorted by name."""
     return [path for path in sorted(folder.glob(pattern)) if path.suffix.lower() in DEPTH_SUFFIXES]
 
 
 def _by_number(paths: Iterable[Path]) -> dict[tuple[int, ...], Path]:
-    """By the first number in the name, which is that of Redwood's frame; by all if it is not unique."""
+    """Index paths by the first number in the name (Redwood's frame number), or by all if it is not unique."""
     numbered = [(tuple(map(int, re.findall(r"\d+", path.stem))), path) for path in paths]
     by_first = {numbers[:1]: path for numbers, path in numbered if numbers}
     return by_first if len(by_first) == len(numbered) else dict(numbered)
 
 
 def _thinned(items: list) -> tuple[list, tuple[str, ...]]:
-    """Every so manieth of many, and a note that says so."""
+    """Subsample a long list evenly; returns it with a note about the subsampling."""
     every = -(-len(items) // MOST_CANDIDATES) or 1
     note = f"Of {len(items)} frames one in {every} was looked at"
     return items[::every], (note,) if every > 1 else ()
@@ -170,7 +170,7 @@ def _some(items: list, folder: Path, missing: str) -> None:
 
 
 def _pose_or_none(path: Path) -> FloatArray | None:
-    """None where the recording lost its track, which such files hold as -inf, or has no pose."""
+    """Read a pose; None if the file is missing, or has -inf because the recording lost track."""
     try:
         return read_pose(path)
     except InputError:

@@ -1,4 +1,4 @@
-"""A rig folder, all of it or nothing."""
+"""Writing of a rig folder, completely or not at all."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ from pipeline.types import ByteArray, CameraIntrinsics, DepthMap, FloatArray
 
 @dataclass(frozen=True, slots=True)
 class NodeImages:
-    """What one node's folder gets."""
+    """Contents of one node's folder."""
 
     color_name: str
-    """The file or topic that the colour image is of."""
+    """File or topic of the colour image."""
     depth_name: str
     rgb: ByteArray
     """(H, W, 3)."""
     depth: DepthMap
-    """(H, W), or (h, w) of the depth camera."""
+    """(H, W), or (h, w) in a separate depth camera."""
     camera: CameraIntrinsics
     T_world_camera: FloatArray | None
-    """(4, 4), metres, if it is known."""
+    """(4, 4) pose, metres; None if it is unknown."""
     depth_camera: CameraIntrinsics | None = None
-    """Of depth that is not registered to the colour image."""
+    """Depth camera, if the depth is not registered to the colour image."""
     T_color_depth: FloatArray | None = None
-    """(4, 4) where that camera stands, metres; with a depth camera."""
+    """(4, 4) pose of the depth camera in the colour camera's frame, metres; given with ``depth_camera``."""
     notes: tuple[str, ...] = ()
-    """What is doubtful about its depth, a sentence each."""
+    """Doubts about its depth, one sentence each."""
 
 
 @contextmanager
 def new_folder(out: Path) -> Iterator[Path]:
-    """A sibling that becomes ``out`` if the body succeeds and vanishes if not."""
+    """Create a sibling folder that is renamed to ``out`` if the body succeeds, and deleted if not."""
     sibling = out.with_name(f".{out.name}-{secrets.token_hex(4)}")
     try:
         sibling.mkdir(parents=True)
@@ -59,10 +59,10 @@ def new_folder(out: Path) -> Iterator[Path]:
 
 
 def write_node(folder: Path, node: NodeImages) -> None:
-    """Write ``folder``/{color.png, depth.png, intrinsics.json} and what else is known.
+    """Write ``folder``/{color.png, depth.png, intrinsics.json}, and pose and depth camera if known.
 
     Raises:
-        InputError: images and cameras of different sizes, or a folder that cannot be written.
+        InputError: images and cameras differ in size, or the folder cannot be written.
     """
     _check_size("intrinsics", (node.camera.height_px, node.camera.width_px), node.color_name, node.rgb.shape)
     if node.depth_camera is None or node.T_color_depth is None:

@@ -1,4 +1,4 @@
-"""RVL, the fast lossless code of depth images (Wilson, "Fast lossless depth image compression", ISS 2017)."""
+"""Decoder of RVL, a lossless code of depth (Wilson, "Fast lossless depth image compression", ISS 2017)."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ MAX_PIXELS = 50_000_000
 
 
 def decode_rvl(data: bytes, width_px: int, height_px: int) -> IntArray:
-    """(H, W) uint16 depth: runs of zeros, then of differences, every number in groups of three bits.
+    """Decode (H, W) uint16 depth: runs of zeros, then of differences, with numbers in groups of three bits.
 
     Raises:
-        ValueError: the data end too soon, or hold more pixels than the image.
+        ValueError: the data end too early, or have more pixels than the image.
     """
     if not 0 < width_px * height_px <= MAX_PIXELS:
         raise ValueError(f"an image of {width_px} x {height_px} pixels")
@@ -27,7 +27,7 @@ def decode_rvl(data: bytes, width_px: int, height_px: int) -> IntArray:
 
 @numba.njit(cache=True, nogil=True)
 def _number(words, nibble):  # type: ignore[no-untyped-def]
-    """The number that begins at a nibble, and the nibble after it; -1 where the words end."""
+    """Decode the number at a nibble; returns it and the next nibble's index, or -1 at the words' end."""
     value, shift = 0, 0
     while True:
         if nibble >= 8 * len(words) or shift > 30:
@@ -42,7 +42,7 @@ def _number(words, nibble):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _decoded(words, pixels):  # type: ignore[no-untyped-def]
-    """Fill the pixels; whether the words hold as many."""
+    """Decode into ``pixels``; returns False if the words end too early or contain too many."""
     nibble, at, previous = 0, 0, 0
     while at < len(pixels):
         zeros, nibble = _number(words, nibble)

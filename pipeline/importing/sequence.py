@@ -1,4 +1,4 @@
-"""What every kind of recording is read into."""
+"""Frames of a recording, in the form into which every kind is read."""
 
 from __future__ import annotations
 
@@ -11,49 +11,49 @@ from pipeline.kernels.geometry import rigid
 from pipeline.types import CameraIntrinsics, FloatArray
 
 DEPTH_SUFFIXES = (".png", ".tif", ".tiff", ".npy", ".pfm", ".exr", ".pgm")
-"""Of depth images."""
+"""File name suffixes of depth images."""
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A colour and a depth image of one moment, not read yet."""
+    """File names of a colour and a depth image of one moment, with the pose."""
 
     color: Path
     depth: Path
     T_world_camera: FloatArray | None = None
-    """(4, 4) of the colour camera, metres."""
+    """(4, 4) pose of the colour camera, metres."""
     time_s: float | None = None
 
     def enlarged(self, factor: float) -> Candidate:
-        """With its pose's lengths times ``factor``."""
+        """Return the candidate with its position multiplied by ``factor``."""
         T = self.T_world_camera
         return self if T is None else replace(self, T_world_camera=rigid(T[:3, :3], factor * T[:3, 3]))
 
 
 @dataclass(frozen=True, slots=True)
 class Sequence:
-    """The frames of one recording, in the order of time, with what they have in common."""
+    """The frames of one recording in order of time, with their common properties."""
 
     candidates: tuple[Candidate, ...]
-    """All of them with poses or none."""
+    """Candidates, either all with poses or all without."""
     camera: CameraIntrinsics
     units_per_metre: float = 1000.0
-    """Of depth images in whole numbers, or of all if it is stated."""
+    """Depth units per metre of integer images, or of all images if ``scale_stated``."""
     scale_stated: bool = False
-    """Whether a person gave it."""
+    """Whether the user gave the scale."""
     rotated_bits: bool = False
-    """Whether the depth images may have their bits rotated as those of SUN RGB-D."""
+    """Whether depth images may have rotated bits, as in SUN RGB-D."""
     depth_camera: CameraIntrinsics | None = None
-    """Of depth images that are not registered to the colour images."""
+    """Depth camera, if depth images are not registered to colour images."""
     T_color_depth: FloatArray | None = None
-    """(4, 4) where that camera stands, metres."""
+    """(4, 4) pose of the depth camera in the colour camera's frame, metres."""
     poses_in_depth_units: bool = False
-    """Whether the poses are known in the unit of the depth images only, as those of COLMAP."""
+    """Whether the poses have the depth images' unknown unit, as in COLMAP."""
     notes: tuple[str, ...] = ()
-    """What was assumed, one sentence each."""
+    """Assumptions, one sentence each."""
 
     def with_scale(self, units_per_metre: float) -> Sequence:
-        """With depth images of so many units in a metre."""
+        """Return the sequence with another depth scale."""
         candidates = self.candidates
         if self.poses_in_depth_units:
             factor = self.units_per_metre / units_per_metre
@@ -68,10 +68,10 @@ class Sequence:
 
 
 def named_inside(folder: Path, name: str, file: str) -> Path:
-    """What a file of a recording calls ``name``.
+    """Return the path of ``name``, which a file of a recording contains.
 
     Raises:
-        InputError: it lies outside the recording's folder.
+        InputError: it is outside the recording's folder.
     """
     try:
         return path_below(folder, name)
@@ -80,7 +80,7 @@ def named_inside(folder: Path, name: str, file: str) -> Path:
 
 
 def posed(candidates: list[Candidate], what: str) -> tuple[tuple[Candidate, ...], tuple[str, ...]]:
-    """Those with a pose and a note on what was left out; all of them if none has one."""
+    """Return the candidates with a pose and a note on those left out, or all if none has a pose."""
     known = [candidate for candidate in candidates if candidate.T_world_camera is not None]
     if not known:
         note = f"No {what}: poses are not known; reconstruct looks for them"

@@ -1,4 +1,4 @@
-"""TUM RGB-D sequences: pictures, depth and poses with their own clocks.
+"""Import of TUM RGB-D sequences: colour, depth and poses, each with its own times.
 
 Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems", IROS 2012.
 """
@@ -25,19 +25,19 @@ _CAMERAS = {
     "2": ((520.9, 521.0, 325.1, 249.7), (0.2312, -0.7849, -0.0033, -0.0001, 0.9172)),
     "3": ((535.4, 539.2, 320.1, 247.6), (0.0, 0.0, 0.0, 0.0, 0.0)),
 }
-"""The colour cameras of the sequences freiburg1 to 3 as the benchmark's page gives them."""
+"""Colour cameras of freiburg1 to 3, from the benchmark's web page."""
 
 
 def is_tum(folder: Path) -> bool:
-    """Whether it has the two lists."""
+    """Return whether a folder contains rgb.txt and depth.txt."""
     return (folder / "rgb.txt").is_file() and (folder / "depth.txt").is_file()
 
 
 def read_tum(folder: Path, intrinsics: Path | None) -> Sequence:
-    """The frames whose pictures, depth and, if there is groundtruth.txt, poses are less than 20 ms apart.
+    """Read frames whose colour, depth and (if groundtruth.txt exists) pose are less than 20 ms apart.
 
     Raises:
-        InputError: a list with a line that cannot be read, or no two images of one moment.
+        InputError: a list has an invalid line, or no two images are of one moment.
     """
     (rgb_s, pictures), (depth_s, depths) = listed(folder / "rgb.txt"), listed(folder / "depth.txt")
     pairs = associate(rgb_s, depth_s)
@@ -64,7 +64,7 @@ def read_tum(folder: Path, intrinsics: Path | None) -> Sequence:
 
 
 def associate(first_s: FloatArray, second_s: FloatArray) -> list[tuple[int, int]]:
-    """Indices of times less than 20 ms apart, nearest pairs first, each time used once (associate.py).
+    """Match times less than 20 ms apart, closest pairs first, each time once (associate.py); returns indices.
 
     Args:
         first_s: (N,) times, seconds, ascending.
@@ -85,17 +85,17 @@ def associate(first_s: FloatArray, second_s: FloatArray) -> list[tuple[int, int]
 
 
 def listed(file: Path) -> tuple[FloatArray, list[str]]:
-    """Times in ascending order and the files that belong to them.
+    """Read the times of a list, ascending, and the file of each.
 
     Raises:
-        InputError: a line that is no time and file.
+        InputError: a line is not a time and a file.
     """
     rows = _rows(file, "list of a TUM sequence", 1, "a time in seconds and a file")
     return np.array([time_s for time_s, _ in rows]), [words[0] for _, words in rows]
 
 
 def _rows(file: Path, what: str, least: int, form: str) -> list[tuple[float, list[str]]]:
-    """Time and words of each line, in the order of time."""
+    """Return time and words of each line, sorted by time."""
     rows = []
     text = read_bytes(file, 100 * MAX_TEXT_BYTES, what).decode("utf-8", "replace")
     for line in text.splitlines():
@@ -114,7 +114,7 @@ def _rows(file: Path, what: str, least: int, form: str) -> list[tuple[float, lis
 
 
 def _poses(file: Path, wanted_s: FloatArray) -> dict[int, FloatArray]:
-    """T_world_camera by the indices of the (N,) times that have one at most 20 ms away."""
+    """Return T_world_camera by index of those (N,) times with a pose at most 20 ms away."""
     if not file.is_file():
         return {}
     rows = _rows(file, "trajectory", 7, "a time, tx ty tz in metres and a quaternion qx qy qz qw")

@@ -1,1 +1,1 @@
-"""Files: images, intrinsics, poses, clouds, meshes and rigs, checked when read and whole when written."""
+"""Reading and writing of images, intrinsics, poses, clouds, meshes and rigs; no file is written in part."""

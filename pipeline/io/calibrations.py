@@ -1,7 +1,7 @@
-"""A calibration on disk: a rig folder without images, whose files take the place of a rig's own.
+"""Calibrations on disk: a rig folder without images, whose files replace a rig's own.
 
 ``CAL/node_00/{intrinsics.json, pose.txt, depth_intrinsics.json, extrinsics.json, depth_correction.json}``,
-``CAL/node_01/...``: each node has those that were calibrated.
+``CAL/node_01/...``: each node has those files that were calibrated.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ FILES = {
     "extrinsics": "extrinsics.json",
     "depth_correction": "depth_correction.json",
 }
-"""Of a node, by what ``load_frame`` calls them: its camera, where it stands, the separate camera of its
-depth, where that one stands beside it, and the depth sensor's own bias."""
+"""File names of a node by parameters of ``load_frame``: its camera and pose, a separate depth camera and
+its pose relative to the colour camera, and the depth sensor's bias."""
 
 
 class NodeFiles(TypedDict, total=False):
-    """Those of ``FILES`` that there are."""
+    """Those of ``FILES`` that exist."""
 
     intrinsics: AnyPath
     pose: AnyPath
@@ -39,31 +39,31 @@ class NodeFiles(TypedDict, total=False):
 
 
 def node_files(folder: Path) -> NodeFiles:
-    """The files in a node's folder."""
+    """Return the files of ``FILES`` that exist in a node's folder."""
     found = {name: folder / file for name, file in FILES.items() if (folder / file).exists()}
     return cast(NodeFiles, found)
 
 
 @dataclass(frozen=True, slots=True)
 class CalibratedNode:
-    """What a calibration says of a node."""
+    """Calibration of one node."""
 
     intrinsics: CameraIntrinsics | None
-    """None leaves the rig's own."""
+    """Intrinsics; None keeps the rig's own."""
     T_world_camera: FloatArray | None = None
-    """(4, 4), metres; None leaves the rig's own pose."""
+    """(4, 4) pose, metres; None keeps the rig's own."""
     depth_intrinsics: CameraIntrinsics | None = None
-    """Of a separate depth camera, whose images are not registered to the colour camera's."""
+    """Intrinsics of a separate depth camera, whose images are not registered to the colour camera's."""
     T_color_depth: FloatArray | None = None
-    """(4, 4), metres, where that one stands."""
+    """(4, 4) pose of the depth camera in the colour camera's frame, metres."""
 
 
 def write_calibration(folder: AnyPath, nodes: Mapping[str, CalibratedNode]) -> None:
-    """Write a folder that ``load_rig(..., calibration=folder)`` lays over a rig.
+    """Write a calibration folder, for ``load_rig(..., calibration=folder)``.
 
     Args:
-        folder: made if it is missing.
-        nodes: by name, node_00 and so on.
+        folder: created if it is missing.
+        nodes: calibrations by the nodes' names, node_00 and so on.
 
     Raises:
         InputError: the folder cannot be written.
@@ -84,15 +84,15 @@ def write_calibration(folder: AnyPath, nodes: Mapping[str, CalibratedNode]) -> N
 
 
 def calibration_files(folder: AnyPath, nodes: Sequence[str]) -> dict[str, NodeFiles]:
-    """The files of a calibration by the node's name.
+    """Return the files of a calibration by the nodes' names.
 
     Args:
-        folder: as ``write_calibration`` makes it.
+        folder: a folder as ``write_calibration`` makes it.
         nodes: names of the rig's nodes.
 
     Raises:
-        InputError: no folder, no node with a file in it, a node that the rig has not, or poses of some nodes
-            only.
+        InputError: the folder is missing, contains no node with a file or a node that the rig lacks, or has
+            poses for only some nodes.
     """
     folder = Path(folder)
     if not folder.is_dir():

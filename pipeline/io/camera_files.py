@@ -1,6 +1,6 @@
-"""Cameras in the files of other programs: each a writer, and readers of those that ``intrinsics`` knows not.
+"""Camera files of other programs: a writer for each, and readers for those that ``intrinsics`` does not read.
 
-Where pixels are counted otherwise, principal points are moved: the middle of the first pixel is (0, 0) here,
+Principal points are converted between pixel conventions: the centre of the first pixel is (0, 0) here,
 (0.5, 0.5) in COLMAP and (1, 1) in MATLAB.
 """
 
@@ -18,10 +18,10 @@ from packetmesh.files import atomic_path
 from pipeline.types import AnyPath, CameraIntrinsics
 
 COLMAP_MIDDLE, MATLAB_MIDDLE = 0.5, 1.0
-"""Of the first pixel."""
+"""Coordinate of the first pixel's centre."""
 _COLMAP = re.compile(r"^\s*\d+\s+(PINHOLE|OPENCV|FULL_OPENCV)\s+(.*)$", re.MULTILINE)
 _COLMAP_NUMBERS = {"PINHOLE": 4, "OPENCV": 8, "FULL_OPENCV": 12}
-"""After the size."""
+"""Number of parameters after the image size."""
 _FISHEYE = re.compile(r"\bequidistant\b|\bOPENCV_FISHEYE\b|^fisheye_model:\s*1", re.MULTILINE)
 _KALIBR = re.compile(r"^\s+(intrinsics|distortion_coeffs|resolution):\s*\[([^\]]*)\]", re.MULTILINE)
 _MATLAB = re.compile(
@@ -31,7 +31,7 @@ _MATLAB = re.compile(
 
 
 def opencv_yaml(camera: CameraIntrinsics) -> str:
-    """As ``cv2.FileStorage`` and the tools around OpenCV have it."""
+    """Return the camera as ``cv2.FileStorage`` and programs around OpenCV write it."""
     return "\n".join(
         (
             "%YAML:1.0",
@@ -46,7 +46,7 @@ def opencv_yaml(camera: CameraIntrinsics) -> str:
 
 
 def opencv_matrix(name: str, values: np.ndarray) -> tuple[str, ...]:
-    """Lines of a matrix in OpenCV's YAML."""
+    """Return the lines of a matrix in OpenCV's YAML."""
     rows, columns = values.shape
     return (
         f"{name}: !!opencv-matrix",
@@ -58,13 +58,13 @@ def opencv_matrix(name: str, values: np.ndarray) -> tuple[str, ...]:
 
 
 def ros_matrix(name: str, values: np.ndarray) -> tuple[str, ...]:
-    """Lines of a matrix in ROS's YAML."""
+    """Return the lines of a matrix in ROS's YAML."""
     rows, columns = values.shape
     return f"{name}:", f"  rows: {rows}", f"  cols: {columns}", f"  data: [{listed(values.ravel())}]"
 
 
 def camera_info(camera: CameraIntrinsics) -> str:
-    """ROS's camera_info, as ``camera_calibration`` writes it."""
+    """Return the camera as ROS's camera_info, as ``camera_calibration`` writes it."""
     return "\n".join(
         (
             f"image_width: {camera.width_px}",
@@ -81,10 +81,10 @@ def camera_info(camera: CameraIntrinsics) -> str:
 
 
 def open3d_json(camera: CameraIntrinsics) -> str:
-    """Open3D's PinholeCameraIntrinsic, whose matrix goes column by column; it has no distortion.
+    """Return the camera as Open3D's PinholeCameraIntrinsic: column-major matrix, no distortion.
 
     Raises:
-        InputError: the camera has one: its images must be undistorted first.
+        InputError: the camera has distortion: its images must be undistorted first.
     """
     _refuse(camera, camera.distortion, "Open3D's file", "undistort the images first")
     values = {
@@ -96,7 +96,7 @@ def open3d_json(camera: CameraIntrinsics) -> str:
 
 
 def colmap_text(camera: CameraIntrinsics) -> str:
-    """A cameras.txt of one camera: OPENCV, or FULL_OPENCV where k3 is not 0."""
+    """Return a cameras.txt with one camera: OPENCV, or FULL_OPENCV if k3 is not 0."""
     places = (camera.fx_px, camera.fy_px, camera.cx_px + COLMAP_MIDDLE, camera.cy_px + COLMAP_MIDDLE)
     whole = bool(camera.distortion[4])
     model = "FULL_OPENCV" if whole else "OPENCV"
@@ -108,10 +108,10 @@ def colmap_text(camera: CameraIntrinsics) -> str:
 
 
 def kalibr_yaml(camera: CameraIntrinsics) -> str:
-    """Kalibr's camchain of one camera with the lens radtan, which has no k3.
+    """Return Kalibr's camchain of one camera with the distortion model radtan, which has no k3.
 
     Raises:
-        InputError: the camera has one.
+        InputError: the camera has a k3.
     """
     _refuse(camera, camera.distortion[4:], "Kalibr's radtan", "calibrate with the lens 'thesis'")
     places = np.array([camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px])
@@ -125,7 +125,7 @@ def kalibr_yaml(camera: CameraIntrinsics) -> str:
 
 
 def matlab_text(camera: CameraIntrinsics) -> str:
-    """The properties of MATLAB's cameraIntrinsics, a line each."""
+    """Return the properties of MATLAB's cameraIntrinsics, one per line."""
     k1, k2, p1, p2, k3 = camera.distortion
     middle = np.array([camera.cx_px, camera.cy_px]) + MATLAB_MIDDLE
     radial = (k1, k2, k3) if k3 else (k1, k2)
@@ -148,14 +148,14 @@ WRITERS: Mapping[str, Callable[[CameraIntrinsics], str]] = MappingProxyType(
         "matlab.txt": matlab_text,
     }
 )
-"""By the name that the file has usually."""
+"""Writers by the usual name of the file."""
 
 
 def write_camera(path: AnyPath, camera: CameraIntrinsics, kind: str) -> None:
-    """Write a camera as one of ``WRITERS`` does.
+    """Write a camera with the writer ``WRITERS[kind]``.
 
     Raises:
-        InputError: the format cannot hold the lens, or the folder cannot be written.
+        InputError: the format cannot store the distortion, or the folder cannot be written.
     """
     text = WRITERS[kind](camera)
     with atomic_path(path) as sibling:
@@ -163,12 +163,12 @@ def write_camera(path: AnyPath, camera: CameraIntrinsics, kind: str) -> None:
 
 
 def is_fisheye(text: str) -> bool:
-    """Whether a camera file says that its lens is a fisheye, of which the chain knows none."""
+    """Return whether a camera file describes a fisheye lens, which the reconstruction does not support."""
     return _FISHEYE.search(text) is not None
 
 
 def camera_in(text: str) -> CameraIntrinsics | None:
-    """The camera of a COLMAP, Kalibr or MATLAB file; None if it is none of them."""
+    """Read a COLMAP, Kalibr or MATLAB camera; returns None if the text is none of these."""
     for read in (_from_colmap, _from_kalibr, _from_matlab):
         camera = read(text)
         if camera is not None:
@@ -200,7 +200,7 @@ def _from_matlab(text: str) -> CameraIntrinsics | None:
     if not {"FocalLength", "PrincipalPoint", "ImageSize"} <= found.keys():
         return None
     if "Distortion" in text and not {"RadialDistortion", "TangentialDistortion"} <= found.keys():
-        return None  # it ends too soon
+        return None  # the file is truncated
     k1, k2, k3 = (*found.get("RadialDistortion", []), 0.0, 0.0, 0.0)[:3]
     p1, p2 = (*found.get("TangentialDistortion", []), 0.0, 0.0)[:2]
     cx, cy = (value - MATLAB_MIDDLE for value in found["PrincipalPoint"])
@@ -222,7 +222,7 @@ def _numbers(words: str) -> list[float]:
 
 
 def listed(values: np.ndarray, between: str = ", ") -> str:
-    """Numbers exact to the last bit."""
+    """Format numbers exactly to the last bit."""
     return between.join(repr(float(value)) for value in values)
 
 

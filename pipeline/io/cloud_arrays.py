@@ -1,4 +1,4 @@
-"""Points as bare numbers: NumPy arrays, and the sweeps of the KITTI benchmark."""
+"""Readers of points from plain numbers: NumPy arrays, and sweeps of the KITTI benchmark."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from pipeline.types import AnyPath
 
 SWEEP_ROW = np.dtype([(name, "<f4") for name in (*POSITION, "reflectance")])
 FARTHEST_M = 1e5
-"""A number beyond is no position of a sweep, but the file another thing."""
+"""Largest plausible coordinate of a sweep; larger numbers mean that the file is something else."""
 
 
 def parse_npy(path: AnyPath, data: bytes) -> np.ndarray:
-    """The points of an array (N, 3 or more), its further columns understood as those of text files.
+    """Read an array (N, 3 or more); columns after the third are interpreted as in text files.
 
     Raises:
-        InputError: damaged, or no such array of numbers.
+        InputError: the file is damaged, or not such an array of numbers.
     """
     try:
         array = array_in(data)
@@ -38,10 +38,10 @@ def parse_npy(path: AnyPath, data: bytes) -> np.ndarray:
 
 
 def parse_sweep(path: AnyPath, data: bytes) -> np.ndarray:
-    """A sweep of a LiDAR as KITTI stores it: x, y, z and reflectance, four bytes each (Geiger et al. 2013).
+    """Read a LiDAR sweep in KITTI's format: x, y, z and reflectance, four bytes each (Geiger et al. 2013).
 
     Raises:
-        InputError: another length, or numbers that are no positions.
+        InputError: the length is no multiple of a row, or the numbers are no positions.
     """
     if not data or len(data) % SWEEP_ROW.itemsize:
         raise InputError(

@@ -1,4 +1,4 @@
-"""The vertices of OBJ, STL and GLB models as points."""
+"""Reader of the vertices of OBJ, STL and GLB models as points."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from pipeline.types import AnyPath
 
 
 def parse_model(path: AnyPath, data: bytes) -> np.ndarray:
-    """Every vertex of every part once, Z up, with its colour where all parts have colours.
+    """Read each vertex of every part once, Z up, with its colour if all parts have colours.
 
     Raises:
-        InputError: damaged, or without vertices.
+        InputError: the file is damaged, or has no vertices.
     """
     suffix = PurePath(path).suffix.lower()
     try:
@@ -41,7 +41,7 @@ def parse_model(path: AnyPath, data: bytes) -> np.ndarray:
 
 
 def _colors(part: trimesh.Trimesh | trimesh.PointCloud) -> np.ndarray | None:
-    """(V, 3) uint8 of a part whose vertices have colours."""
+    """Return (V, 3) uint8 colours of a part; None if its vertices have none."""
     if isinstance(part, trimesh.PointCloud):
         rgba = np.asarray(part.colors)
         return rgba[:, :3].astype(np.uint8) if rgba.shape == (len(part.vertices), 4) else None

@@ -1,4 +1,4 @@
-"""NumPy archives with an array ``points`` and, optionally, ``colors`` and ``normals``."""
+"""Reader of NumPy archives with an array ``points`` and, optionally, ``colors`` and ``normals``."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _COLUMNS = {"points": POSITION, "colors": COLOR, "normals": NORMAL}
 
 
 def parse_npz(path: AnyPath, data: bytes) -> np.ndarray:
-    """The points as a structured array; nothing in the archive is executed (no pickles).
+    """Read the points as a structured array; nothing in the archive is executed (no pickles).
 
     Raises:
-        InputError: damaged, unpacking to too much, or arrays that are not (N, 3) numbers.
+        InputError: the file is damaged, too large when unpacked, or its arrays are not (N, 3) numbers.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:

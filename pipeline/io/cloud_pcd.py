@@ -1,4 +1,4 @@
-"""PCD files, the format of the Point Cloud Library, version 0.7 and before: ASCII, binary and compressed."""
+"""Reader of PCD files, the format of the Point Cloud Library, up to 0.7: ASCII, binary and compressed."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _OUR_NAMES = {"normal_x": "nx", "normal_y": "ny", "normal_z": "nz"}
 
 
 def parse_pcd(path: AnyPath, data: bytes) -> np.ndarray:
-    """The points as a structured array with the names of PLY files; packed colours unpacked.
+    """Read the points as a structured array with the field names of PLY files; packed colours are unpacked.
 
     Raises:
-        InputError: truncated, damaged, too many points or not a PCD file.
+        InputError: the file is truncated, damaged, no PCD file, or has too many points.
     """
     mark = data.find(b"\nDATA ", 0, _MAX_HEADER_BYTES)
     start = data.find(b"\n", mark + 1) + 1
@@ -43,7 +43,7 @@ def parse_pcd(path: AnyPath, data: bytes) -> np.ndarray:
 
 
 def _compressed(path: AnyPath, body: bytes, count: int, dtype: np.dtype) -> np.ndarray:
-    """The rows of a body that holds two sizes and, packed by LZF, one field after the other."""
+    """Read a compressed body: two sizes, then the fields one after the other, packed with LZF."""
     whole = count * dtype.itemsize
     packed_bytes, unpacked_bytes = np.frombuffer(body[:8], "<u4") if len(body) >= 8 else (0, -1)
     if unpacked_bytes != whole or whole > MAX_GEOMETRY_BYTES:
@@ -90,7 +90,7 @@ def _lzf_unpacked(packed, out):  # type: ignore[no-untyped-def]
             read += 1
             if back < 0 or written + length > len(out):
                 return -1
-            for k in range(length):  # may overlap itself
+            for k in range(length):  # source and target may overlap
                 out[written + k] = out[back + k]
         written += length
     return written
@@ -102,7 +102,7 @@ def _header(text: str) -> dict[str, list[str]]:
 
 
 def _layout(header: dict[str, list[str]]) -> tuple[int, np.dtype]:
-    """Number of points and their layout; ``_`` is padding and may come more than once."""
+    """Return the number of points and their layout; ``_`` is padding and may occur several times."""
     names = header["FIELDS"]
     repeats = [int(word) for word in header.get("COUNT", ["1"] * len(names))]
     kinds = [_TYPES[kind, int(size)] for kind, size in zip(header["TYPE"], header["SIZE"], strict=True)]
@@ -120,7 +120,7 @@ def _layout(header: dict[str, list[str]]) -> tuple[int, np.dtype]:
 
 
 def _unpacked(table: np.ndarray) -> np.ndarray:
-    """With red, green and blue from ``rgb`` or ``rgba``: four bytes, often declared as a float."""
+    """Replace ``rgb`` or ``rgba``, four bytes often declared as a float, by red, green and blue."""
     names = table.dtype.names or ()
     packed = next((name for name in ("rgb", "rgba") if name in names), None)
     if packed is None or table.dtype[packed].itemsize != 4:

@@ -1,4 +1,4 @@
-"""PLY files: the first element, whatever scalar properties it has."""
+"""Reader of PLY files: their first element with any scalar properties."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ TYPES = {
 
 
 def parse_ply(path: AnyPath, data: bytes) -> np.ndarray:
-    """The vertex element, the first of the file, as a structured array; ASCII and both binary orders.
+    """Read the vertex element, the first of the file, as a structured array; ASCII and both byte orders.
 
     Raises:
-        InputError: truncated, too many points or not a PLY file.
+        InputError: the file is truncated, no PLY file, or has too many points.
     """
     end = data.find(b"end_header", 0, _MAX_HEADER_BYTES)
     start = data.find(b"\n", end) + 1
@@ -41,7 +41,7 @@ def parse_ply(path: AnyPath, data: bytes) -> np.ndarray:
 
 
 def _parse_header(lines: list[str]) -> tuple[Literal["a", "<", ">"], int, np.dtype]:
-    """Byte order (``a`` for ASCII), number of vertices and their layout."""
+    """Return the byte order (``a`` for ASCII), the number of vertices and their layout."""
     orders: dict[str, Literal["a", "<", ">"]]
     orders = {"ascii": "a", "binary_little_endian": "<", "binary_big_endian": ">"}
     order: Literal["a", "<", ">"] | None = None

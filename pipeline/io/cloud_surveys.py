@@ -1,4 +1,4 @@
-"""Surveyors' files, LAS, LAZ and E57, by libraries that come with the extra ``clouds``."""
+"""Readers of survey formats, LAS, LAZ and E57, with libraries of the extra ``clouds``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _DAMAGED = "The point cloud {} is truncated or damaged; try to copy or export it
 
 
 def parse_las(path: AnyPath, data: bytes) -> np.ndarray:
-    """The points of a LAS or LAZ file; colours of 16 bits become bytes.
+    """Read the points of a LAS or LAZ file; 16-bit colours are reduced to 8 bits.
 
     Raises:
         InputError: the extra is not installed, or the file is damaged.
@@ -31,7 +31,7 @@ def parse_las(path: AnyPath, data: bytes) -> np.ndarray:
         with laspy.open(io.BytesIO(data)) as reader:
             check_count(path, reader.header.point_count)
             points, count = reader.read(), reader.header.point_count
-        if len(points) < count:  # laspy gives what there is
+        if len(points) < count:  # laspy returns the points of a truncated file without an error
             raise truncated(path, len(points), count)
         xyz = np.stack([np.asarray(points[name], np.float64) for name in ("x", "y", "z")], axis=1)
         named = set(points.point_format.dimension_names)
@@ -48,7 +48,7 @@ def parse_las(path: AnyPath, data: bytes) -> np.ndarray:
 
 
 def parse_e57(path: AnyPath, data: bytes) -> np.ndarray:
-    """The points of all scans of an E57 file, each moved to its pose.
+    """Read the points of all scans of an E57 file, each transformed by its pose.
 
     Raises:
         InputError: the extra is not installed, or the file is damaged.
@@ -65,13 +65,13 @@ def parse_e57(path: AnyPath, data: bytes) -> np.ndarray:
         rgb = _joined(scans, _E57_COLORS) if all(set(_E57_COLORS) <= scan.keys() for scan in scans) else None
     except InputError:
         raise
-    except Exception:  # libE57 has one exception for everything
+    except Exception:  # libE57 raises one type for all errors
         raise InputError(_DAMAGED.format(path)) from None
     return _table(xyz, rgb)
 
 
 def _las_records_fit(data: bytes) -> bool:
-    """Whether a file is as long as its variable length records at least (LAS 1.4, tables 3, 5 and 7)."""
+    """Return whether a file is long enough for its variable length records (LAS 1.4, tables 3, 5 and 7)."""
     if len(data) < 227:
         return False
     header_bytes, records = (
@@ -84,17 +84,17 @@ def _las_records_fit(data: bytes) -> bool:
 
 
 def _joined(scans: Sequence[dict[str, np.ndarray]], names: Sequence[str]) -> np.ndarray:
-    """(N, 3) of three columns of all scans."""
+    """Return three columns of all scans as (N, 3)."""
     return np.concatenate([np.stack([scan[name] for name in names], axis=1) for scan in scans])
 
 
 def _colored(file: object, scan: int) -> bool:
-    """Whether the points of a scan have colours."""
+    """Return whether the points of a scan have colours."""
     return set(_E57_COLORS) <= set(file.get_header(scan).point_fields)  # type: ignore[attr-defined]
 
 
 def _library(name: str, path: AnyPath) -> ModuleType:
-    """The reader's module."""
+    """Import the reader's module."""
     try:
         return __import__(name)
     except ImportError:
@@ -106,7 +106,7 @@ def _library(name: str, path: AnyPath) -> ModuleType:
 
 
 def _table(xyz: np.ndarray, rgb: np.ndarray | None) -> np.ndarray:
-    """Positions and colours as a structured array."""
+    """Combine positions and colours in a structured array."""
     table = np.empty(len(xyz), [(n, "f8") for n in POSITION] + [(n, "u1") for n in COLOR if rgb is not None])
     for name, column in zip(POSITION, np.asarray(xyz).T, strict=True):
         table[name] = column

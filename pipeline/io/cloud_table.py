@@ -1,4 +1,4 @@
-"""Clouds as tables of named columns, which all file formats are read into."""
+"""Clouds as tables of named columns, the result of every format's reader."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ _log = logging.getLogger(__name__)
 
 MAX_POINTS = 20_000_000
 FARTHEST, MOST_FAR_SHARE = 1e12, 0.1
-"""Coordinates beyond, in any unit, are none; so many of them tell of a file that is understood wrongly."""
+"""A share of coordinates beyond FARTHEST (in any unit) above this means that the file was misread."""
 POSITION, NORMAL, COLOR = ("x", "y", "z"), ("nx", "ny", "nz"), ("red", "green", "blue")
 LABEL = "source"
 
 
 def cloud_of(path: AnyPath, table: np.ndarray) -> PointCloud:
-    """The points of a structured array whose fields are named as in PLY files.
+    """Convert a structured array whose fields are named as in PLY files to a cloud.
 
-    Colours that are no integers run from 0 to 1. Points that are not finite are left out.
+    Floating-point colours range from 0 to 1. Points that are not finite are left out.
 
     Raises:
-        InputError: no x, y, z, or no finite point.
+        InputError: x, y or z is missing, or no point is finite.
     """
     points_m = columns(table, POSITION, np.float64)
     if points_m is None:
@@ -54,14 +54,14 @@ def cloud_of(path: AnyPath, table: np.ndarray) -> PointCloud:
 
 
 def columns(table: np.ndarray, names: tuple[str, ...], dtype: type) -> np.ndarray | None:
-    """(N, len(names)) of the named fields, None unless the table has them all."""
+    """Return the named fields as (N, len(names)); None unless the table has all of them."""
     if not set(names) <= set(table.dtype.names or ()):
         return None
     return np.stack([table[name].astype(dtype) for name in names], axis=1)
 
 
 def check_count(path: AnyPath, count: int) -> None:
-    """Refuse more than ``MAX_POINTS`` points."""
+    """Raise an InputError for more than ``MAX_POINTS`` points."""
     if count > MAX_POINTS:
         raise InputError(
             f"The point cloud {path} has {count} points, more than the {MAX_POINTS // 10**6} million that "
@@ -70,17 +70,17 @@ def check_count(path: AnyPath, count: int) -> None:
 
 
 def truncated(path: AnyPath, there: int, count: int) -> InputError:
-    """The error of a file that ends before its last point."""
+    """Return the error for a file that ends before its last point."""
     return InputError(
         f"The point cloud {path} ends after {there} of its {count} points; try to copy or export it again"
     )
 
 
 def table_of(path: AnyPath, body: bytes, count: int, dtype: np.dtype, ascii_text: bool) -> np.ndarray:
-    """``count`` rows of a structured array from the body of a file: lines of numbers, or the rows' own bytes.
+    """Return ``count`` rows of a structured array from a file's body: lines of numbers, or binary rows.
 
     Raises:
-        InputError: fewer rows, or a line of another length.
+        InputError: there are fewer rows, or a line has another length.
     """
     if not ascii_text:
         there = len(body) // dtype.itemsize
@@ -98,10 +98,10 @@ def table_of(path: AnyPath, body: bytes, count: int, dtype: np.dtype, ascii_text
 
 
 def number_rows(path: AnyPath, body: bytes, count: int, width: int) -> np.ndarray:
-    """(count, width) float64 numbers from the first lines of text that are not blank.
+    """Read (count, width) float64 numbers from the first lines that are not blank.
 
     Raises:
-        InputError: fewer lines, or a line without ``width`` numbers.
+        InputError: there are fewer lines, or a line has no ``width`` numbers.
     """
     lines = [line for line in body.splitlines() if line.strip()][:count]
     if len(lines) < count:

@@ -1,4 +1,4 @@
-"""Points as lines of numbers, separated by blanks, tabs, commas or semicolons: XYZ, TXT, ASC, CSV, PTS."""
+"""Readers of points as text, separated by blanks, tabs, commas or semicolons: XYZ, TXT, ASC, CSV, PTS."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from pipeline.types import AnyPath
 _NAMES = {"r": "red", "g": "green", "b": "blue", "normal_x": "nx", "normal_y": "ny", "normal_z": "nz"}
 MOST_COLUMNS = 1000
 _UNIT_TOLERANCE = 0.02
-"""How far from one the lengths of triples may be that are taken for normals."""
+"""Largest deviation from one of the lengths of triples that are read as normals."""
 
 
 def parse_text(path: AnyPath, data: bytes) -> np.ndarray:
-    """The points as a structured array.
+    """Read the points as a structured array.
 
-    A first line of words names the columns (x, y, z, r, g, b, nx, ny, nz in any order). Without one the
-    first three columns are the position; further triples are normals if their lengths are one, or
-    colours if they are integers up to 255. Other columns are ignored, as are lines that begin with # or //.
+    A first line of words names the columns (x, y, z, r, g, b, nx, ny, nz in any order). Without it the first
+    three columns are the position; further triples are normals if their lengths are one, or colours if they
+    are integers up to 255. Other columns are ignored, as are lines that begin with # or //.
 
     Raises:
-        InputError: not such a file, lines of different lengths, or too many points.
+        InputError: the file is not such text, its lines differ in length, or there are too many points.
     """
     try:
         text = data.decode("utf-8-sig")
@@ -50,19 +50,19 @@ def parse_text(path: AnyPath, data: bytes) -> np.ndarray:
 
 
 def table_of_columns(rows: np.ndarray) -> np.ndarray:
-    """(N, 3 or more) numbers as a structured array: positions, then normals or colours by what is in them."""
+    """Convert (N, 3 or more) numbers to a structured array: positions, then normals or colours as guessed."""
     return _table(rows, _guessed(rows))
 
 
 def parse_pts(path: AnyPath, data: bytes) -> np.ndarray:
-    """Leica's PTS: a line with the number of points, then x, y, z, intensity and perhaps r, g, b.
+    """Read Leica's PTS: a line with the number of points, then x, y, z, intensity and optionally r, g, b.
 
     Raises:
-        InputError: not such a file, or one that ends before its last point.
+        InputError: the file is not such text, or ends before its last point.
     """
     first, _, rest = data.partition(b"\n")
     if not first.strip().isdigit():
-        return parse_text(path, data)  # many a PTS file goes without its first line
+        return parse_text(path, data)  # many PTS files lack the first line
     count = int(first)
     check_count(path, count)
     lines = [line for line in rest.splitlines() if line.strip()]
@@ -85,7 +85,7 @@ def _is_number(word: str) -> bool:
 
 
 def _guessed(rows: np.ndarray) -> list[str]:
-    """Names of the columns by what is in them."""
+    """Guess the names of the columns from their values."""
     names = list(POSITION)
     for start in range(3, rows.shape[1] - 2, 3):
         triple = rows[:, start : start + 3]
@@ -100,7 +100,7 @@ def _guessed(rows: np.ndarray) -> list[str]:
 
 
 def _table(rows: np.ndarray, names: list[str]) -> np.ndarray:
-    """A structured array; colours that are integers become bytes, so that fractions stay fractions."""
+    """Return a structured array; integer colours get an integer type, which marks them as 0 to 255."""
     kinds = dict.fromkeys(names, "f8")
     places = [place for place, name in enumerate(names) if name in COLOR]
     if places and np.all(rows[:, places] == np.rint(rows[:, places])) and rows[:, places].max() > 1:

@@ -1,4 +1,4 @@
-"""Legacy VTK files: the points of any data set, ASCII or binary (big-endian)."""
+"""Reader of legacy VTK files: the points of any data set, ASCII or binary (big-endian)."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _POINTS = re.compile(rb"^POINTS[ \t]+(\d{1,18})[ \t]+(\w+)[ \t]*\r?\n", re.MULTI
 
 
 def parse_vtk(path: AnyPath, data: bytes) -> np.ndarray:
-    """The points as a structured array; cells and attributes are left out.
+    """Read the points as a structured array; cells and attributes are ignored.
 
     Raises:
-        InputError: truncated, too many points, or not a legacy VTK file.
+        InputError: the file is truncated, no legacy VTK file, or has too many points.
     """
     lines = data[:1024].split(b"\n", 3)
     place = _POINTS.search(data, 0, _MAX_HEADER_BYTES)
@@ -33,7 +33,7 @@ def parse_vtk(path: AnyPath, data: bytes) -> np.ndarray:
     if word not in _TYPES:
         raise InputError(f"The points of {path} are of type {word}; try to save them as float or double")
     body = data[place.end() :]
-    if kind == b"ASCII":  # any number of points on a line
+    if kind == b"ASCII":  # a line may have any number of points
         words = body.split(None, 3 * count)[: 3 * count]
         if len(words) < 3 * count:
             raise truncated(path, len(words) // 3, count)

@@ -1,4 +1,4 @@
-"""Point clouds as files: many kinds are read, PLY is written."""
+"""Point cloud files: reading of many formats, and writing of PLY."""
 
 from __future__ import annotations
 
@@ -33,21 +33,21 @@ _PARSERS: dict[str, Callable[[AnyPath, bytes], np.ndarray]] = {
     **dict.fromkeys((".las", ".laz"), parse_las),
     ".e57": parse_e57,
 }
-"""Formats by suffix. A new one is a file with a parser that gives a table, and a line here."""
+"""Parsers by suffix. A new format is a file with a parser that returns a table, and a line here."""
 
 
 def read_cloud(path: AnyPath) -> PointCloud:
-    """Points with normals, colours and source labels, where the file has them.
+    """Read points, with normals, colours and source labels if the file has them.
 
-    The suffix decides the format: .ply (also without a suffix), .pcd, .npz, .npy, text in .xyz, .txt, .asc
+    The suffix determines the format: .ply (also if there is none), .pcd, .npz, .npy, text in .xyz, .txt, .asc
     and .csv, .pts, legacy .vtk, KITTI's .bin, the vertices of .obj, .stl and .glb, and with the extra
-    ``clouds`` .las, .laz and .e57. Faces and points that are not finite are left out.
+    ``clouds`` .las, .laz and .e57. Faces and points that are not finite are ignored.
 
     Returns:
         (N, 3) points in the file's unit, which should be metres.
 
     Raises:
-        InputError: missing, truncated, too large, of another format or without points.
+        InputError: the file is missing, truncated, too large, of another format or without points.
 
     >>> from pathlib import Path; import packetmesh as pm
     >>> _ = Path("corners.csv").write_text("x,y,z\\n0,0,1\\n0.5,0,1\\n0,0.5,1\\n")
@@ -66,7 +66,7 @@ def write_cloud(path: AnyPath, cloud: PointCloud) -> None:
     """Write a binary PLY: float positions and normals, uchar colours and source label.
 
     Raises:
-        InputError: not a .ply name, or the folder cannot be written.
+        InputError: the name does not end in .ply, or the folder cannot be written.
 
     >>> import numpy as np, packetmesh as pm
     >>> pm.write_cloud("corners.ply", pm.PointCloud(np.eye(3)))

@@ -1,4 +1,4 @@
-"""The demo scenes that ship in assets/scenes: rendered rigs with their truth, each described by a file."""
+"""Demo scenes in assets/scenes: rendered rigs with ground truth, each described by a file."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from pipeline.types import AnyPath, Rig
 
 SCENES = Path(__file__).resolve().parents[2] / "assets" / "scenes"
 BOARDS = "board"
-"""Folder of a scene whose nodes need calibration: what they see of a board."""
+"""Folder with board images, in scenes whose nodes need calibration."""
 
 
 @dataclass(frozen=True, slots=True)
 class DemoScene:
-    """A place that ships."""
+    """A demo scene that comes with PacketMesh."""
 
     title: str
-    """Its name on a screen."""
+    """Displayed name."""
     description: str
     seed: int
-    """Of its sensor noise and of its nodes' pose errors, together with its name."""
+    """Seed, together with the name, of its sensor noise and of its nodes' pose errors."""
 
 
 def _described() -> dict[str, DemoScene]:
@@ -34,14 +34,14 @@ def _described() -> dict[str, DemoScene]:
 
 
 DEMO_SCENES: dict[str, DemoScene] = _described()
-"""By name; the living room first, which opens by itself."""
+"""Demo scenes by name; the first, the living room, is opened at the start."""
 
 
 def board_views_of(scene: str) -> Path | None:
-    """The folder with views of a board by a demo's nodes, from which they can be calibrated; None without.
+    """Return the folder with a demo's board images, for calibrating its nodes; None if there is none.
 
-    It holds node_00/{color_00.jpg, depth_00.png, ...}, node_01/..., board.json and truth.json; images of
-    the same number are of the same moment.
+    It contains node_00/{color_00.jpg, depth_00.png, ...}, node_01/..., board.json and truth.json; images
+    with the same number were taken at the same time.
 
     >>> import packetmesh as pm
     >>> (pm.board_views_of("uncalibrated") / "node_00" / "color_00.jpg").is_file()
@@ -52,18 +52,18 @@ def board_views_of(scene: str) -> Path | None:
 
 
 CALIBRATED_SCENES = tuple(name for name in DEMO_SCENES if board_views_of(name) is None)
-"""Those whose nodes' intrinsics and depth are right, on which claims and benchmarks are measured."""
+"""Scenes whose intrinsics and depth are correct, used for claims and benchmarks."""
 
 
 def load_demo(name: str, calibration: AnyPath | None = None) -> Rig:
-    """The shipped rig of a demo, with its truth: the scene's mesh, the nodes' poses and hole-free depth.
+    """Load the rig of a demo with its truth: the scene's mesh, the nodes' poses and hole-free depth.
 
     Args:
         name: a key of ``DEMO_SCENES``.
-        calibration: a folder that is laid over it, as ``load_rig`` does.
+        calibration: a folder whose files replace the rig's own, as in ``load_rig``.
 
     Raises:
-        InputError: there is no demo of that name, its files are missing, or the calibration is not its own.
+        InputError: the demo or its files do not exist, or the calibration is for another rig.
 
     >>> import packetmesh as pm
     >>> rig = pm.load_demo("office")
@@ -72,6 +72,6 @@ def load_demo(name: str, calibration: AnyPath | None = None) -> Rig:
     """
     if name not in DEMO_SCENES:
         raise InputError(f"There is no demo scene {name!r}; try one of {', '.join(DEMO_SCENES)}")
-    from pipeline.io.rigs import load_rig  # large libraries; a list of the scenes needs none
+    from pipeline.io.rigs import load_rig  # imports large libraries, which listing the scenes does not need
 
     return load_rig(SCENES / name, calibration)

@@ -1,4 +1,4 @@
-"""A depth sensor's own bias and noise as a calibration found them: ``depth_correction.json`` (SPEC 1.5)."""
+"""Calibrated bias and noise of a depth sensor, stored in ``depth_correction.json`` (SPEC 1.5)."""
 
 from __future__ import annotations
 
@@ -21,39 +21,39 @@ MAP_SHAPE = (3, 4)
 """Rows and columns of the map's coefficients."""
 DEGREE = 2
 MOST_SHARE = 0.5
-"""A sensor that is off by more than this share is none: its file has another unit."""
+"""A larger bias, as a share of the depth, is implausible: the file has another unit."""
 
 
 @dataclass(frozen=True, slots=True)
 class DepthCorrection:
-    """The true depth z* = a + b z + c z^2 + z s(u, v) of a measured depth z, and the noise that is left.
+    """The true depth z* = a + b z + c z^2 + z s(u, v) of a measured depth z, and its remaining noise.
 
-    The map s is a quadratic B-spline over the image, clamped at its edges, of 3 x 4 coefficients. Its mean
+    The map s is a quadratic B-spline over the image with 3 x 4 coefficients, clamped at the edges. Its mean
     over the image is 0, so that b alone is the scale.
     """
 
     size_px: tuple[int, int]
-    """Width and height of the depth images that it is for."""
+    """Width and height of the depth images to which it applies."""
     offset_m: float = 0.0
-    """a"""
+    """Coefficient a."""
     scale: float = 1.0
-    """b"""
+    """Coefficient b."""
     curvature_per_m: float = 0.0
-    """c"""
+    """Coefficient c."""
     map_coefficients: FloatArray = field(default_factory=lambda: np.zeros(MAP_SHAPE))
-    """(3, 4) of s, dimensionless, the first row at the top of the image."""
+    """(3, 4) coefficients of s, dimensionless, the first row at the top of the image."""
     noise: DepthNoise | None = None
-    """Of the corrected depth; None where it is not known."""
+    """Noise of the corrected depth; None if it is unknown."""
     range_m: tuple[float, float] = (0.0, float("inf"))
-    """Nearest and farthest depth that was measured for it; beyond, it is a guess."""
+    """Nearest and farthest depth in the calibration; outside this range the correction is extrapolated."""
     ci95: Mapping[str, FloatArray] = field(default_factory=dict)
-    """95 % intervals by the name of a field above or of the noise: (..., 2) beside its shape."""
+    """95 % intervals (..., 2) by the name of a field above or of the noise, which has the shape (...)."""
 
     def apply(self, depth: DepthMap) -> DepthMap:
-        """The corrected depth image.
+        """Return the corrected depth image.
 
         Raises:
-            InputError: an image of another size, or relative depth.
+            InputError: the image has another size, or relative depth.
         """
         height_px, width_px = depth.z_m.shape
         if (width_px, height_px) != self.size_px:
@@ -67,13 +67,13 @@ class DepthCorrection:
         return DepthMap(np.where(corrected_m > 0.0, corrected_m, np.nan).astype(np.float32))
 
     def corrected_m(self, z_m: FloatArray, pixels: FloatArray | IntArray) -> FloatArray:
-        """(N,) true depth of (N,) measured depth at (N, 2) pixels."""
+        """Return (N,) true depths of (N,) measured depths at (N, 2) pixels."""
         rows, columns = map_basis(self.size_px, pixels)
         share = np.einsum("nr,rc,nc->n", rows, self.map_coefficients, columns)
         return self._corrected_m(np.asarray(z_m, float), share)
 
     def map_over_image(self) -> FloatArray:
-        """(H, W) s(u, v)."""
+        """Evaluate s(u, v) at all pixels, (H, W)."""
         rows, columns = _image_basis(self.size_px)
         return rows @ self.map_coefficients @ columns.T
 
@@ -82,13 +82,13 @@ class DepthCorrection:
 
 
 def map_basis(size_px: tuple[int, int], pixels: FloatArray | IntArray) -> tuple[FloatArray, FloatArray]:
-    """(N, 3) and (N, 4) splines of the map's rows and columns at (N, 2) pixels."""
+    """Evaluate the splines of the map's rows (N, 3) and columns (N, 4) at (N, 2) pixels."""
     u, v = (np.asarray(pixels, float) + 0.5).T / np.array(size_px, float)[:, None]
     return _splines(v, MAP_SHAPE[0]), _splines(u, MAP_SHAPE[1])
 
 
 def map_means() -> FloatArray:
-    """(3, 4) how much of each of the map's coefficients is in its mean over the image."""
+    """Return (3, 4) weights of the map's coefficients in its mean over the image."""
     rows, columns = (
         (knots[DEGREE + 1 :] - knots[: -DEGREE - 1]) / (DEGREE + 1) for knots in map(_knots, MAP_SHAPE)
     )
@@ -103,7 +103,7 @@ def _image_basis(size_px: tuple[int, int]) -> tuple[FloatArray, FloatArray]:
 
 
 def _splines(share: FloatArray, count: int) -> FloatArray:
-    """(N, count) at (N,) places from 0 to 1."""
+    """Evaluate ``count`` splines at (N,) positions from 0 to 1; returns (N, count)."""
     return BSpline.design_matrix(np.clip(share, 0.0, 1.0), _knots(count), DEGREE).toarray()
 
 
@@ -112,7 +112,7 @@ def _knots(count: int) -> FloatArray:
 
 
 def write_depth_correction(path: AnyPath, correction: DepthCorrection) -> None:
-    """Write the terms so that reading gives the same numbers.
+    """Write a correction so that reading it gives exactly the same numbers.
 
     Raises:
         InputError: the file cannot be written.
@@ -134,10 +134,10 @@ def write_depth_correction(path: AnyPath, correction: DepthCorrection) -> None:
 
 
 def read_depth_correction(path: AnyPath) -> DepthCorrection:
-    """The correction in a file.
+    """Read a correction from a file.
 
     Raises:
-        InputError: missing, no JSON, another kind of file, or terms that no sensor has.
+        InputError: the file is missing, no JSON, of another kind, or has implausible terms.
     """
     values = read_json(path, "depth correction")
     if values.get("format") != FORMAT:
@@ -171,7 +171,7 @@ def _from_values(values: dict[str, Any]) -> DepthCorrection:
 
 
 def _check(path: AnyPath, correction: DepthCorrection) -> None:
-    """Raise InputError for what is no sensor's."""
+    """Raise an InputError for implausible terms."""
     terms = [correction.offset_m, correction.scale, correction.curvature_per_m]
     noise = [] if correction.noise is None else list(asdict(correction.noise).values())
     finite = np.isfinite([*terms, *noise, *correction.map_coefficients.ravel()]).all()

@@ -1,4 +1,4 @@
-"""What the numbers of a depth image mean: units in a metre, unknown values, and what is doubtful."""
+"""Interpretation of a depth image's numbers: units per metre, unknown values, and doubts about them."""
 
 from __future__ import annotations
 
@@ -11,46 +11,46 @@ from packetmesh.errors import InputError
 from pipeline.types import AnyPath, BoolArray
 
 MILLIMETRES = 1000.0
-"""Depth units in one metre where nothing else is said."""
+"""Depth units per metre of whole numbers if no scale is given."""
 COMMON_DEPTH_SCALES = (1.0, 100.0, 256.0, 1000.0, 5000.0, 10000.0)
 """Units per metre that RGB-D data sets use."""
 NO_VALUE = 65535
-"""What some data sets (7-Scenes) write where the depth is unknown, beside 0."""
+"""Value that some data sets (7-Scenes) use for unknown depth, in addition to 0."""
 FARTHEST_M = 65.534
-"""What is left for 16 bits of millimetres."""
+"""Largest depth that 16 bits store in millimetres, without ``NO_VALUE``."""
 FARTHEST_FLOAT_M, MOST_FAR_SHARE = 1e6, 0.05
-"""Floating-point depths beyond are none; so many of them tell of a file that is understood wrongly."""
+"""A share of floating-point depths beyond FARTHEST_FLOAT_M above this means that the file was misread."""
 PLAUSIBLE_MEDIAN_M = (0.01, 100.0)
-"""Beyond these an image is refused."""
+"""Range of plausible median depths; images outside it are rejected."""
 ROOM_M = (0.2, 15.0)
-"""Median depths between which nothing is said."""
+"""Range of median depths that raise no doubt."""
 STEPS = {5: "as TUM stores 5000 to the metre", 8: "as SUN RGB-D stores them with rotated bits"}
-"""Of depth that was measured in millimetres and stored as multiples of them, by whom."""
+"""Steps of depth values that are stored as multiples of the real unit, and the data set that does so."""
 _STEP_SHARE = 0.95
-"""Of the values: rotated bits are multiples of eight only up to 8.191 m."""
+"""Share of the values that must be multiples: rotated bits are multiples of eight only up to 8.191 m."""
 _TYPICAL_DEPTH_M = 2.0
 
 
 def known_in(values: NDArray[Any]) -> BoolArray:
-    """(H, W) where the values of a depth image are depths."""
+    """Return (H, W) True where the values of a depth image are known depths."""
     if values.dtype.kind == "f":
         return np.isfinite(values) & (values > 0)
     return (values > 0) & (values != NO_VALUE)
 
 
 def usual_scale(values: NDArray[Any]) -> float:
-    """Units per metre where nobody says more: floating-point depth is in metres, whole numbers are
+    """Return the units per metre if no scale is given: floating-point depth is in metres, whole numbers in
     millimetres."""
     return 1.0 if values.dtype.kind == "f" else MILLIMETRES
 
 
 def doubts(values: NDArray[Any], depth_scale: float, stated: bool) -> tuple[str, ...]:
-    """What is doubtful about a depth image read at a scale, a sentence each, with what to try.
+    """Return doubts about a depth image read at a scale, one sentence each, with what to try.
 
     Args:
-        values: (H, W) as they stand in the file; some are known.
+        values: (H, W) as stored in the file; some are known.
         depth_scale: units per metre at which they are read.
-        stated: whether a person gave the scale, so that the values' steps say nothing against it.
+        stated: True if the user gave the scale; then the step of the values raises no doubt.
     """
     known = values[known_in(values)]
     median_m = float(np.median(known)) / depth_scale
@@ -74,7 +74,7 @@ def doubts(values: NDArray[Any], depth_scale: float, stated: bool) -> tuple[str,
 
 
 def step_of(known: NDArray[Any]) -> int | None:
-    """The one of ``STEPS`` of which nearly all (N,) values are multiples, odd and even ones; else None."""
+    """Return the step of which nearly all (N,) values are multiples, both odd and even; else None."""
     if known.dtype.kind == "f":
         return None
     for step in STEPS:
@@ -85,10 +85,10 @@ def step_of(known: NDArray[Any]) -> int | None:
 
 
 def check_median(path: AnyPath, values: NDArray[Any], depth_scale: float) -> None:
-    """Refuse a scale at which the values are no distances at all.
+    """Raise an error if the median depth is implausible at this scale.
 
     Raises:
-        InputError: with the scale to try.
+        InputError: the message contains a scale to try.
     """
     known = values[known_in(values)]
     median_units = float(np.median(known))
@@ -106,7 +106,7 @@ def check_median(path: AnyPath, values: NDArray[Any], depth_scale: float) -> Non
 
 
 def likely_depth_scale(median_units: float) -> float:
-    """The usual depth scale at which this median comes nearest to 2 m, if possible within a room."""
+    """Return the common depth scale that brings the median nearest to 2 m, if possible within room size."""
     nearest_m, farthest_m = ROOM_M
     rooms = [scale for scale in COMMON_DEPTH_SCALES if nearest_m <= median_units / scale <= farthest_m]
     typical_scale = median_units / _TYPICAL_DEPTH_M

@@ -1,4 +1,4 @@
-"""Depth that a camera of its own has measured, as the colour camera beside it would have it."""
+"""Registration of a separate depth camera's image to the colour camera's pixel grid."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from pipeline.kernels.geometry import apply, project, undistorted_rays
 from pipeline.types import BoolArray, CameraIntrinsics, DepthMap, FloatArray, IntArray
 
 RaysAt = Callable[[FloatArray], FloatArray]
-"""(N, 3) directions with z = 1 of (N, 2) positions in an image."""
+"""Returns (N, 3) directions with z = 1 for (N, 2) positions in an image."""
 REACH, OVERLAP = 0.5, 0.15
-"""Half a depth pixel is its own; a little more closes the cracks that noise opens between two."""
+"""Half size of a depth pixel, and its enlargement to close the cracks that noise opens between pixels."""
 STEEPEST = 0.05
-"""Share of the depth by which it may change over a pixel; more is an edge (SPEC 2)."""
+"""Largest change of depth over a pixel, as a share of the depth; a larger one is an edge (SPEC 2)."""
 STEP = 0.02
-"""Share of the depth by which a surface in a crack must be nearer than what shows through it."""
+"""Share of the depth by which a surface in a crack must be nearer than the surface behind the crack."""
 NEAREST_M = 0.02
-"""Before the colour camera."""
+"""Least distance in front of the colour camera."""
 WIDEST_PX = 64
-"""Of the colour image that one depth pixel may cover."""
+"""Most colour pixels, in width and height, that one depth pixel may cover."""
 AT_ONCE = 40_000
-"""Depth pixels."""
+"""Number of depth pixels processed together."""
 
 
 def register_depth(
@@ -31,18 +31,18 @@ def register_depth(
     color_camera: CameraIntrinsics,
     T_color_depth: FloatArray,
 ) -> DepthMap:
-    """Depth on the colour camera's pixel grid, unknown where it sees nothing that was measured.
+    """Return depth on the colour camera's pixel grid, NaN where no measured surface is visible.
 
-    Every depth pixel is a small piece of the surface: a parallelogram in the colour image, inclined as its
-    neighbours say, so that a finer colour image has no gaps. Of several the nearest hides the others.
-    ``cv2.registerDepth`` sets single pixels, leaves a grid of holes in a finer image, takes the depth image
-    as free of distortion and does not look where a point is behind the camera.
+    Every depth pixel becomes a small parallelogram in the colour image, inclined like its neighbourhood,
+    so that a finer colour image has no gaps; the nearest one hides the others.
+    ``cv2.registerDepth`` sets single pixels, leaves a grid of holes in a finer image, ignores distortion of
+    the depth image and does not check whether a point is behind the camera.
 
     Args:
         depth: (h, w) metric, on the depth camera's grid.
-        depth_camera: which is undistorted first.
-        color_camera: whose image the depth is registered to, with its distortion.
-        T_color_depth: (4, 4), metres.
+        depth_camera: its intrinsics, whose distortion is removed.
+        color_camera: target of the registration, with its distortion.
+        T_color_depth: (4, 4) transform from the depth camera to the colour camera, metres.
     """
     z_m = carried(
         depth.z_m, lambda pixels: undistorted_rays(depth_camera, pixels), color_camera, T_color_depth
@@ -53,7 +53,7 @@ def register_depth(
 def carried(
     z_m: FloatArray, rays_at: RaysAt, color_camera: CameraIntrinsics, T_color_depth: FloatArray
 ) -> FloatArray:
-    """(H, W) float32 of ``register_depth`` for a depth camera that is known by its rays alone."""
+    """Do ``register_depth`` for a depth camera given only by its rays; returns (H, W) float32."""
     size = color_camera.height_px * color_camera.width_px
     own, near = np.full(size, np.inf, np.float32), np.full(size, np.inf, np.float32)
     limits = _limits(color_camera)
@@ -70,8 +70,8 @@ def carried(
 def _pieces(
     z_m: FloatArray, rays_at: RaysAt, T_color_depth: FloatArray
 ) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """(4, N, 3) middles of the left, right, upper and lower side of depth pixels and (N, 3) their centres, in
-    the colour camera's frame.
+    """Yield (4, N, 3) midpoints of the left, right, upper and lower side of depth pixels and (N, 3) their
+    centres, in the colour camera's frame.
     """
     z_m = z_m.astype(np.float64)
     slopes_m = np.stack([_slope(z_m, axis) for axis in (1, 0)], axis=-1)
@@ -88,7 +88,7 @@ def _pieces(
 
 
 def _slope(z_m: FloatArray, axis: int) -> FloatArray:
-    """(H, W) change of depth over a pixel: the smaller of the two sides', and none across an edge."""
+    """Return (H, W) change of depth per pixel: the smaller of both sides, and 0 across an edge."""
     step = np.diff(z_m, axis=axis)
     unknown = np.full_like(np.take(z_m, [0], axis=axis), np.nan)
     before = np.concatenate([unknown, step], axis=axis)
@@ -98,7 +98,7 @@ def _slope(z_m: FloatArray, axis: int) -> FloatArray:
 
 
 def _limits(camera: CameraIntrinsics) -> tuple[FloatArray, FloatArray]:
-    """Least and largest x / z and y / z in the image; a lens's polynomial may fold what is beyond into it."""
+    """Return least and largest x / z and y / z in the image; the lens model may fold others into it."""
     u, v = np.arange(-1, camera.width_px + 1), np.arange(-1, camera.height_px + 1)
     rim = [np.column_stack([u, np.full_like(u, edge)]) for edge in (-1, camera.height_px)]
     rim += [np.column_stack([np.full_like(v, edge), v]) for edge in (-1, camera.width_px)]
@@ -115,7 +115,7 @@ def _in_view(points_m: FloatArray, limits: tuple[FloatArray, FloatArray]) -> Boo
 def _covered(
     sides_m: FloatArray, center_m: FloatArray, camera: CameraIntrinsics
 ) -> tuple[IntArray, FloatArray, BoolArray]:
-    """(P,) flat indices of colour pixels, depth of a piece there, and whether the piece proper covers it."""
+    """Return (P,) flat indices of colour pixels, a piece's depth there, and if it covers them unenlarged."""
     left, right, above, below = (project(camera, side_m) for side_m in sides_m)
     center = project(camera, center_m)
     across, down = right - left, below - above
@@ -138,7 +138,7 @@ def _covered(
 
 
 def _shares(offset: FloatArray, across: FloatArray, down: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Offsets in the image as shares s of ``across`` and t of ``down``; infinite where they are parallel."""
+    """Express image offsets as s ``across`` + t ``down``; s and t are infinite where these are parallel."""
     area = across[:, 0] * down[:, 1] - across[:, 1] * down[:, 0]
     seen = np.abs(area) > 1e-12
     safe = np.where(seen, area, 1.0)

@@ -1,4 +1,4 @@
-"""Where a separate depth camera stands beside the colour camera: ``extrinsics.json``."""
+"""Pose of a separate depth camera relative to the colour camera: ``extrinsics.json``."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ KEY = "T_color_depth"
 
 
 def read_extrinsics(path: AnyPath) -> FloatArray:
-    """The (4, 4) ``T_color_depth``, metres: points of the depth camera's frame in the colour camera's.
+    """Read the (4, 4) ``T_color_depth``, metres, from the depth camera's to the colour camera's frame.
 
     Raises:
-        InputError: unreadable, or no rigid transform of that name.
+        InputError: the file is unreadable, or has no rigid transform of that name.
     """
     values = read_json(path, "extrinsics file")
     try:
@@ -34,7 +34,7 @@ def read_extrinsics(path: AnyPath) -> FloatArray:
 
 
 def write_extrinsics(path: AnyPath, T_color_depth: FloatArray) -> None:
-    """Write a (4, 4) transform so that reading it gives the same numbers.
+    """Write a (4, 4) transform so that reading it gives exactly the same numbers.
 
     Raises:
         InputError: the folder cannot be written.

@@ -1,6 +1,6 @@
-"""Fisheye cameras in the files of other programs, those that know Kannala and Brandt's lens.
+"""Writers of fisheye cameras for other programs that support the Kannala-Brandt model.
 
-MATLAB's and Open3D's files hold no such lens, and neither do this program's own intrinsics.
+MATLAB's and Open3D's files have no such model, and neither do PacketMesh's own intrinsics.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pipeline.types import AnyPath, FloatArray
 
 
 def opencv_yaml(matrix: FloatArray, distortion: FloatArray, size_px: tuple[int, int]) -> str:
-    """As OpenCV's own calibration sample marks a fisheye."""
+    """Return the camera in YAML, marked as a fisheye as in OpenCV's calibration sample."""
     return "\n".join(
         (
             "%YAML:1.0",
@@ -32,7 +32,7 @@ def opencv_yaml(matrix: FloatArray, distortion: FloatArray, size_px: tuple[int, 
 
 
 def camera_info(matrix: FloatArray, distortion: FloatArray, size_px: tuple[int, int]) -> str:
-    """ROS's camera_info with the model ``equidistant``."""
+    """Return ROS's camera_info with the distortion model ``equidistant``."""
     return "\n".join(
         (
             f"image_width: {size_px[0]}",
@@ -49,7 +49,7 @@ def camera_info(matrix: FloatArray, distortion: FloatArray, size_px: tuple[int, 
 
 
 def kalibr_yaml(matrix: FloatArray, distortion: FloatArray, size_px: tuple[int, int]) -> str:
-    """Kalibr's camchain of one camera with the lens equidistant."""
+    """Return Kalibr's camchain of one camera with the distortion model equidistant."""
     return (
         "cam0:\n  camera_model: pinhole\n"
         f"  intrinsics: [{listed(_places(matrix))}]\n"
@@ -60,7 +60,7 @@ def kalibr_yaml(matrix: FloatArray, distortion: FloatArray, size_px: tuple[int, 
 
 
 def colmap_text(matrix: FloatArray, distortion: FloatArray, size_px: tuple[int, int]) -> str:
-    """A cameras.txt of one OPENCV_FISHEYE."""
+    """Return a cameras.txt with one OPENCV_FISHEYE camera."""
     fx, fy, cx, cy = _places(matrix)
     numbers = listed(np.array([fx, fy, cx + COLMAP_MIDDLE, cy + COLMAP_MIDDLE, *distortion]), " ")
     return (
@@ -76,13 +76,13 @@ FISHEYE_WRITERS: Mapping[str, Callable[[FloatArray, FloatArray, tuple[int, int]]
         "camchain.yaml": kalibr_yaml,
     }
 )
-"""By the name that the file has usually; each takes (3, 3) K, (4,) k1 to k4, and width and height."""
+"""Writers by the usual name of the file; arguments: (3, 3) K, (4,) k1 to k4, and width and height."""
 
 
 def write_fisheye(
     path: AnyPath, matrix: FloatArray, distortion: FloatArray, size_px: tuple[int, int], kind: str
 ) -> None:
-    """Write a camera as one of ``FISHEYE_WRITERS`` does.
+    """Write a camera with the writer ``FISHEYE_WRITERS[kind]``.
 
     Raises:
         InputError: the folder cannot be written.

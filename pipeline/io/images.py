@@ -1,4 +1,4 @@
-"""Colour and depth images."""
+"""Reading and writing of colour and depth images."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ _PNM_HEADER = re.compile(rb"P[56]" + (_PNM_SPACE + rb"(\d{1,9})") * 3 + rb"\s")
 
 
 def read_color(path: AnyPath) -> ByteArray:
-    """(H, W, 3) RGB of a PNG, JPEG, PGM, PPM, TIFF or NPY file; grey images get three equal channels.
+    """Read (H, W, 3) RGB from a PNG, JPEG, PGM, PPM, TIFF or NPY file; grey images get three equal channels.
 
     Raises:
-        InputError: missing, truncated, too large, or none of these.
+        InputError: the file is missing, truncated, too large, or of another format.
     """
     raw = _raw(path, "colour image")
     if raw is not None:
@@ -41,30 +41,30 @@ def read_color(path: AnyPath) -> ByteArray:
 
 @dataclass(frozen=True, slots=True)
 class ReadDepth:
-    """A depth image and how it was understood."""
+    """A depth image with the scale at which it was read."""
 
     depth: DepthMap
     units_per_metre: float
     notes: tuple[str, ...]
-    """What is doubtful about it, a sentence each."""
+    """Doubts about it, one sentence each."""
 
 
 def read_depth(path: AnyPath, depth_scale: float | None = None) -> DepthMap:
-    """Metric depth of a PNG, PGM, TIFF, PFM, OpenEXR or NPY image, as ``read_depth_noted`` reads it."""
+    """Read metric depth from a PNG, PGM, TIFF, PFM, OpenEXR or NPY image, as ``read_depth_noted`` does."""
     return read_depth_noted(path, depth_scale).depth
 
 
 def read_depth_noted(path: AnyPath, depth_scale: float | None = None) -> ReadDepth:
-    """Metric depth of a PNG, PGM, TIFF, PFM, OpenEXR or NPY image, with what is doubtful about its scale.
+    """Read metric depth from a PNG, PGM, TIFF, PFM, OpenEXR or NPY image, with doubts about its scale.
 
     Args:
         path: the file; 0 and, in whole numbers, 65535 mean unknown.
-        depth_scale: image units per metre; without it whole numbers are millimetres and floating-point
+        depth_scale: image units per metre; by default whole numbers are millimetres and floating-point
             numbers metres.
 
     Raises:
-        InputError: missing, truncated, too large, not one channel of depth, without any depth, or with a
-            median depth that no room has at this scale.
+        InputError: the file is missing, truncated, too large, not one channel of depth, without any depth,
+            or has an implausible median depth at this scale.
     """
     if depth_scale is not None and not (np.isfinite(depth_scale) and depth_scale > 0):
         raise InputError(f"The depth scale for {path} is {depth_scale}; try 1000 for an image in millimetres")
@@ -77,10 +77,10 @@ def read_depth_noted(path: AnyPath, depth_scale: float | None = None) -> ReadDep
 
 
 def read_depth_values(path: AnyPath) -> NDArray[Any]:
-    """(H, W) values of a depth image as they stand in the file, some of them known (``known_in``).
+    """Read (H, W) values as stored in a depth image; at least one is known (``known_in``).
 
     Raises:
-        InputError: missing, truncated, too large, not one channel of 16 bits or more, or without any depth.
+        InputError: the file is missing, truncated, too large, not one channel of 16 bits or more, or empty.
     """
     raw = _raw(path, "depth image")
     values = _decode(path, cv2.IMREAD_UNCHANGED, "depth image") if raw is None else raw
@@ -96,10 +96,10 @@ def read_depth_values(path: AnyPath) -> NDArray[Any]:
 
 
 def read_depth_units(path: AnyPath) -> NDArray[Any]:
-    """(H, W) values of a depth image, 0 where the depth is unknown.
+    """Read (H, W) values of a depth image, 0 where the depth is unknown.
 
     Raises:
-        InputError: as ``read_depth_values``.
+        InputError: as for ``read_depth_values``.
     """
     values = read_depth_values(path)
     return np.where(known_in(values), values, values.dtype.type(0))
@@ -116,7 +116,7 @@ def write_color(path: AnyPath, rgb: ByteArray) -> None:
 
 
 def jpeg_of(rgb: ByteArray, quality: int = 88) -> bytes:
-    """(H, W, 3) RGB as a JPEG file."""
+    """Encode (H, W, 3) RGB as a JPEG file."""
     return cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()
 
 
@@ -124,7 +124,7 @@ def write_depth_mm(path: AnyPath, depth: DepthMap) -> None:
     """Write a 16-bit PNG in millimetres, 0 where the depth is unknown.
 
     Raises:
-        InputError: a depth that 16 bits cannot hold, or a folder that cannot be written.
+        InputError: a depth exceeds 16 bits, or the folder cannot be written.
     """
     depth_mm = np.rint(np.where(depth.valid, depth.z_m, 0.0).astype(np.float64) * 1000.0)
     if depth_mm.min() < 0 or depth_mm.max() >= NO_VALUE:
@@ -137,13 +137,13 @@ def write_depth_mm(path: AnyPath, depth: DepthMap) -> None:
 
 
 def _raw(path: AnyPath, what: str) -> np.ndarray | None:
-    """The numbers of a file that holds them plainly; None for one that is to be decoded."""
+    """Return the numbers of a file with one of ``SIGNATURES``; None for a file that OpenCV decodes."""
     data = read_bytes(path, MAX_IMAGE_BYTES, what)
     return raw_values(path, data, what) if data.startswith(SIGNATURES) else None
 
 
 def _rgb_of(path: AnyPath, values: np.ndarray) -> ByteArray:
-    """(H, W, 3) bytes of an image with one, three or four channels."""
+    """Convert an image with one, three or four channels to (H, W, 3) bytes."""
     if values.ndim == 2:
         values = np.stack([values] * 3, axis=-1)
     if values.dtype != np.uint8 or values.shape[2] not in (3, 4):
@@ -174,7 +174,7 @@ def _decode(path: AnyPath, flags: int, what: str) -> np.ndarray:
 
 
 def _is_whole(data: bytes) -> bool:
-    """Whether nothing is missing at the end of a file."""
+    """Return whether a file is complete, without missing bytes at its end."""
     if data.startswith(_PNG_SIGNATURE):
         return _png_is_whole(data)
     if data.startswith(_PNM_SIGNATURES):
@@ -188,7 +188,7 @@ def _is_whole(data: bytes) -> bool:
 
 
 def _png_is_whole(data: bytes) -> bool:
-    """Whether all chunks up to the last are there with right checksums; decoders trust their lengths."""
+    """Return whether all chunks are present with correct checksums, because decoders trust their lengths."""
     view = memoryview(data)
     position = len(_PNG_SIGNATURE)
     while position + 12 <= len(data):
@@ -202,7 +202,7 @@ def _png_is_whole(data: bytes) -> bool:
 
 
 def _size_px(data: bytes) -> tuple[int, int]:
-    """Width and height from the header of a file, before anything is decoded; 0 x 0 if absent."""
+    """Read width and height from a file's header before decoding; 0 x 0 if absent."""
     if data.startswith(_PNG_SIGNATURE):
         return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
     if data.startswith(_PNM_SIGNATURES):

@@ -1,4 +1,4 @@
-"""Camera intrinsics in the common styles, recognised by their keys."""
+"""Reading and writing of camera intrinsics in common formats, recognised by their keys."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from pipeline.types import AnyPath, CameraIntrinsics, FloatArray
 _BROWN_CONRADY = {"", "plumb_bob", "rational_polynomial"}
 """Distortion models whose first five coefficients are k1, k2, p1, p2, k3."""
 FOCAL_LENGTHS = (0.05, 100.0)
-"""In widths or heights of the image: angles of view of 169 and of half a degree."""
+"""Least and largest focal length in image widths or heights: angles of view of 169 and half a degree."""
 MOST_DISTORTION = 1e4
 _YAML_ENTRY = re.compile(r"^([ \t]*)(\w+):(.*(?:\n(?![ \t]*\w+:).*)*)", re.MULTILINE)
 _LIST = re.compile(r"\[[^\]]*\]")
 _WORDS = re.compile(r"\s*[^\s#%.-]")
-"""A line that is neither empty nor a comment, nor part of a list, nor the end of a document."""
+"""A line that is neither empty nor a comment, a list item or the end of a document."""
 _NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?(?![\w.])")
 
 
 def read_intrinsics(path: AnyPath, size_px: tuple[int, int] | None = None) -> CameraIntrinsics:
-    """Intrinsics from JSON, YAML or text.
+    """Read intrinsics from JSON, YAML or text.
 
-    Three styles: ``width height fx fy cx cy [distortion]``; Open3D's ``intrinsic_matrix``, which is
-    column-major; ROS's camera_info (``K``, ``D``) or OpenCV's and ROS's calibration file
-    (``camera_matrix``, ``distortion_coefficients``). And those of COLMAP, Kalibr and MATLAB
-    (``pipeline.io.camera_files``). Or a bare matrix, 3 x 3 or 4 x 4 numbers, of images whose size is known.
+    Formats: ``width height fx fy cx cy [distortion]``; Open3D's column-major ``intrinsic_matrix``;
+    ROS's camera_info (``K``, ``D``) or the calibration file of OpenCV and ROS (``camera_matrix``,
+    ``distortion_coefficients``); files of COLMAP, Kalibr and MATLAB (``pipeline.io.camera_files``); or a
+    bare matrix, 3 x 3 or 4 x 4 numbers, if the image size is known.
 
     Args:
         path: the file.
-        size_px: width and height of the images, for a bare matrix.
+        size_px: width and height of the images, needed for a bare matrix.
 
     Raises:
-        InputError: unreadable, of no known style, or with impossible values.
+        InputError: the file is unreadable, of no known format, or has impossible values.
     """
     text = read_text(path, "intrinsics file")
     numbers = _bare_numbers(text)
@@ -65,7 +65,7 @@ def read_intrinsics(path: AnyPath, size_px: tuple[int, int] | None = None) -> Ca
 
 
 def _bare_numbers(text: str) -> FloatArray | None:
-    """(N,) numbers of a text that holds nothing else, separated by blanks or commas."""
+    """Return the (N,) numbers of a text of nothing but numbers, separated by blanks or commas; else None."""
     try:
         return np.array(text.replace(",", " ").split(), dtype=np.float64)
     except ValueError:
@@ -73,7 +73,7 @@ def _bare_numbers(text: str) -> FloatArray | None:
 
 
 def _in_matrix(path: AnyPath, numbers: FloatArray, size_px: tuple[int, int] | None) -> CameraIntrinsics:
-    """The camera of a 3 x 3 or 4 x 4 matrix in rows."""
+    """Return the camera of a 3 x 3 or 4 x 4 matrix given row by row."""
     side = 3 if numbers.size == 9 else 4
     matrix = numbers.reshape(side, side)[:3, :3]
     if not (np.isfinite(matrix).all() and matrix[0, 0] > 0 and matrix[1, 1] > 0 and matrix[2, 2] == 1):
@@ -92,7 +92,7 @@ def _in_matrix(path: AnyPath, numbers: FloatArray, size_px: tuple[int, int] | No
 
 
 def write_intrinsics(path: AnyPath, intrinsics: CameraIntrinsics) -> None:
-    """Write the JSON style ``width height fx fy cx cy distortion``, exact to the last bit.
+    """Write ``width height fx fy cx cy distortion`` as JSON, exact to the last bit.
 
     Raises:
         InputError: the folder cannot be written.
@@ -111,10 +111,10 @@ def write_intrinsics(path: AnyPath, intrinsics: CameraIntrinsics) -> None:
 
 
 def _parse_yaml(text: str) -> dict[str, Any]:
-    """The numbers and words of block-style YAML, two levels deep, which is all that camera files use.
+    """Parse numbers and words of block-style YAML, two levels deep, which camera files do not exceed.
 
     Raises:
-        ValueError: it ends within a list or a name.
+        ValueError: the text ends within a list or a name.
     """
     if text.count("[") != text.count("]"):
         raise ValueError
@@ -135,10 +135,10 @@ def _parse_yaml(text: str) -> dict[str, Any]:
 
 
 def _from_keys(values: dict[str, Any]) -> CameraIntrinsics | None:
-    """The camera as the file has it, with five distortion coefficients or more; None in an unknown style.
+    """Return the camera with all its distortion coefficients, at least five; None for an unknown format.
 
     Raises:
-        KeyError, TypeError, ValueError, OverflowError: a value is missing or none that belongs there.
+        KeyError, TypeError, ValueError, OverflowError: a value is missing or invalid.
     """
     if "intrinsic_matrix" in values:
         matrix = np.array(values["intrinsic_matrix"], dtype=np.float64).reshape(3, 3).T
@@ -164,7 +164,7 @@ def _first(values: dict[str, Any], *keys: str) -> Any:
 
 
 def _data(value: Any) -> Any:
-    """A list, or that of a matrix, which has as many numbers as it says."""
+    """Return a list, or the data of a matrix after checking that they match its size."""
     if not isinstance(value, dict):
         return value
     numbers = value["data"]
@@ -174,7 +174,7 @@ def _data(value: Any) -> Any:
 
 
 def _check(path: AnyPath, camera: CameraIntrinsics, distortion_model: str) -> None:
-    """Raise InputError for a camera that cannot be."""
+    """Raise an InputError for impossible values."""
 
     def wrong(what: str, hint: str) -> InputError:
         return InputError(f"The intrinsics file {path} has {what}; try {hint}")

@@ -1,4 +1,4 @@
-"""Triangle meshes as PLY, GLB, OBJ and STL files."""
+"""Reading and writing of triangle meshes as PLY, GLB, OBJ and STL files."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ MESH_SUFFIXES = (".ply", ".glb", ".obj", ".stl")
 _MAX_HEADER_BYTES = 10_000
 _PLY_FACES = re.compile(rb"^element face (\d{1,18})\s*$", re.MULTILINE)
 SRGB_GAMMA = 2.2
-"""About that of sRGB; glTF has vertex colours in linear light."""
+"""Approximate gamma of sRGB; vertex colours in glTF are linear."""
 T_GLTF_WORLD = rigid(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]), np.zeros(3))
-"""glTF has y up and the world frame z; the file's root node carries this rotation."""
+"""Rotation between the world frame (z up) and glTF (y up); the file's root node stores it."""
 
 
 def write_mesh(path: AnyPath, surface: Surface, texture: Texture | None = None) -> None:
     """Write the triangles of a surface, with its colours, in the format of the suffix.
 
     Args:
-        path: ends in .ply (binary), .glb, .obj or .stl (binary, which has no place for colours).
-        surface: in metres, Z up; a .glb file is turned to Y up, as glTF wants it.
-        texture: its photographs, which only a .glb file has a place for.
+        path: name ending in .ply (binary), .glb, .obj or .stl (binary, without colours).
+        surface: in metres, Z up; a .glb file is rotated to Y up, as glTF requires.
+        texture: photographs for the surface, which only .glb files store.
 
     Raises:
-        InputError: another suffix, no triangle, or a folder that cannot be written.
+        InputError: the suffix is another, there is no triangle, or the folder cannot be written.
 
     >>> import numpy as np, packetmesh as pm
     >>> surface = pm.Surface(np.eye(3), np.array([[0, 1, 2]]))
@@ -61,7 +61,7 @@ def write_mesh(path: AnyPath, surface: Surface, texture: Texture | None = None) 
 
 
 def _dressed(surface: Surface, texture: Texture) -> trimesh.Trimesh:
-    """In photographs and, where there is none, in the colours of the points, which glTF multiplies."""
+    """Build a mesh with photographs and, where there are none, vertex colours; glTF multiplies both."""
     corners = texture.corners(surface.triangles)
     colors = np.full((len(corners.vertices), 4), 255, np.uint8)
     if surface.colors is not None:
@@ -79,16 +79,16 @@ def _dressed(surface: Surface, texture: Texture) -> trimesh.Trimesh:
 
 
 def read_mesh(path: AnyPath) -> Surface:
-    """The triangles of a PLY, GLB, OBJ or STL file, everything in it joined to one mesh, Z up.
+    """Read the triangles of a PLY, GLB, OBJ or STL file; all parts are joined to one mesh, Z up.
 
-    STL repeats a vertex for each of its triangles; equal ones are joined again.
+    STL repeats a vertex for each of its triangles; equal vertices are merged.
 
     Returns:
         (V, 3) float64 vertices in the file's unit (metres in glTF), (F, 3) int32 triangles, and colours
-        where the vertices have them.
+            if the vertices have them.
 
     Raises:
-        InputError: missing, damaged, too large, of another format or without triangles.
+        InputError: the file is missing, damaged, too large, of another format or without triangles.
 
     >>> import numpy as np, packetmesh as pm
     >>> pm.write_mesh("triangle.stl", pm.Surface(np.eye(3), np.array([[0, 1, 2]])))
@@ -124,10 +124,10 @@ def read_mesh(path: AnyPath) -> Surface:
 
 
 def scene_in(data: bytes, suffix: str) -> trimesh.Scene:
-    """What trimesh makes of a file in memory, Z up; no other file is opened for it.
+    """Load a model from memory with trimesh, Z up; no other file is opened.
 
     Raises:
-        Exception: of any kind, where it is damaged.
+        Exception: of any type, if the file is damaged.
     """
     if suffix == ".glb":
         _check_accessors(data)
@@ -138,7 +138,7 @@ def scene_in(data: bytes, suffix: str) -> trimesh.Scene:
 
 
 def _check_accessors(data: bytes) -> None:
-    """Raise ValueError for numbers of vertices or places below 0, from which slices would be taken."""
+    """Raise a ValueError for negative counts or offsets, which would be used as slices."""
     document = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
     for part in (*document.get("accessors", ()), *document.get("bufferViews", ())):
         if min(part.get(name, 0) for name in ("count", "byteOffset", "byteLength", "byteStride")) < 0:
@@ -146,10 +146,10 @@ def _check_accessors(data: bytes) -> None:
 
 
 def mesh_suffix(path: AnyPath) -> str:
-    """The suffix of a mesh's name, in small letters.
+    """Return the suffix of a mesh file's name, in lower case.
 
     Raises:
-        InputError: none of ``MESH_SUFFIXES``.
+        InputError: it is none of ``MESH_SUFFIXES``.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in MESH_SUFFIXES:

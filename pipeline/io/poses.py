@@ -1,4 +1,4 @@
-"""Poses on disk: text files of 4 x 4 numbers."""
+"""Reading and writing of poses as text files of 4 x 4 numbers."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _RIGID_TOLERANCE = 1e-4
 
 
 def read_pose(path: AnyPath) -> FloatArray:
-    """The (4, 4) rigid transform in a text file.
+    """Read a (4, 4) rigid transform from a text file.
 
     Raises:
-        InputError: the file does not hold sixteen numbers that make a rotation and a translation.
+        InputError: the file does not contain sixteen numbers that form a rotation and a translation.
     """
     rows = [
         line.split("#")[0].replace(",", " ").split() for line in read_text(path, "pose file").splitlines()
@@ -35,7 +35,7 @@ def read_pose(path: AnyPath) -> FloatArray:
 
 
 def rigid_or_none(T: FloatArray) -> FloatArray | None:
-    """``T`` if it is a (4, 4) rotation and translation."""
+    """Return ``T`` if it is a (4, 4) rotation and translation, else None."""
     if T.shape != (4, 4) or not np.isfinite(T).all():
         return None
     rotation = T[:3, :3]
@@ -46,7 +46,7 @@ def rigid_or_none(T: FloatArray) -> FloatArray | None:
 
 
 def write_pose(path: AnyPath, T: FloatArray) -> None:
-    """Write a (4, 4) transform so that reading it gives the same numbers.
+    """Write a (4, 4) transform so that reading it gives exactly the same numbers.
 
     Raises:
         InputError: the file cannot be written.

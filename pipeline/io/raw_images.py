@@ -1,4 +1,4 @@
-"""Images as plain numbers: NumPy arrays, PFM, TIFF and, with the extra ``exr``, OpenEXR files."""
+"""Readers of images not decoded by OpenCV: NumPy, PFM, TIFF and, with the extra ``exr``, OpenEXR."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ _NPY = b"\x93NUMPY"
 _TIFF = (b"II*\x00", b"MM\x00*")
 _EXR = b"\x76\x2f\x31\x01"
 _EXR_DEPTH = ("Z", "Y", "V")
-"""Names under which programs write one channel, in the order in which they are looked for."""
+"""Names of single channels in OpenEXR files, in order of preference."""
 _PFM = re.compile(rb"(P[Ff])\s+(\d{1,9})\s+(\d{1,9})\s+([-+.\deE]{1,30})\s")
 SIGNATURES = (_NPY, *_TIFF, b"Pf", b"PF", _EXR)
 
 
 def raw_values(path: AnyPath, data: bytes, what: str) -> np.ndarray:
-    """(H, W) or (H, W, C) numbers as they stand in the file, rows from the top.
+    """Return (H, W) or (H, W, C) numbers as stored in the file, rows from the top.
 
     Args:
-        path: for the errors.
+        path: path for error messages.
         data: the file's bytes, which begin with one of ``SIGNATURES``.
-        what: for the errors, such as "depth image".
+        what: kind of image for error messages, such as "depth image".
 
     Raises:
-        InputError: truncated, damaged, too large, no image, or OpenEXR without the extra.
+        InputError: the file is truncated, damaged, too large, no image, or OpenEXR without the extra.
     """
     readers = {_NPY: _numpy, **dict.fromkeys(_TIFF, _tiff), _EXR: _exr}
     read = next((reader for signature, reader in readers.items() if data.startswith(signature)), _pfm)
@@ -57,7 +57,7 @@ def raw_values(path: AnyPath, data: bytes, what: str) -> np.ndarray:
 
 
 class _TooLarge(Exception):
-    """More pixels than are read; says how many."""
+    """The image exceeds the largest number of pixels; its text is the size."""
 
 
 def _check(height_px: int, width_px: int) -> None:
@@ -79,13 +79,13 @@ def _tiff(data: bytes) -> np.ndarray:
 
 
 def _exr(data: bytes) -> np.ndarray:
-    """The one channel of a depth image, or red, green and blue."""
+    """Return the only channel of a depth image, or red, green and blue."""
     import OpenEXR
 
     corners = OpenEXR.File(io.BytesIO(data), header_only=True).header()["dataWindow"]
     width_px, height_px = (int(last - first) + 1 for first, last in zip(*corners, strict=True))
     _check(height_px, width_px)
-    quiet = contextlib.redirect_stdout(io.StringIO())  # where OpenEXR prints warnings
+    quiet = contextlib.redirect_stdout(io.StringIO())  # OpenEXR prints warnings to standard output
     with quiet, OpenEXR.File(io.BytesIO(data), separate_channels=True) as file:
         channels = {name: channel.pixels for name, channel in file.channels().items()}
     if {"R", "G", "B"} <= channels.keys():
@@ -95,7 +95,7 @@ def _exr(data: bytes) -> np.ndarray:
 
 
 def _pfm(data: bytes) -> np.ndarray:
-    """Portable float map, rows from the bottom; the scale's sign is the byte order."""
+    """Read a portable float map: rows from the bottom; the sign of the scale gives the byte order."""
     header = _PFM.match(data)
     if header is None:
         raise ValueError

@@ -1,8 +1,8 @@
-"""Camera nodes on disk: ``RIG/node_00/{color.png, depth.png, intrinsics.json, pose.txt}`` and so on.
+"""Rigs on disk: ``RIG/node_00/{color.png, depth.png, intrinsics.json, pose.txt}`` and so on.
 
-A node may also hold ``depth_correction.json``, by which its depth is corrected. Where ``depth.png`` is of a
-camera of its own, not registered to the colour image, the node has ``depth_intrinsics.json`` and
-``extrinsics.json``, too.
+A node's depth is corrected by ``depth_correction.json`` if it has one. If a separate depth camera took
+``depth.png``, so that it is not registered to the colour image, the node also has
+``depth_intrinsics.json`` and ``extrinsics.json``.
 """
 
 from __future__ import annotations
@@ -40,22 +40,22 @@ def load_frame(
     extrinsics: AnyPath | None = None,
     depth_correction: AnyPath | None = None,
 ) -> RgbdFrame:
-    """One RGB-D pair; without a pose at the origin, upright, looking along +y.
+    """Load one RGB-D pair; without a pose it is at the origin, upright, looking along +y.
 
     Args:
         color: (H, W) image.
-        depth: (H, W) image, 0 where the depth is unknown; of another size if it is not registered.
+        depth: (H, W) image, 0 where the depth is unknown; its size may differ if it is not registered.
         intrinsics: JSON with fx, fy, cx and cy, Open3D JSON, ROS camera_info or a bare matrix, pixels.
-        depth_scale: depth units in a metre; without it whole numbers are millimetres and floating-point
+        depth_scale: depth units per metre; by default whole numbers are millimetres and floating-point
             numbers metres.
-        name: what the node is called.
+        name: name of the node.
         pose: 4 x 4 T_world_camera, metres.
-        depth_intrinsics: of the depth camera, if the depth image is not registered to the colour image.
-        extrinsics: JSON with ``T_color_depth``, where the depth camera stands; both of these or none.
-        depth_correction: of the depth sensor's own bias, applied before anything else (SPEC 1.5).
+        depth_intrinsics: intrinsics of the depth camera, if depth is not registered to colour.
+        extrinsics: JSON with ``T_color_depth``, the depth camera's pose; give both of these or none.
+        depth_correction: bias of the depth sensor, which is corrected first (SPEC 1.5).
 
     Raises:
-        InputError: a file that cannot be used, or images and intrinsics of different sizes.
+        InputError: a file cannot be used, or images and intrinsics have different sizes.
 
     >>> import packetmesh as pm
     >>> pm.save_rig("office", pm.load_demo("office"))
@@ -127,18 +127,18 @@ def _check_size(
 
 
 def load_rig(directory: AnyPath, calibration: AnyPath | None = None, depth_scale: float | None = None) -> Rig:
-    """The nodes below ``directory`` in the order of their folders' names.
+    """Load the nodes below ``directory``, ordered by their folders' names.
 
     Args:
-        directory: holds node_00/{color.png, depth.png, intrinsics.json}, node_01/... and, where the poses
+        directory: contains node_00/{color.png, depth.png, intrinsics.json}, node_01/... and, if the poses
             are known, node_NN/pose.txt with a 4 x 4 T_world_camera, metres.
-        calibration: a folder whose node_NN/intrinsics.json, pose.txt and so on take the place of the rig's
-            own; what is true of a rendered rig stays.
-        depth_scale: depth units in a metre, of every node; as ``load_frame``.
+        calibration: a folder whose node_NN/intrinsics.json, pose.txt and so on replace the rig's own; the
+            truth of a rendered rig does not change.
+        depth_scale: depth units per metre of every node, as for ``load_frame``.
 
     Raises:
-        InputError: no folder, no node or more than six, a file of a node that cannot be used, or the
-            calibration of another rig.
+        InputError: the folder is missing, has no node or more than six, a node's file cannot be used, or the
+            calibration is for another rig.
 
     >>> import packetmesh as pm
     >>> pm.save_rig("office", pm.load_demo("office"))
@@ -167,21 +167,21 @@ def load_rig(directory: AnyPath, calibration: AnyPath | None = None, depth_scale
 
 
 def is_rig(path: Path) -> bool:
-    """Whether it is a folder of nodes."""
+    """Return whether a folder contains nodes."""
     return any(node.is_dir() for node in path.glob("node_*"))
 
 
 def is_pair(path: Path) -> bool:
-    """Whether it is the folder of one node: a colour image, a depth image and intrinsics."""
+    """Return whether a folder is that of one node: colour image, depth image and intrinsics."""
     images = (_image_in(path, stem).is_file() for stem in ("color", "depth"))
     return path.is_dir() and _intrinsics_in(path).is_file() and all(images)
 
 
 def save_rig(directory: AnyPath, rig: Rig) -> None:
-    """Write every frame of ``rig`` as ``directory/node_NN``; with its truth beside them, if it has one.
+    """Write every frame of ``rig`` as ``directory/node_NN``, and the rig's truth if it has one.
 
     Raises:
-        InputError: the folder cannot be written, or holds nodes of a larger rig.
+        InputError: the folder cannot be written, or contains nodes of a larger rig.
 
     >>> import packetmesh as pm
     >>> pm.save_rig("copy", pm.Rig("first node", pm.load_demo("office").frames[:1]))
@@ -206,7 +206,7 @@ def save_rig(directory: AnyPath, rig: Rig) -> None:
 
 
 def _write_noise(folder: Path, frame: RgbdFrame) -> None:
-    """Depth is written as it is, corrected and registered: what an older rig there says of that goes."""
+    """Write the frame's noise; delete an older rig's files: depth is saved corrected and registered."""
     for name in ("depth_correction", "depth_intrinsics", "extrinsics"):
         (folder / FILES[name]).unlink(missing_ok=True)
     if frame.noise is not None:
@@ -227,14 +227,14 @@ def _load_node(folder: Path, over: NodeFiles, depth_scale: float | None) -> Rgbd
 
 
 def _intrinsics_in(folder: Path) -> Path:
-    """JSON, or where there is none text."""
+    """Return the path of intrinsics.json, or of intrinsics.txt if only that exists."""
     intrinsics = folder / "intrinsics.json"
     text = intrinsics.with_suffix(".txt")
     return text if text.exists() and not intrinsics.exists() else intrinsics
 
 
 def _image_in(folder: Path, stem: str) -> Path:
-    """The PNG, or where there is none the only image of that name with another suffix."""
+    """Return the PNG with this stem, or the only image with another suffix if there is no PNG."""
     usual = folder / f"{stem}.png"
     others = [file for file in sorted(folder.glob(f"{stem}.*")) if file.suffix.lower() in IMAGE_SUFFIXES]
     return others[0] if len(others) == 1 and not usual.exists() else usual

@@ -1,5 +1,5 @@
-"""What is true of a rig: ``RIG/truth.ply``, ``RIG/node_NN/true_pose.txt`` and ``true_intrinsics.json``, which
-is there where the node's own intrinsics are not right.
+"""Ground truth of a rig: ``RIG/truth.ply``, ``RIG/node_NN/true_pose.txt`` and, if the node's own intrinsics
+are wrong, ``true_intrinsics.json``.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ INTRINSICS_NAME = "true_intrinsics.json"
 
 
 def read_truth(directory: Path, names: Sequence[str]) -> RigTruth | None:
-    """The true surface and poses of a rig's nodes, with the depth that the true cameras see of it.
+    """Read the true surface and poses of a rig's nodes; renders the depth that the true cameras see of it.
 
     Raises:
-        InputError: there is a true surface, but it cannot be read, or a node has no true pose.
+        InputError: a true surface exists but cannot be read, or a node has no true pose.
     """
     if not (directory / MESH_NAME).exists():
         return None
@@ -48,11 +48,11 @@ def read_truth(directory: Path, names: Sequence[str]) -> RigTruth | None:
 
 
 def write_truth(directory: Path, frames: Mapping[str, RgbdFrame], truth: RigTruth) -> None:
-    """Write the true surface, and what is true of every node.
+    """Write the true surface, and the true pose and intrinsics of every node.
 
     Args:
-        directory: of the rig.
-        frames: by the names of the nodes' folders; their true intrinsics are written where they differ.
+        directory: folder of the rig.
+        frames: frames by the names of the nodes' folders; true intrinsics are written if they differ.
         truth: what to write.
 
     Raises:

@@ -1,3 +1,3 @@
-"""What all stages compute with: rigid motions, k-d tree, ordering, patches, rays, threads, Open3D's loading.
-Imports of ``pipeline`` only ``types``.
+"""Computations shared by all stages: rigid motions, k-d tree, sorting, patches, rays, threads, Open3D import.
+This folder imports only ``types`` of ``pipeline``.
 """

@@ -1,4 +1,4 @@
-"""Rigid motions, the pinhole camera, and what the points of one cloud are to each other."""
+"""Rigid motions and the pinhole camera with its distortion."""
 
 import math
 from functools import lru_cache
@@ -11,7 +11,7 @@ from pipeline.types import CameraIntrinsics, FloatArray
 
 
 def rigid(rotation: FloatArray, translation_m: FloatArray) -> FloatArray:
-    """The (4, 4) transform x -> rotation @ x + translation."""
+    """Return the (4, 4) transform x -> rotation @ x + translation."""
     T = np.eye(4)
     T[:3, :3] = rotation
     T[:3, 3] = translation_m
@@ -19,32 +19,32 @@ def rigid(rotation: FloatArray, translation_m: FloatArray) -> FloatArray:
 
 
 def inverse(T_a_b: FloatArray) -> FloatArray:
-    """T_b_a of a rigid (4, 4) transform, by transposing its rotation."""
+    """Return T_b_a, the inverse of a rigid (4, 4) transform, by transposing its rotation."""
     rotation = T_a_b[:3, :3].T
     return rigid(rotation, -rotation @ T_a_b[:3, 3])
 
 
 def apply(T_a_b: FloatArray, points_m: FloatArray) -> FloatArray:
-    """(N, 3) points in frame a, from points in frame b."""
+    """Transform (N, 3) points from frame b to frame a."""
     moved_m = points_m @ T_a_b[:3, :3].T
     moved_m += T_a_b[:3, 3]
     return moved_m
 
 
 def rotation_exp(omega_rad: FloatArray) -> FloatArray:
-    """The (3, 3) rotation about the (3,) axis ``omega_rad`` by its length (Rodrigues)."""
+    """Return the (3, 3) rotation about the axis ``omega_rad`` (3,) by its length (Rodrigues)."""
     return cv2.Rodrigues(np.asarray(omega_rad, dtype=np.float64))[0]
 
 
 def rotation_angle_rad(rotation: FloatArray) -> float:
-    """Angle of a (3, 3) rotation, accurate near zero and near pi."""
+    """Return the angle of a (3, 3) rotation, accurate near zero and near pi."""
     skew = rotation - rotation.T
     sine = 0.5 * math.hypot(skew[2, 1], skew[0, 2], skew[1, 0])
     return math.atan2(sine, 0.5 * (rotation[0, 0] + rotation[1, 1] + rotation[2, 2] - 1.0))
 
 
 def look_at(eye_m: ArrayLike, target_m: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.0)) -> FloatArray:
-    """T_world_camera of a camera at ``eye_m`` that looks at ``target_m``."""
+    """Return T_world_camera of a camera at ``eye_m`` that looks at ``target_m``."""
     eye_m = np.asarray(eye_m, float)
     forward = np.asarray(target_m, float) - eye_m
     forward /= np.linalg.norm(forward)
@@ -54,11 +54,11 @@ def look_at(eye_m: ArrayLike, target_m: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.
 
 
 LEVEL_POSE = look_at(np.zeros(3), np.array([0.0, 1.0, 0.0]))
-"""T_world_camera of a camera of which nothing is known: at the origin, upright, looking along +y."""
+"""T_world_camera of a camera with unknown pose: at the origin, upright, looking along +y."""
 
 
 def scaled(intrinsics: CameraIntrinsics, factor: float) -> CameraIntrinsics:
-    """The camera of an image resized by ``factor``: pixel centres stay at integers."""
+    """Return the camera of an image resized by ``factor``; pixel centres stay at integers."""
     matrix = intrinsics.matrix.copy()
     matrix[:2, :2] *= factor
     matrix[:2, 2] = (matrix[:2, 2] + 0.5) * factor - 0.5
@@ -67,9 +67,9 @@ def scaled(intrinsics: CameraIntrinsics, factor: float) -> CameraIntrinsics:
 
 
 def pixel_rays(intrinsics: CameraIntrinsics) -> FloatArray:
-    """(H, W, 3) camera-frame directions of the pixel centres, scaled to z = 1, undistorted; read-only.
+    """Return (H, W, 3) camera-frame directions of the pixel centres with z = 1, undistorted; read-only.
 
-    Those of the last cameras stay: a frame asks for its own five times on the way to its surface.
+    The last four cameras are cached: reconstructing one frame calls this five times.
     """
     size = intrinsics.width_px, intrinsics.height_px
     find = _kept_rays if size[0] * size[1] <= _KEPT_PX else _rays
@@ -78,7 +78,7 @@ def pixel_rays(intrinsics: CameraIntrinsics) -> FloatArray:
 
 
 def _rays(matrix: bytes, distortion: bytes, width_px: int, height_px: int) -> FloatArray:
-    """``pixel_rays`` of a camera whose numbers are given as bytes of float64."""
+    """Compute ``pixel_rays`` of a camera whose parameters are given as bytes of float64."""
     numbers = np.frombuffer(matrix).reshape(3, 3), np.frombuffer(distortion)
     u, v = np.meshgrid(np.arange(width_px), np.arange(height_px))
     pixels = np.stack([u, v], axis=-1).reshape(-1, 2)
@@ -89,13 +89,13 @@ def _rays(matrix: bytes, distortion: bytes, width_px: int, height_px: int) -> Fl
 
 _kept_rays = lru_cache(maxsize=4)(_rays)
 _KEPT_PX = 1_000_000
-"""Pixels of the largest image whose rays stay: 24 MB."""
+"""Pixels of the largest image whose rays are cached: 24 MB."""
 
 
 def undistorted_rays(intrinsics: CameraIntrinsics, pixels: ArrayLike) -> FloatArray:
-    """(N, 3) camera-frame directions with z = 1 of (N, 2) image positions, SPEC 1.1.
+    """Return (N, 3) camera-frame directions with z = 1 of (N, 2) image positions, SPEC 1.1.
 
-    The distortion is inverted by fixed-point iteration to 1e-10 of the normalised plane.
+    Distortion is inverted by fixed-point iteration to 1e-10 in normalised image coordinates.
     """
     pixels = np.asarray(pixels, dtype=np.float64)
     if not len(pixels):
@@ -112,10 +112,10 @@ def undistorted_rays(intrinsics: CameraIntrinsics, pixels: ArrayLike) -> FloatAr
 
 
 def project(intrinsics: CameraIntrinsics, points_m: FloatArray) -> FloatArray:
-    """(N, 2) image positions of (N, 3) camera-frame points in front of the camera (eq. 3.1-3.3)."""
+    """Project (N, 3) camera-frame points in front of the camera to (N, 2) image positions (eq. 3.1-3.3)."""
     if not len(points_m):
         return np.empty((0, 2))
-    if not np.any(intrinsics.distortion):  # OpenCV would find fifty derivatives of a point as well
+    if not np.any(intrinsics.distortion):  # OpenCV would also compute fifty derivatives per point
         depth_m = points_m[:, 2]
         nearness = np.divide(1.0, depth_m, out=np.ones_like(depth_m), where=depth_m != 0.0)
         u_px = points_m[:, 0] * nearness * intrinsics.fx_px + intrinsics.cx_px

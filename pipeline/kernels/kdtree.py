@@ -1,7 +1,7 @@
-"""A k-d tree of points whose searches run compiled, on all cores and without Python's lock.
+"""A k-d tree of points with compiled searches, which run on all cores without Python's lock.
 
-SciPy's tree answers any query; this one also begins a search with what the caller already knows (the distance
-of an old neighbour), which is what iterations ask for, and keeps the points of a leaf beside each other.
+Unlike SciPy's tree, a search can start from a known bound (the distance to an earlier neighbour), as
+iterations need, and the points of a leaf are adjacent in memory.
 """
 
 from __future__ import annotations
@@ -20,36 +20,36 @@ from pipeline.types import ByteArray, FloatArray, IntArray
 LEAF_POINTS = 16
 """A node with more points is split."""
 SERIAL_POINTS = 512
-"""Fewer points are searched on the calling thread: others would take longer to wake."""
+"""Fewer points are searched on the calling thread: waking other threads would take longer."""
 CORES = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-"""Of this machine, or fewer where ``NUMBA_NUM_THREADS`` says so, as for processes that work side by side."""
+"""Cores of this machine, or the lower ``NUMBA_NUM_THREADS``, set for processes that run in parallel."""
 _MOST_LEVELS = 64
 _MOST_GUESSES = 64
 compiled = numba.njit(cache=True, nogil=True)
 
 
 class KdTree:
-    """A balanced tree: every node halves its points along the longer side of their box."""
+    """A balanced tree: every node halves its points along the longest side of their bounding box."""
 
     def __init__(self, points_m: FloatArray) -> None:
-        """Of (N, 3) points."""
+        """Build the tree of (N, 3) points."""
         count = len(points_m)
         self.order = np.arange(count)
-        """(N,) rows of the points, those of a leaf beside each other."""
+        """(N,) row of each point in the tree's order, in which the points of a leaf are adjacent."""
         self.points_m = np.ascontiguousarray(points_m, dtype=np.float64).copy()
-        """(N, 3) the points in this order."""
+        """(N, 3) points in the tree's order."""
         levels = levels_of(count)
         self.axes = np.zeros(max(1, 2**levels - 1), dtype=np.uint8)
         """(K,) axis along which each inner node is split; node k has the children 2k + 1 and 2k + 2."""
         self.splits_m = np.zeros(max(1, 2**levels - 1))
-        """(K,) coordinate at which it is."""
+        """(K,) coordinate of each split."""
         self.levels = levels
-        """How often the points are halved."""
+        """Number of times that the points are halved."""
         if count:
             self._build()
 
     def _build(self) -> None:
-        """Sort the points into leaves; two halves of many points beside each other."""
+        """Sort the points into leaves; with many points, the two halves are sorted in parallel."""
         count, levels = len(self), self.levels
         build = partial(_build, self.points_m, self.order, self.axes, self.splits_m)
         if count < 4 * SERIAL_POINTS or CORES == 1:
@@ -62,14 +62,14 @@ class KdTree:
 
     @property
     def parts(self) -> tuple[FloatArray, ByteArray, FloatArray, int]:
-        """What compiled searches take of it."""
+        """Arrays that compiled searches take: points, axes, splits and levels."""
         return self.points_m, self.axes, self.splits_m, self.levels
 
     def __len__(self) -> int:
         return len(self.order)
 
     def nearest(self, places_m: FloatArray, count: int) -> tuple[FloatArray, IntArray]:
-        """The nearest points of (M, 3) places.
+        """Find the ``count`` nearest points of (M, 3) places.
 
         Returns:
             (M, count) distances, ascending, and rows of the points; ``count`` is at most N.
@@ -86,7 +86,7 @@ class KdTree:
 
 
 def tree_of(points_m: FloatArray) -> KdTree:
-    """The tree of (N, 3) points that nobody changes: built once, and kept as long as they are."""
+    """Return the tree of (N, 3) points that are never modified; it is cached as long as the array exists."""
     tree = _trees.get(id(points_m))
     if tree is None:
         tree = _trees[id(points_m)] = KdTree(points_m)
@@ -98,7 +98,7 @@ _trees: dict[int, KdTree] = {}
 
 
 def levels_of(count: int) -> int:
-    """How often ``count`` points are halved until every leaf is small enough."""
+    """Return how many times ``count`` points are halved until every leaf is small enough."""
     levels = 0
     while count > LEAF_POINTS << levels:
         levels += 1
@@ -106,7 +106,7 @@ def levels_of(count: int) -> int:
 
 
 def in_parts(work: Callable[[int, int], None], count: int) -> None:
-    """Call ``work(first, last)`` for parts of ``range(count)`` on all cores; it must release the lock."""
+    """Call ``work(first, last)`` for parts of ``range(count)`` in parallel; it must release the lock."""
     parts = CORES if count >= SERIAL_POINTS else 1
     if parts == 1:
         work(0, count)
@@ -135,7 +135,7 @@ def _build(
     levels: int,
     last_level: int,
 ) -> None:
-    """Sort the points of a node into those below it, down to a level, and their rows with them."""
+    """Sort a node's points, and their rows with them, into its subtrees down to ``last_level``."""
     stack = np.empty((_MOST_LEVELS, 4), dtype=np.int64)
     stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = root, begin, end, levels
     size = 1
@@ -156,7 +156,7 @@ def _build(
 
 @compiled
 def _longest_axis(points: FloatArray, first: int, last: int) -> int:
-    """The axis along which the points spread most."""
+    """Return the axis along which the points' extent is largest."""
     best, longest = 0, -1.0
     for axis in range(3):
         low = high = points[first, axis]
@@ -170,7 +170,7 @@ def _longest_axis(points: FloatArray, first: int, last: int) -> int:
 
 @compiled
 def _select(points: FloatArray, order: IntArray, first: int, last: int, middle: int, axis: int) -> None:
-    """Swap until no point before ``middle`` lies beyond it along an axis and none behind it before."""
+    """Partition the points so that none before ``middle`` has a larger coordinate than any later one."""
     low, high = first, last - 1
     while low < high:
         pivot = points[(low + high) // 2, axis]
@@ -223,13 +223,13 @@ def search(
     stack: IntArray,
     bounds: FloatArray,
 ) -> None:
-    """Fill in the nearest points of a place.
+    """Find the points nearest to a place, and write them in ascending order of distance.
 
     Args:
-        points, axes, splits, levels: of the tree.
-        place: (3,).
-        squared: (k,) in ascending order, where only nearer points count; their squared distances after it.
-        rows: (k,) those of the tree's own order; untouched where no nearer point is found.
+        points, axes, splits, levels: parts of the tree.
+        place: (3,) query point.
+        squared: (k,) ascending bounds: only nearer points count; receives the points' squared distances.
+        rows: (k,) receives rows in the tree's order; unchanged where no nearer point is found.
         stack, bounds: working space.
     """
     worst = len(squared) - 1
@@ -260,18 +260,18 @@ def search_many(
     stack: IntArray,
     bounds: FloatArray,
 ) -> float:
-    """Fill in the ``count`` nearest points of a place in any order, which costs less than in order.
+    """Find the ``count`` points nearest to a place and write them unsorted, which is faster than sorted.
 
     Args:
-        points, axes, splits, levels: of the tree.
-        place: (3,).
-        count: at most N.
-        limit: so many are nearer than its root.
-        squared, rows: (``room_for(count)``,) squared distances and rows in the tree's own order after it.
+        points, axes, splits, levels: parts of the tree.
+        place: (3,) query point.
+        count: number of points, at most N.
+        limit: squared distance within which there are at least ``count`` points.
+        squared, rows: (``room_for(count)``,) receive squared distances and rows in the tree's order.
         stack, bounds: working space.
 
     Returns:
-        The squared distance of the farthest of them.
+        The squared distance of the farthest of these points.
     """
     have = 0
     size = _begin(len(points), levels, stack, bounds)
@@ -280,7 +280,7 @@ def search_many(
         if have + end - start >= len(squared):
             limit = min(limit, _keep_least(squared, rows, have, count))
             have = count
-        for j in range(start, end):  # what does not count is overwritten: no branch to mispredict
+        for j in range(start, end):  # overwrite points that are too far: no branch to mispredict
             distance = squared_distance(points[j], place)
             squared[have], rows[have] = distance, j
             have += distance < limit
@@ -294,16 +294,16 @@ def search_many(
 
 @compiled
 def room_for(count: int) -> int:
-    """Points that ``search_many`` holds at a time, and one more."""
+    """Return the length of the buffers of ``search_many``: the points it keeps, and one more."""
     return 2 * count + 24
 
 
 @compiled
 def _keep_least(squared: FloatArray, rows: IntArray, have: int, count: int) -> float:
-    """Move the ``count`` least of the first ``have`` to the front; gives what none of them exceeds.
+    """Move the ``count`` smallest of the first ``have`` values to the front; returns an upper bound of them.
 
-    A number that parts them from the others is guessed from how many lie below two earlier ones; of equal
-    ones that no number parts, the first are taken. Loops without branches, as there is no telling.
+    A threshold is found by interpolating between the counts below two earlier ones. Of equal values at
+    the threshold, the first are taken. The loops have no branches, which would be unpredictable.
     """
     low, high, below, above = 0.0, 0.0, 0, have
     for k in range(have):
@@ -339,7 +339,7 @@ def _keep_least(squared: FloatArray, rows: IntArray, have: int, count: int) -> f
 
 @compiled
 def _begin(count: int, levels: int, stack: IntArray, bounds: FloatArray) -> int:
-    """Put the whole tree of ``count`` points on the stack; gives its size."""
+    """Put the root, with all ``count`` points, on the stack; returns the stack's size."""
     stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0, 0, count, levels
     bounds[0, 0] = bounds[0, 1] = bounds[0, 2] = bounds[0, 3] = 0.0
     return 1
@@ -355,7 +355,7 @@ def _next_leaf(
     bounds: FloatArray,
     size: int,
 ) -> tuple[int, int, int]:
-    """Where the points of the next leaf within the root of ``limit`` start and end, and the stack's size."""
+    """Return start and end of the next leaf within the squared distance ``limit``, and the stack's size."""
     size -= 1
     apart = bounds[size, 3]
     if apart >= limit:
@@ -388,12 +388,12 @@ def _next_leaf(
 
 @compiled
 def working_space() -> tuple[IntArray, FloatArray]:
-    """What ``search`` writes in: once for many searches."""
+    """Allocate working space of ``search``, to be reused by many searches."""
     return np.empty((_MOST_LEVELS, 4), dtype=np.int64), np.empty((_MOST_LEVELS, 4))
 
 
 @compiled
 def squared_distance(a: FloatArray, b: FloatArray) -> float:
-    """Of two points (3,)."""
+    """Return the squared distance of two points (3,)."""
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     return x * x + y * y + z * z

@@ -1,4 +1,4 @@
-"""Planes through the neighbourhoods of points, compiled: their normals, and smoothing onto them."""
+"""Planes fitted to the neighbourhoods of points, compiled: their normals, and smoothing onto them."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from pipeline.kernels.kdtree import (
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 _SWEEPS = 10
-"""Of Jacobi's rotations at most; a matrix of three rows needs four or five."""
+"""Most sweeps of Jacobi's rotations; a 3 x 3 matrix needs four or five."""
 _LEAST_GAP = 1e-2
-"""Between the two smallest eigenvalues, over that between the outer two, for the closed form."""
+"""Least gap between the two smallest eigenvalues, relative to the whole range, for the closed form."""
 
 
 def patch_normals(tree: KdTree, neighbours: int, places: IntArray | None = None) -> FloatArray:
-    """Unit normals, of either sign, of the planes through the nearest points of a tree's own.
+    """Return unit normals, of either sign, of the planes fitted to the nearest neighbours of a tree's points.
 
     Args:
-        tree: of N points.
-        neighbours: of a point, itself included.
-        places: (M,) of the points in the tree's order, best ascending: neighbours then follow each other;
-            None for all.
+        tree: tree of N points.
+        neighbours: points per plane, including the point itself.
+        places: (M,) indices in the tree's order, best ascending, as consecutive points are then close; None
+            for all points.
 
     Returns:
-        (M, 3), or (N, 3) in the points' own order for all.
+        (M, 3) normals; for all points (N, 3) in the order of the original points.
     """
     asked = np.arange(len(tree)) if places is None else places
     normals = np.empty((len(asked), 3))
@@ -49,16 +49,16 @@ def patch_normals(tree: KdTree, neighbours: int, places: IntArray | None = None)
 def onto_patches(
     points_m: FloatArray, neighbours: int, kernel_share: float, rows: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Points moved along the normals of the planes that fit their neighbours best, nearer ones counting more.
+    """Move points along the normals of planes fitted to their neighbours, weighted by a Gaussian of distance.
 
     Args:
-        points_m: (N, 3).
-        neighbours: of a point, itself included; at most N.
-        kernel_share: standard deviation of the Gaussian weight over the distance of the farthest of them.
-        rows: (M,) of the points to move.
+        points_m: (N, 3) points.
+        neighbours: points per plane, including the point itself; at most N.
+        kernel_share: standard deviation of the Gaussian over the distance of the farthest neighbour.
+        rows: (M,) rows of the points to move.
 
     Returns:
-        (M, 3) where these move to, and (M, 3) unit normals there, of either sign.
+        (M, 3) moved points, and (M, 3) unit normals there, of either sign.
     """
     tree = KdTree(points_m)
     place = np.empty(len(tree), np.int64)
@@ -137,7 +137,7 @@ def _move(
 
 @compiled
 def _reach(before: FloatArray, place: FloatArray, farthest: float) -> float:
-    """A squared distance within which a place has as many points as another one has within ``farthest``."""
+    """Return a squared distance from ``place`` that holds as many points as ``farthest`` from ``before``."""
     reach = np.sqrt(squared_distance(before, place)) + np.sqrt(farthest)
     return reach * reach * (1.0 + 1e-12) + 1e-300
 
@@ -151,7 +151,7 @@ def _scatter(
     center: FloatArray,
     spread: FloatArray,
 ) -> None:
-    """The patch's weighted centre, from ``place``, which is near it, and the (3, 3) scatter about it."""
+    """Compute the patch's weighted centre relative to ``place``, and the (3, 3) covariance about it."""
     spread[:], center[:], total = 0.0, 0.0, 0.0
     for k in range(len(near)):
         total += weights[k]
@@ -170,10 +170,10 @@ def _scatter(
 
 @compiled
 def _thinnest(spread: FloatArray, axis: FloatArray) -> None:
-    """Write the unit eigenvector of a symmetric matrix's smallest eigenvalue; spoils the matrix.
+    """Write the unit eigenvector of a symmetric matrix's smallest eigenvalue; overwrites the matrix.
 
-    The eigenvalue by Smith 1961; its vector is across two rows of the matrix less that value. Where the next
-    eigenvalue is near, which leaves too few digits, Jacobi's rotations find both.
+    The eigenvalue follows Smith 1961; the vector is orthogonal to the rows of the matrix minus this value.
+    If the next eigenvalue is too close for enough digits, Jacobi's rotations find both.
     """
     mean = (spread[0, 0] + spread[1, 1] + spread[2, 2]) / 3.0
     a, b, c = spread[0, 0] - mean, spread[1, 1] - mean, spread[2, 2] - mean
@@ -191,7 +191,7 @@ def _thinnest(spread: FloatArray, axis: FloatArray) -> None:
 
 @compiled
 def _across(a: float, b: float, c: float, d: float, e: float, f: float, axis: FloatArray) -> None:
-    """Write the unit vector across all rows of ((a, d, e), (d, b, f), (e, f, c)), a matrix of rank two."""
+    """Write the unit vector normal to all rows of ((a, d, e), (d, b, f), (e, f, c)), a matrix of rank two."""
     longest = 0.0
     for x, y, z in (
         (d * f - e * b, e * d - a * f, a * b - d * d),
@@ -208,7 +208,7 @@ def _across(a: float, b: float, c: float, d: float, e: float, f: float, axis: Fl
 
 @compiled
 def _jacobi(spread: FloatArray, axis: FloatArray) -> None:
-    """As ``_thinnest``, whatever the eigenvalues."""
+    """Do the same as ``_thinnest``, for any eigenvalues."""
     axes = np.eye(3)
     for _ in range(_SWEEPS):
         off = abs(spread[0, 1]) + abs(spread[0, 2]) + abs(spread[1, 2])
@@ -227,7 +227,7 @@ def _jacobi(spread: FloatArray, axis: FloatArray) -> None:
 
 @compiled
 def _rotate(spread: FloatArray, axes: FloatArray, a: int, b: int) -> None:
-    """One of Jacobi's rotations: the entry (a, b) becomes zero (Golub, Van Loan, section 8.5)."""
+    """Make the entry (a, b) zero by one Jacobi rotation (Golub, Van Loan, section 8.5)."""
     ratio = (spread[b, b] - spread[a, a]) / (2.0 * spread[a, b])
     tangent = 1.0 / (abs(ratio) + np.sqrt(1.0 + ratio * ratio))
     if ratio < 0.0:

@@ -1,4 +1,4 @@
-"""Pixels that are known, and what they say about those that are not."""
+"""Pixels near known ones, and colours filled in from the nearest known pixel."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from pipeline.types import BoolArray, ByteArray
 
 
 def near(known: BoolArray, reach_px: float) -> BoolArray:
-    """(H, W) the pixels with a known one within ``reach_px``."""
+    """Return an (H, W) mask of the pixels that have a known one within ``reach_px``."""
     distance_px = cv2.distanceTransform((~known).astype(np.uint8), cv2.DIST_L2, 5)
     return distance_px <= reach_px
 
 
 def nearest_colors(rgb: ByteArray, known: BoolArray) -> ByteArray:
-    """(H, W, 3) with the colour of the nearest known pixel at every other one; unchanged if none is known."""
+    """Fill every unknown pixel with the colour of the nearest known one; unchanged if none is known."""
     if not known.any():
         return rgb
     _, labels = cv2.distanceTransformWithLabels(

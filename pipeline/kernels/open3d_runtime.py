@@ -1,7 +1,7 @@
-"""Open3D, importable on a bare Linux: its shared library wants libusb, which pip brings.
+"""Import of Open3D on a bare Linux: its shared library needs libusb, which a pip package provides.
 
-Its plots in a notebook, which are not used here, import dash, for which every command and computing process
-would wait (``python -X importtime -m pipeline.open3d_runtime``); something empty stands in for it meanwhile.
+Open3D's notebook plots, unused here, import dash, which would delay the start of every process
+(``python -X importtime -m pipeline.open3d_runtime``); an empty module replaces dash during the import.
 """
 
 import ctypes

@@ -1,4 +1,4 @@
-"""The order of many whole numbers, such as cubes of a grid or edges of a mesh."""
+"""Sorting of many whole numbers, such as grid cells or mesh edges."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import numpy as np
 from pipeline.types import IntArray
 
 _DIGIT_BITS = 11
-"""Of a key that one round looks at: its counts stay in a core's first cache."""
+"""Bits of a key sorted per round: the counts fit into a core's first-level cache."""
 
 
 def stable_order(keys: IntArray) -> IntArray:
-    """(N,) the rows of (N,) keys, all 0 or more, by ascending key; rows of one key as they were.
+    """Return (N,) rows sorted by their (N,) keys, all 0 or more; rows with equal keys keep their order.
 
-    Radix sort from the last digit on: for keys that take few digits, a third of the time of NumPy's
-    ``argsort`` (``tests/benchmarks/ordering.py``), which compares them.
+    Radix sort from the last digit: for keys with few digits it takes a third of the time of NumPy's
+    ``argsort`` (``tests/benchmarks/ordering.py``), which compares keys.
     """
     return _radix_order(np.ascontiguousarray(keys, np.int64), int(keys.max(initial=0)))
 

@@ -1,4 +1,4 @@
-"""Threads beside the calling one that stay: a new one for each call would begin with no memory to use again
+"""Thread pools that stay: a new thread for each call would start without memory to reuse
 (``packetmesh bench --only chain``: a rig of three took a fifth more).
 """
 
@@ -10,5 +10,5 @@ from functools import cache
 
 @cache
 def threads(use: str, count: int) -> ThreadPoolExecutor:
-    """Of one use, whose work must not wait for other work of the same use."""
+    """Return the thread pool kept for one purpose; jobs in the same pool must not wait for each other."""
     return ThreadPoolExecutor(count, use)

@@ -1,1 +1,1 @@
-"""Two clouds registered from the command line, by our methods and by peers."""
+"""Registration of two clouds from the command line, by our methods and by peers."""

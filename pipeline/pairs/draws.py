@@ -1,4 +1,4 @@
-"""One method on a pair, so that the answer does not hang on which points happened to be drawn."""
+"""Registration with several random draws of points, so that the answer does not depend on one draw."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ _log = logging.getLogger(__name__)
 
 DRAWS = 10
 DRAWN_SHARE = 0.8
-"""Of a cloud so small that all of its points take part, a further draw takes this share."""
+"""Share of a cloud that further draws take if it is so small that all its points are used."""
 
 
 def with_gate(pair: Pair, config: RegistrationConfig) -> RegistrationConfig:
-    """The settings with the gate that the data give.
+    """Return the settings with the gate chosen from the data.
 
     Raises:
-        ReconstructionError: no gate holds enough pairs at the start pose.
+        ReconstructionError: no gate leaves enough pairs at the start pose.
     """
     misfit = Misfit(pair.source, pair.target, config.seed)
     return replace(config, gate_m=best_gate_m(ladder(pair.source, pair.target, config, pair.T_init, misfit)))
 
 
 def run_draws(name: str, pair: Pair, config: RegistrationConfig) -> Iterator[Answer]:
-    """The answer of one of our methods, with how far ten draws of the points end from each other.
+    """Run one of our methods with ten draws of the points; yields its answer, with the spread of the draws.
 
-    Where they end in different places, the answer is the draw after which the clouds lie best on each other,
-    and a start pose by matched features is tried as well, unless that is where they started.
+    If the draws disagree, the answer is the draw with the least misfit of the clouds, and a start pose from
+    matched features is also tried, unless the method started there.
     """
     first = _answer(name, pair, config)
     if first.failed:
@@ -64,7 +64,7 @@ def run_draws(name: str, pair: Pair, config: RegistrationConfig) -> Iterator[Ans
 def _settled(
     name: str, pair: Pair, config: RegistrationConfig, first: Answer, misfit: Misfit
 ) -> tuple[Answer, float]:
-    """The first answer if all draws agree with it, else that of the least misfit; and its misfit."""
+    """Return the first answer if all draws agree with it, else that of the least misfit; and its misfit."""
     if first.T_target_source is None:
         return first, float("inf")
     fewer = max(6, int(DRAWN_SHARE * min(len(pair.source), len(pair.target))))
@@ -92,7 +92,7 @@ def _settled(
 
 
 def _spread_m(pair: Pair, poses: list[FloatArray], T: FloatArray) -> float:
-    """Largest point error of any pose from one of them."""
+    """Return the largest point error of any pose relative to ``T``."""
     some_m = pair.source.points_m[:: max(1, len(pair.source) // 2000)]
     return max(point_error_m(other, T, some_m) for other in poses)
 

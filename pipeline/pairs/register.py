@@ -1,4 +1,4 @@
-"""Any two clouds: whether they can be registered, and where our methods and the peers place them."""
+"""Registration of any two clouds: their checks, and the answers of our methods and of the peers."""
 
 from __future__ import annotations
 
@@ -30,56 +30,56 @@ DEFAULT_METHOD = "ceicp-a"
 ALIASES = {"ceicp": DEFAULT_METHOD}
 LEAST_POINTS = 6
 LARGEST_M, SMALLEST_M = 1000.0, 0.001
-"""Clouds larger or smaller than this are hardly in metres."""
+"""Plausible extents of a cloud in metres."""
 UNIT_RATIOS = (300.0, 3000.0)
 """If one cloud is about a thousand times as large as the other, one of them is in millimetres."""
 EVALUATED_POINTS = 20_000
-"""The clouds are thinned alike to about this many points before their distance is measured."""
+"""Both clouds are thinned to about this many points before their distance is measured."""
 SHAPE_POINTS = 3000
 AGREEMENT_M = 0.005
-"""Draws of the points whose answers are nearer to each other than this agree."""
+"""Draws of the points agree if their answers differ by less than this point error."""
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The outcome of one method on a pair; ``T_target_source`` is None if it failed."""
+    """Result of one method on a pair; ``T_target_source`` is None if it failed."""
 
     method: str
     T_target_source: FloatArray | None
-    """(4, 4)."""
+    """(4, 4) final pose."""
     iterations: int | None
     stop_reason: str
     elapsed_s: float
     rmse_m: float = float("nan")
-    """Root mean square distance of the moved source points from the target, of those within the gate; the
-    same measure for every method."""
+    """Root mean square distance of the moved source points from the target, within the gate; computed
+    in the same way for every method."""
     average_hausdorff_m: float = float("nan")
-    """Both clouds thinned alike (SPEC 4.7)."""
+    """Average Hausdorff distance of both clouds, thinned equally (SPEC 4.7)."""
     point_error_m: float = float("nan")
-    """NaN without the truth."""
+    """Point error against the true pose; NaN if this is unknown."""
     steps: tuple[RegistrationStep, ...] = ()
-    """None of a peer."""
+    """Steps of the method; empty for peers."""
     step_times_s: tuple[float, ...] = ()
-    """Since the start, for every step."""
+    """Time since the start at each step."""
     draws: int = 1
-    """How many draws of the points were registered; this is the answer of one of them."""
+    """Number of draws of the points that were registered; this is the answer of one of them."""
     spread_m: float = float("nan")
-    """Largest point error of another draw's answer from this one; infinite if one has none, NaN of one."""
+    """Largest point error between this and another draw's answer; infinite if one failed, NaN of one draw."""
 
     @property
     def agreed(self) -> bool:
-        """Whether all draws of the points lead to one place."""
+        """Whether all draws of the points lead to the same pose."""
         return self.spread_m <= AGREEMENT_M
 
     @property
     def failed(self) -> bool:
-        """No pose, or one that the points do not determine."""
+        """Whether there is no pose, or the points do not determine it."""
         return self.T_target_source is None or self.stop_reason.startswith("degenerate")
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Two clouds that may be registered."""
+    """Two clouds to register."""
 
     source: PointCloud
     target: PointCloud
@@ -89,10 +89,10 @@ class Pair:
 
 
 def chosen_methods(name: str) -> tuple[str, ...]:
-    """The methods behind a name: one, or for ``all`` every method and every peer that is installed.
+    """Return the methods with this name; ``all`` means every method and every installed peer.
 
     Raises:
-        InputError: no such method; the sentence lists them.
+        InputError: there is no such method; the message lists them.
     """
     known = (*METHODS, *available_peers())
     if name == ALL:
@@ -110,14 +110,14 @@ def config_for(
     start: Literal["given", "global"],
     with_scale: bool,
 ) -> RegistrationConfig:
-    """The settings of a comparison.
+    """Return the settings of a comparison.
 
-    A scale needs the point metric, and pairs of both directions: source points that look for their
-    nearest partners come nearer to them by shrinking. Without a gate it is the default one, until the data
-    give another (``with_gate``).
+    A scale needs the point metric and pairs in both directions: with one direction, source points come nearer
+    to their nearest partners by shrinking. Without ``gate_m`` the default is set, until ``with_gate`` chooses
+    one from the data.
 
     Raises:
-        InputError: settings that do not go together.
+        InputError: the settings contradict each other.
     """
     method = methods[0] if len(methods) == 1 and methods[0] in METHODS else DEFAULT_METHOD
     return RegistrationConfig(
@@ -131,10 +131,10 @@ def config_for(
 
 
 def prepared_cloud(cloud: PointCloud, name: str, voxel_m: float | None) -> PointCloud:
-    """Without repeated points and, if asked, thinned.
+    """Remove repeated points and, if ``voxel_m`` is given, thin the cloud.
 
     Raises:
-        InputError: fewer than six distinct points, or a size that no cloud in metres has.
+        InputError: there are fewer than six distinct points, or the size is implausible in metres.
     """
     first = distinct_rows(cloud.points_m)
     if len(first) < LEAST_POINTS:
@@ -163,11 +163,11 @@ def prepared_pair(
     T_init: FloatArray | None = None,
     T_true: FloatArray | None = None,
 ) -> Pair:
-    """The clouds checked, thinned and given a start pose.
+    """Check and thin two clouds and determine the start pose.
 
     Raises:
-        InputError: points that cannot be used, or two units.
-        ReconstructionError: a target whose shape leaves the motion open, or no global start was found.
+        InputError: points cannot be used, or the clouds have different units.
+        ReconstructionError: the target's shape leaves a motion open, or no global start was found.
     """
     ratio = middle_extent_m(source.points_m) / max(middle_extent_m(target.points_m), 1e-300)
     if UNIT_RATIOS[0] < max(ratio, 1.0 / max(ratio, 1e-300)) < UNIT_RATIOS[1]:
@@ -186,7 +186,7 @@ def prepared_pair(
 
 
 def run_methods(methods: tuple[str, ...], pair: Pair, config: RegistrationConfig) -> Iterator[Answer]:
-    """Every method's answer from the same start; a method that fails gives the reason as its stop reason."""
+    """Yield every method's answer from the same start; a failed method's stop reason says why."""
     evaluate = _Evaluation(pair, config.gate_m)
     for name in methods:
         try:
@@ -214,7 +214,7 @@ def _peer(name: str, pair: Pair, config: RegistrationConfig) -> Answer:
 
 
 class _Evaluation:
-    """Measures answers by the distances they leave; thins the clouds and builds the tree once."""
+    """Measures answers by the remaining distances, with clouds thinned and a tree built once."""
 
     def __init__(self, pair: Pair, gate_m: float) -> None:
         self._pair, self._gate_m = pair, gate_m
@@ -229,7 +229,7 @@ class _Evaluation:
         self._tree = cKDTree(self._target_m)
 
     def __call__(self, answer: Answer) -> Answer:
-        """The answer with its distances."""
+        """Return the answer with its distances."""
         if answer.T_target_source is None:
             return answer
         moved_m = apply(answer.T_target_source, self._source_m)
@@ -249,7 +249,7 @@ class _Evaluation:
 
 
 def _check_shape(target: PointCloud, seed: int) -> None:
-    """Refuse a target that any motion within its own surface leaves as it is."""
+    """Raise an error if some motion leaves the target's surface unchanged."""
     count = min(len(target), SHAPE_POINTS)
     rows = np.random.default_rng(seed).choice(len(target), count, replace=False)
     points_m = target.points_m[rows]

@@ -1,1 +1,1 @@
-"""Nodes of a rig placed next to each other: pair by pair, by a pose graph, judged by what both measured."""
+"""Placement of a rig's nodes: pairwise registration, a pose graph, and verification by both measurements."""

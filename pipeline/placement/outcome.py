@@ -1,4 +1,4 @@
-"""What is found out about where the nodes of a rig stand."""
+"""Results of the placement of a rig's nodes."""
 
 from __future__ import annotations
 
@@ -14,85 +14,84 @@ from pipeline.types import FloatArray, RegistrationResult, Rig
 
 Item = TypeVar("Item")
 APART = "No two nodes stand beside each other: the surface is of one node only"
-"""What is said of a rig that failed."""
+"""Message for a rig whose placement failed."""
 
 
 @dataclass(frozen=True, slots=True)
 class NodeRegistration:
-    """How one node found its place beside another."""
+    """Registration of one node to another."""
 
     source: str
     target: str
     result: RegistrationResult
     loop_error_m: float = float("nan")
-    """How far it is from what the other registrations say about these two nodes; NaN where they say
-    nothing."""
+    """Point error against what the other registrations imply for these nodes; NaN if they imply nothing."""
     used: bool = True
-    """False if it degenerated, or contradicts the loops or what both measured, and was left out."""
+    """False if it degenerated, or contradicts the loops or the measurements, and was not used."""
     agreement: Agreement = NOTHING_SHARED
-    """Of both nodes' points at this registration's pose."""
+    """Agreement of both nodes' points at this registration's pose."""
 
 
 @dataclass(frozen=True, slots=True)
 class NodeAgreement:
-    """What two placed nodes both measured, at their final poses."""
+    """Agreement of two placed nodes' measurements at their final poses."""
 
     source: str
     target: str
     agreement: Agreement
-    """Of both nodes' points."""
+    """Agreement in both nodes' points."""
 
 
 @dataclass(frozen=True, slots=True)
 class NodeVerdict:
-    """Whether a node has found its place."""
+    """Whether a node was placed, and how well it fits."""
 
     name: str
     placed: bool
-    """False for a node that is left out of everything that follows."""
+    """False for a node that is excluded from the following stages."""
     agreement: Agreement
-    """With all placed nodes together, at the final poses."""
+    """Agreement with all placed nodes together, at the final poses."""
     sentence: str = ""
-    """What is to be said of it; empty where all is well."""
+    """Warning for the user; empty if there is none."""
 
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """The nodes beside each other."""
+    """The poses of all nodes."""
 
     registrations: tuple[NodeRegistration, ...]
-    """Those of nodes whose poses were given, that place each beside an earlier one, first."""
+    """All registrations; first those from given poses that place each node relative to an earlier one."""
     T_world_camera: tuple[FloatArray, ...]
-    """Corrected poses of all nodes; of one that is left out, as it believes."""
+    """Corrected poses of all nodes; excluded nodes keep their given poses."""
     verdicts: tuple[NodeVerdict, ...] = ()
-    """One for each node; empty says that all are placed."""
+    """Verdict on each node; empty means that all are placed."""
     agreements: tuple[NodeAgreement, ...] = ()
-    """Of all pairs of placed nodes."""
+    """Agreements of all pairs of placed nodes."""
 
     def placed(self, items: Sequence[Item]) -> list[Item]:
-        """Of one item for each node, those of the nodes that are placed."""
+        """Return the items of placed nodes, from one item per node."""
         if not self.verdicts:
             return list(items)
         return [item for item, verdict in zip(items, self.verdicts, strict=True) if verdict.placed]
 
     @property
     def agreement(self) -> Agreement:
-        """Of all pairs of placed nodes together."""
+        """Agreement of all pairs of placed nodes together."""
         return reduce(add, (pair.agreement for pair in self.agreements), NOTHING_SHARED)
 
     @property
     def apart(self) -> bool:
-        """Whether there are several nodes, of which no two stand beside each other."""
+        """Whether there are several nodes, but no two are placed relative to each other."""
         return len(self.verdicts) > 1 and not self.agreements
 
     @property
     def sentences(self) -> list[str]:
-        """What a person must know of nodes that found no place, or one that nothing confirms."""
+        """Warnings about nodes that were not placed, or whose pose nothing confirms."""
         return [verdict.sentence for verdict in self.verdicts if verdict.sentence]
 
 
 def whole_placement(rig: Rig, present: Sequence[int], placement: Placement) -> Placement:
-    """The nodes that found a place, and the others beside the first, as the truth or the rig believes."""
+    """Return all poses: those of placed nodes, others relative to the first by the truth or given poses."""
     believed = [frame.T_world_camera for frame in rig.frames]
     reference = believed if rig.truth is None else rig.truth.T_world_camera
     placed = placement.placed(list(zip(present, placement.T_world_camera, strict=True)))

@@ -1,4 +1,4 @@
-"""The nodes of a rig beside each other: registered pair by pair, and judged by what they both measured."""
+"""Placement of a rig's nodes: pairwise registration, and verification by both cameras' measurements."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ from pipeline.registration.anywhere import register_anywhere
 from pipeline.types import FloatArray, PointCloud, RegistrationResult, RgbdFrame
 
 SHARED_VIEW = 0.25
-"""Share of a node's points in another's image from which on the two are worth registering."""
+"""Least share of a node's points in another's image for registering the two."""
 LEAST_OVERLAP = 0.05
-"""Share of two nodes' points that the other camera can judge from which on their agreement counts."""
+"""Least share of two nodes' points that the other camera can judge, for their agreement to count."""
 LEAST_AGREEMENT = 0.4
-"""A node whose pose is given is left out if less of what it and the others both measured is within 2 %."""
+"""Least agreement of a node with a given pose with all others; with less it is excluded."""
 SURE_OVERLAP, SURE_AGREEMENT = 0.15, 0.88
-"""What a pose that was found without a first guess must reach; a given one with less is doubted. Where they
-stand right, nodes of rendered rigs reach .92 to .98 and those of a real SR300 .92 to .99; .09 to .54 where
-they are 3 degrees and 6 cm off, up to .72 in another room, .86 with one corner taken for the opposite."""
+"""Least overlap and agreement of a pose found without a first guess; a given one with less gets a warning.
+At correct poses, nodes of rendered rigs reach .92 to .98 and those of a real SR300 .92 to .99; 3 degrees and
+6 cm off .09 to .54; in another room up to .72; with one corner mistaken for the opposite .86."""
 WIDER_GATES = 2.0, 4.0
-"""Times the configured gate: tried where given poses lead to what the cameras' measurements contradict."""
+"""Multiples of the configured gate, tried if given poses lead to a contradiction with the measurements."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class _Tried:
     source: int
     target: int
     given: bool
-    """Whether it started at given poses."""
+    """Whether it started from given poses."""
     result: RegistrationResult
     agreement: Agreement
 
@@ -59,12 +59,12 @@ class _Tried:
 
     @property
     def agrees(self) -> bool:
-        """Whether what both measured speaks for it, or, from given poses, not against it."""
+        """Whether the measurements confirm it or, from given poses, do not contradict it."""
         return not _less(self.agreement, LEAST_AGREEMENT) if self.given else _confirmed(self.agreement)
 
 
 def _less(found: Agreement, least: float) -> bool:
-    """Whether enough is shared, and less than that of it agrees."""
+    """Return whether the overlap is large enough and the agreement below ``least``."""
     return found.overlap_share >= LEAST_OVERLAP and found.within_2pct_share < least
 
 
@@ -78,19 +78,19 @@ def place_nodes(
     config: RegistrationConfig,
     align_with: NodePoints = "sensor",
 ) -> Placement:
-    """Place the nodes beside each other by all pairs that share enough of their view.
+    """Place the nodes relative to each other by registering all pairs with enough common view.
 
-    Pairs of nodes whose poses are not known start from anywhere, and count only if what both cameras
-    measured confirms them. Registrations that contradict that, or the loops they are part of, are left out,
-    and the rest make the poses by least squares. The first node whose pose is known keeps it. A node with a
-    known pose that no good registration reaches is placed beside the earlier node that it shares most of its
-    view with; where their registration degenerates, as it believes. A node without a pose that none reaches,
-    and one that measured something else than the others where it came to stand, is left out.
+    Pairs with unknown poses start from anywhere, and count only if both cameras' measurements confirm them.
+    Registrations that contradict the measurements or their loops are rejected; the others give the poses by
+    least squares. The first node with a known pose keeps it. A node with a known pose that no good
+    registration reaches is placed relative to the earlier node with the largest common view; if their
+    registration degenerates, by the given poses. A node without a pose that none reaches is excluded, and
+    so is one whose measurements contradict the others' at its final pose.
 
     Args:
-        frames: the nodes' images with their believed poses.
-        nodes: their clouds.
-        config: how a pair is registered; with ``start="global"`` no pose counts as known.
+        frames: the nodes' images with their given poses.
+        nodes: the clouds of the nodes.
+        config: settings of the pairwise registration; with ``start="global"`` all poses count as unknown.
         align_with: which of a node's clouds is registered.
     """
     known = [config.start == "given" and frame.pose_known for frame in frames]
@@ -132,7 +132,7 @@ def place_nodes(
 def _registrations(
     nodes: Sequence[NodeClouds], tried: Sequence[_Tried], found: dict[int, tuple[float, bool]]
 ) -> tuple[NodeRegistration, ...]:
-    """What was tried, with the loop error and the use of each that has a pose."""
+    """Return all attempts; those with a pose have their loop error and whether they were used."""
     return tuple(
         NodeRegistration(
             nodes[trial.source].name,
@@ -148,9 +148,9 @@ def _registrations(
 def _node_pairs(
     frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds], known: Sequence[bool]
 ) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
-    """(later, earlier) node: the best partner of each whose pose is known, and the others that share enough.
+    """Return (later, earlier) nodes: the best partner of each with a known pose, and the other pairs to try.
 
-    Where a pose is unknown, so is what is shared, and all pairs are tried.
+    If a pose is unknown, the common view is also unknown, and all pairs are tried.
     """
     partners, others = [], []
     for index in range(1, len(nodes)):
@@ -169,7 +169,7 @@ def _node_pairs(
 
 
 def _shared_view(frame: RgbdFrame, points_m: FloatArray, other: RgbdFrame) -> float:
-    """Share of a node's points that fall into another node's image, by the believed poses."""
+    """Return the share of a node's points that project into another node's image, by the given poses."""
     T_other_camera = geometry.inverse(other.T_world_camera) @ frame.T_world_camera
     seen_m = geometry.apply(T_other_camera, points_m[::50])
     seen_m = seen_m[seen_m[:, 2] > 0.1]
@@ -188,7 +188,7 @@ def _try(
     source: int,
     target: int,
 ) -> _Tried:
-    """One node's cloud onto another's, from the believed poses or from anywhere."""
+    """Register one node's cloud to another's, from the given poses or from anywhere."""
     moving, fixed = (getattr(nodes[index], align_with) for index in (source, target))
     T_init = geometry.inverse(frames[target].T_world_camera) @ frames[source].T_world_camera
     given = known[source] and known[target]
@@ -218,7 +218,7 @@ def _register_given(
     T_init: FloatArray,
     judged: Callable[[FloatArray], Agreement],
 ) -> RegistrationResult:
-    """From a given pose; where what both measured contradicts the result, by a wider gate if that helps."""
+    """Register from a given pose; if the measurements contradict the result, try wider gates."""
     result = register(moving, fixed, config, T_init)
     if _less(judged(result.T_target_source), LEAST_AGREEMENT):
         for gate_m in (times * config.gate_m for times in WIDER_GATES):
@@ -233,14 +233,14 @@ def _links(tried: Sequence[_Tried]) -> list[tuple[int, int]]:
 
 
 def _score(found: Agreement) -> float:
-    """Of poses from anywhere the better one: its agreement, if enough is shared."""
+    """Score a pose found from anywhere: its agreement, or 0 if the overlap is too small."""
     return found.within_2pct_share if found.overlap_share >= SURE_OVERLAP else 0.0
 
 
 def _both_ways(
     frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds], source: int, target: int, T: FloatArray
 ) -> Agreement:
-    """The agreement of two nodes at a pose T_target_source, counted in the points of both."""
+    """Compute the agreement of two nodes at a pose T_target_source, counted in the points of both."""
     there, back = frames[target], frames[source]
     return agreement(nodes[source].sensor, T, there.intrinsics, there.depth) + agreement(
         nodes[target].sensor, geometry.inverse(T), back.intrinsics, back.depth
@@ -248,7 +248,7 @@ def _both_ways(
 
 
 def _reference(known: Sequence[bool], edges: Sequence[PoseEdge]) -> tuple[int, list[int]]:
-    """The node whose pose stays, and the nodes that hang together with it: the most that do."""
+    """Return the node whose pose is kept, and its group: the largest set of connected nodes."""
     believers = [index for index, one in enumerate(known) if one]
     links = [(edge.source, edge.target) for edge in edges if edge.agrees]
     links += pairwise(believers)
@@ -263,7 +263,7 @@ def _poses(
     group: Sequence[int],
     tried: Sequence[_Tried],
 ) -> list[FloatArray]:
-    """Every node's pose, by the graph or beside its partner; those outside of the group as they believe."""
+    """Return every node's pose, by the graph or relative to its partner; outside the group the given pose."""
     poses = [frame.T_world_camera for frame in frames]
     partner = {trial.source: trial for trial in reversed(tried) if trial.given}
     for index in group:
@@ -288,7 +288,7 @@ def _verdicts(
     agreements: dict[tuple[int, int], Agreement],
     tried: Sequence[_Tried],
 ) -> list[NodeVerdict]:
-    """The worst of those that contradict the others is left out, until none does; the same way to doubts."""
+    """Exclude the worst contradicting node until none contradicts; find doubtful nodes in the same way."""
 
     def beside(others: set[int], node: int) -> Agreement:
         pairs = (pair for pair in agreements if node in pair and set(pair) - {node} <= others)
@@ -321,7 +321,7 @@ def _verdicts(
 
 
 def _contradiction(name: str, found: Agreement) -> str:
-    """Why a node with a pose is left out."""
+    """Return why a node with a pose is excluded."""
     return (
         f"{name} is left out: of what it and the others both measured, only {found.within_2pct_share:.0%} is "
         "within 2 %; check its pose and that all nodes saw the same scene, or try --set "
@@ -330,7 +330,7 @@ def _contradiction(name: str, found: Agreement) -> str:
 
 
 def _lost(nodes: Sequence[NodeClouds], index: int, tried: Sequence[_Tried]) -> str:
-    """Why a node hangs together with none."""
+    """Return why a node is connected to no other."""
     mine = [trial for trial in tried if index in (trial.source, trial.target)]
     best = max(mine, key=lambda trial: (_score(trial.agreement), trial.agreement.shared))
     other = nodes[best.target if best.source == index else best.source].name

@@ -1,4 +1,4 @@
-"""The pose graph of a rig: wrong registrations are found by loops, the others agree by least squares."""
+"""Pose graph of a rig: loops reveal wrong registrations, least squares reconciles the others."""
 
 from __future__ import annotations
 
@@ -15,52 +15,52 @@ from pipeline.registration.neighbourhood import median_spacing_m
 from pipeline.types import FloatArray, PointCloud
 
 LOOP_TOLERANCE_M = 0.05
-"""Largest error of a loop of registrations that are all right: a few times the 2 cm of one (SPEC 4.7)."""
+"""Largest error of a loop of correct registrations: a few times the 2 cm of a single one (SPEC 4.7)."""
 INFORMATION_GATE_M = 0.05
-"""Pairs nearer than this at the registered pose are evidence for it."""
+"""Largest distance of pairs, at the registered pose, that count as evidence for it."""
 FIT_GATE_M = 0.3
-"""Points farther than this from the other cloud are outside of the overlap."""
+"""Points farther than this from the other cloud are outside the overlap."""
 GRAPH_POINTS = 4000
-"""Points of a node that the graph looks at."""
+"""Most points of a node that the graph uses."""
 
 
 @dataclass(frozen=True, slots=True)
 class PoseEdge:
-    """One registration as evidence about the poses of two nodes."""
+    """A registration as evidence for the relative pose of two nodes."""
 
     source: int
     target: int
     T_target_source: FloatArray
-    """(4, 4)."""
+    """(4, 4) registered pose."""
     information: FloatArray
-    """(6, 6) sum of J^T J over the close pairs; rotations first, as Open3D orders them."""
+    """(6, 6) sum of J^T J over the close pairs; rotations first, as in Open3D."""
     misfit_m: float
-    """Median distance of the source's points from the target where they overlap; of edges that
-    contradict each other, the one with the largest is dropped first."""
+    """Median distance of the source's points from the target in their overlap; of contradicting edges, that
+    with the largest is rejected first."""
     agrees: bool = True
-    """False for an edge that other evidence contradicts: it makes no pose and checks no loop."""
+    """False for an edge that other evidence contradicts: it determines no pose and checks no loop."""
 
     @property
     def pairs(self) -> float:
-        """How many close pairs the information is made of."""
+        """Number of close pairs in the information."""
         return float(self.information[5, 5])
 
 
 @dataclass(frozen=True, slots=True)
 class PoseGraph:
-    """The outcome; edges in the order in which they were given."""
+    """Solution of a pose graph, with edges in the given order."""
 
     T_reference_node: tuple[FloatArray, ...]
-    """(4, 4) pose of every node in the frame of the reference; NaN for nodes that no used edge reaches."""
+    """(4, 4) pose of every node in the reference's frame; NaN for nodes that no used edge reaches."""
     loop_error_m: tuple[float, ...]
-    """Point error between each edge and the other way between its nodes, along edges that nothing else
-    contradicts, that agrees with it best; NaN without another way."""
+    """Point error between each edge and the path between its nodes, along edges that nothing else
+    contradicts, that agrees with it best; NaN without a path."""
     used: tuple[bool, ...]
-    """False for the edges that were rejected because they contradict the loops."""
+    """False for edges that were rejected because they contradict the loops."""
 
 
 def graph_points(cloud: PointCloud) -> FloatArray:
-    """(N, 3) at most ``GRAPH_POINTS`` of a node's points."""
+    """Draw at most ``GRAPH_POINTS`` (N, 3) points of a node."""
     if len(cloud) <= GRAPH_POINTS:
         return cloud.points_m
     return cloud.points_m[np.random.default_rng(0).choice(len(cloud), GRAPH_POINTS, replace=False)]
@@ -73,10 +73,10 @@ def pose_edge(
     T_target_source: FloatArray,
     agrees: bool = True,
 ) -> PoseEdge:
-    """The evidence for a registered pose in the nodes' own points.
+    """Compute the evidence for a registered pose from the nodes' points.
 
-    The information of a pair is the one of Choi, Zhou, Koltun 2015, eq. 10: the Gauss-Newton matrix of the
-    distances of matched points.
+    The information follows Choi, Zhou, Koltun 2015, eq. 10: the Gauss-Newton matrix of the distances of
+    matched points.
     """
     moved_m = apply(T_target_source, points_m[source])
     distances_m, nearest = cKDTree(points_m[target]).query(moved_m, workers=-1)
@@ -94,7 +94,7 @@ def pose_edge(
 
 
 def _information(points_m: FloatArray) -> FloatArray:
-    """(6, 6) sum over points of J^T J, J = [-[p]x, I]."""
+    """Return the (6, 6) sum over points of J^T J, J = [-[p]x, I]."""
     x, y, z = points_m.T
     zero = np.zeros_like(x)
     skew = np.stack([zero, z, -y, -z, zero, x, y, -x, zero], axis=1).reshape(-1, 3, 3)
@@ -103,7 +103,7 @@ def _information(points_m: FloatArray) -> FloatArray:
 
 
 def groups_of(nodes: int, links: Iterable[tuple[int, int]]) -> list[set[int]]:
-    """The nodes that hang together, in the order of their first ones."""
+    """Return the connected groups of nodes, ordered by their first nodes."""
     groups = [{node} for node in range(nodes)]
     for link in links:
         one, other = (next(group for group in groups if node in group) for node in link)
@@ -116,15 +116,15 @@ def groups_of(nodes: int, links: Iterable[tuple[int, int]]) -> list[set[int]]:
 def strongest_alike(
     points_m: Sequence[FloatArray], edges: Sequence[PoseEdge], strengths: Sequence[float]
 ) -> list[PoseEdge]:
-    """The edges, of which one does not agree if it contradicts the way along stronger ones.
+    """Mark edges as not agreeing if they contradict the path along stronger edges.
 
-    Poses found from anywhere can be wrong alike, a view taken for the one of the opposite corner: two such
-    edges confirm each other by a loop. The stronger evidence is believed.
+    Poses found from anywhere can be wrong in the same way, such as a view mistaken for that of the opposite
+    corner: two such edges form a consistent loop. So stronger evidence wins.
 
     Args:
         points_m: as for ``solve_pose_graph``.
-        edges: registrations.
-        strengths: of each edge.
+        edges: the registrations.
+        strengths: strength of each edge's evidence.
     """
     judged = list(edges)
     kept: list[PoseEdge] = []
@@ -136,7 +136,7 @@ def strongest_alike(
         error_m = point_error_m(T_target_source, edge.T_target_source, points_m[edge.source])
         if error_m > LOOP_TOLERANCE_M:
             judged[place] = replace(edge, agrees=False)
-        else:  # NaN, where there is no other way, is no contradiction
+        else:  # without another path the error is NaN, which is no contradiction
             kept.append(edge)
     return judged
 
@@ -144,12 +144,12 @@ def strongest_alike(
 def solve_pose_graph(
     points_m: Sequence[FloatArray], edges: Sequence[PoseEdge], reference: int = 0
 ) -> PoseGraph:
-    """Poses that agree best with the edges, after those that contradict the loops are taken out.
+    """Compute the poses that agree best with the edges, after rejecting edges that contradict the loops.
 
     Args:
-        points_m: (N, 3) points of every node, in its own frame: errors are measured at them.
-        edges: registrations, at most one for each pair of nodes.
-        reference: the node whose pose is the identity.
+        points_m: (N, 3) points of every node, in its own frame, at which errors are measured.
+        edges: the registrations, at most one per pair of nodes.
+        reference: node whose pose is the identity.
     """
     used = _consistent(points_m, edges)
     kept = [edge for edge, keep in zip(edges, used, strict=True) if keep]
@@ -160,7 +160,7 @@ def solve_pose_graph(
 
 
 def chained(nodes: int, edges: Sequence[PoseEdge], reference: int = 0) -> list[FloatArray]:
-    """T_reference_node along the tree of the edges with the most pairs; NaN for nodes out of reach."""
+    """Return T_reference_node along the tree of edges with the most pairs; NaN for unreachable nodes."""
     poses: list[FloatArray | None] = [None] * nodes
     poses[reference] = np.eye(4)
     while True:
@@ -176,7 +176,7 @@ def chained(nodes: int, edges: Sequence[PoseEdge], reference: int = 0) -> list[F
 
 
 def _consistent(points_m: Sequence[FloatArray], edges: Sequence[PoseEdge]) -> list[bool]:
-    """Which edges stay when the worst fitting of those that no loop confirms goes, until all loops close."""
+    """Reject the worst-fitting edge that no loop confirms until all loops close; returns which edges stay."""
     used = [edge.agrees for edge in edges]
     while True:
         left = [edge for edge, keep in zip(edges, used, strict=True) if keep]
@@ -191,7 +191,7 @@ def _consistent(points_m: Sequence[FloatArray], edges: Sequence[PoseEdge]) -> li
 
 
 def _loop_error_m(points_m: Sequence[FloatArray], edge: PoseEdge, edges: Sequence[PoseEdge]) -> float:
-    """Point error between an edge and the other way that agrees with it best; NaN without one."""
+    """Return the point error between an edge and the path that agrees with it best; NaN without a path."""
     errors = [
         point_error_m(T, edge.T_target_source, points_m[edge.source])
         for T in _ways(edge.source, edge.target, [other for other in edges if other is not edge])
@@ -200,7 +200,7 @@ def _loop_error_m(points_m: Sequence[FloatArray], edge: PoseEdge, edges: Sequenc
 
 
 def _ways(start: int, end: int, edges: Sequence[PoseEdge]) -> Iterator[FloatArray]:
-    """T_end_start composed along every path without a repeated node."""
+    """Yield T_end_start along every path without a repeated node."""
     if start == end:
         yield np.eye(4)
         return
@@ -215,10 +215,10 @@ def _ways(start: int, end: int, edges: Sequence[PoseEdge]) -> Iterator[FloatArra
 
 
 def _optimised(start: Sequence[FloatArray], edges: Sequence[PoseEdge], reference: int) -> list[FloatArray]:
-    """Open3D's Levenberg-Marquardt over the nodes that have a start, the reference held."""
+    """Run Open3D's Levenberg-Marquardt on the nodes that have a start pose, with the reference fixed."""
     reached = [node for node, pose in enumerate(start) if np.isfinite(pose).all()]
     if len(edges) < len(reached):
-        return list(start)  # a tree: nothing to agree about
+        return list(start)  # the edges form a tree, so nothing has to be reconciled
     place = {node: index for index, node in enumerate(reached)}
     o3d_registration = o3d.pipelines.registration
     graph = o3d_registration.PoseGraph()

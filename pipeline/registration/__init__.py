@@ -1,4 +1,4 @@
-"""Registration of two clouds as a sequence of steps, and their fusion (SPEC 4)."""
+"""Iterative registration of two clouds, errors of a registration, and fusion of clouds (SPEC 4)."""
 
 from pipeline.registration.fusion import fuse
 from pipeline.registration.loop import iterate_registration, register, register_timed

@@ -1,4 +1,4 @@
-"""Two clouds of which nothing is known: several start poses, judged by what lies behind the points."""
+"""Registration without a start pose: several start poses are tried and compared by a given score."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from pipeline.registration.sample import draw
 from pipeline.types import FloatArray, PointCloud, RegistrationResult
 
 VOXELS = (1.6, 1.0)
-"""Voxels of the start poses tried, in default voxels: the coarse one is the quickest."""
+"""Voxel sizes of the tried start poses, in default voxels: the coarse one is the fastest."""
 SHAPE_POINTS = 3000
 MEETING_SPACINGS = 3.0
-"""Points nearer than so many spacings to the other cloud are where the two meet."""
+"""The clouds overlap at points that are nearer to the other cloud than this many spacings."""
 
 
 def register_anywhere(
@@ -33,19 +33,19 @@ def register_anywhere(
     enough: float,
     thorough: bool = True,
 ) -> RegistrationResult:
-    """Register from start poses that features of two sizes give; the best by a score of the end pose.
+    """Register from start poses found with features of two sizes; returns the result with the best score.
 
     Args:
         source: the cloud that moves.
         target: the cloud that stays.
-        config: how it goes on from a start pose.
-        score: of a (4, 4) pose T_target_source; the larger the better, and better a check of other evidence
-            than nearest points, which a wrong pose may bring together as well.
-        enough: a score with which the search ends.
-        thorough: whether features of the second size are tried where those of the first do not suffice.
+        config: settings of the registration from each start pose.
+        score: maps a (4, 4) final pose T_target_source to a number, the larger the better. It should use
+            other evidence than nearest points, because a wrong pose can bring these together as well.
+        enough: score at which the search stops.
+        thorough: whether features of the second size are tried if those of the first do not reach ``enough``.
 
     Raises:
-        ReconstructionError: no start pose was found, or the surfaces that meet leave a motion open.
+        ReconstructionError: no start pose was found, or the overlapping surfaces leave a motion undetermined.
     """
     best: tuple[float, RegistrationResult] | None = None
     reason = ""
@@ -70,7 +70,7 @@ def register_anywhere(
 
 
 def _open_where_they_meet(source: PointCloud, target: PointCloud, T: FloatArray, seed: int) -> str:
-    """The motions, in words, that what both clouds have at a pose does not determine."""
+    """Return the motions, in words, that the overlap of both clouds at a pose does not determine."""
     moving, fixed = (draw(cloud, SHAPE_POINTS, seed, "").points_m for cloud in (source, target))
     reach_m = MEETING_SPACINGS * median_spacing_m(fixed)
     distances_m, _ = cKDTree(apply(T, moving)).query(fixed, distance_upper_bound=reach_m, workers=-1)

@@ -1,7 +1,7 @@
-"""Cross-entropy ICP in its well-posed forms: pairs weigh -p log p (SPEC 4.4).
+"""Cross-entropy ICP in its well-posed forms CEICP-N, -A and -R: pair weights -p log p (SPEC 4.4).
 
-The thesis's own formula (eqs. 3.10-3.11) takes the logarithm of a density, so its weights depend on
-the unit of length and turn negative in metres; here p is a probability over the kept pairs.
+The thesis's formula (eqs. 3.10-3.11) takes the logarithm of a density, so its weights depend on the
+unit of length and become negative in metres; here p is a probability over the kept pairs.
 """
 
 from __future__ import annotations
@@ -17,30 +17,30 @@ from pipeline.registration.weighting import MAD_TO_SIGMA, PairWeighting, PairWei
 from pipeline.types import FloatArray, PointCloud
 
 GATE_IN_SIGMAS = 3.0
-"""CEICP-A's gate T_d,k over its scale sigma_k."""
+"""Ratio of CEICP-A's gate T_d,k to its scale sigma_k."""
 START_SIGMA_OF_GATE = 1.0 / 1.5
-"""CEICP-A's first scale sigma_0 over the configured gate T_d."""
+"""Ratio of CEICP-A's first scale sigma_0 to the configured gate T_d."""
 SIGMA_MIN_OF_SPACING = 0.6
-"""CEICP-A's smallest scale over the target's median spacing."""
+"""Ratio of CEICP-A's smallest scale to the target's median spacing."""
 COARSE_POINTS = 2000
-"""Points that look for a partner while CEICP-A's kernel is wide, if there are more."""
+"""Number of points that CEICP-A matches at first, while its kernel is wide."""
 SIGMA_MIN_OF_GATE = 1e-3
-"""Floor of CEICP-A's smallest scale over the gate, for targets whose points coincide."""
+"""Least ratio of CEICP-A's smallest scale to the gate, for targets whose points coincide."""
 
 
 @dataclass(frozen=True, slots=True)
 class CeicpN(PairWeighting):
-    """CEICP-N: a fixed gate, the scale re-estimated from the kept pairs at every iteration."""
+    """CEICP-N: a fixed gate, and a scale that is estimated from the kept pairs at every iteration."""
 
     fixed_gate_m: float
 
     @classmethod
     def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> CeicpN:
-        """With the configured gate."""
+        """Return the first state, with the configured gate."""
         return cls(config.gate_m)
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """Pairs within the gate; sigma^2 is their mean squared distance."""
+        """Weigh the pairs within the gate; sigma^2 is their mean squared distance."""
         rows = np.flatnonzero(matching.distances_m <= self.fixed_gate_m)
         distances_m = matching.distances_m[rows]
         sigma_m = float(np.sqrt(np.mean(distances_m**2))) if len(rows) else float("nan")
@@ -54,22 +54,22 @@ class CeicpN(PairWeighting):
 
 @dataclass(frozen=True, slots=True)
 class CeicpA(PairWeighting):
-    """CEICP-A: the scale shrinks by a factor an iteration, and the gate with it."""
+    """CEICP-A: scale and gate shrink by the same factor at each iteration."""
 
     sigma_m: float
     sigma_0_m: float
     sigma_min_m: float
     decay: float
     least_source_share: float = 1.0
-    """Share of the source's points that look for a partner while the kernel is wide."""
+    """Least share of the source's points that are matched, while the kernel is wide."""
     least_target_share: float = 1.0
-    """The same of the target's."""
+    """Least share of the target's points that are matched, while the kernel is wide."""
     may_widen: bool = True
-    """Whether the scale may still be doubled, once, after losing its pairs."""
+    """Whether the scale may still be doubled (once), when too few pairs are kept."""
 
     @classmethod
     def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> CeicpA:
-        """At sigma_0 = gate / 1.5."""
+        """Return the first state, with sigma_0 = gate / 1.5."""
         sigma_min_m = config.sigma_min_m or _smallest_sigma_m(target, config.gate_m)
         sigma_0_m = max(START_SIGMA_OF_GATE * config.gate_m, sigma_min_m)
         source_share = min(1.0, COARSE_POINTS / len(source)) if config.direction == "q2p" else 1.0
@@ -77,7 +77,7 @@ class CeicpA(PairWeighting):
         return cls(sigma_0_m, sigma_0_m, sigma_min_m, config.sigma_decay, source_share, target_share)
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """Pairs within three sigma."""
+        """Weigh the pairs within three sigma."""
         rows = np.flatnonzero(matching.distances_m <= self.gate_m)
         return PairWeights(rows, *entropy_weights(matching.distances_m[rows], self.sigma_m))
 
@@ -93,23 +93,23 @@ class CeicpA(PairWeighting):
 
     @property
     def source_share(self) -> float:
-        """All points at the last scale, in proportion fewer where the kernel is wider."""
+        """Share of the matched source points: 1 at the smallest scale, proportionally less at wider ones."""
         return self._share(self.least_source_share)
 
     @property
     def target_share(self) -> float:
-        """As ``source_share``, where target points look for partners."""
+        """Like ``source_share``, for matching from the target to the source."""
         return self._share(self.least_target_share)
 
     def _share(self, least: float) -> float:
         return min(1.0, max(least, self.sigma_min_m / self.sigma_m))
 
     def following(self, kept: PairWeights, still: bool) -> CeicpA:
-        """With the scale shrunk."""
+        """Return the next state, with a smaller scale."""
         return replace(self, sigma_m=max(self.sigma_min_m, self.decay * self.sigma_m))
 
     def widened(self) -> CeicpA | None:
-        """With the scale doubled, at most to sigma_0; None once that has been used."""
+        """Return the state with twice the scale, at most sigma_0; None if it was already widened once."""
         if not self.may_widen:
             return None
         return replace(self, sigma_m=min(2.0 * self.sigma_m, self.sigma_0_m), may_widen=False)
@@ -119,21 +119,21 @@ class CeicpA(PairWeighting):
 class CeicpR(PairWeighting):
     """CEICP-R: sigma_k = min(sigma_k-1, max(sigma_min, 1.4826 median d)), gate 3 sigma_k.
 
-    Weights as in CEICP-N. Needs no prior gate: its own follows from the median of all distances, so that
-    none may be left out of the search before.
+    The weights are those of CEICP-N. The gate is not configured: it follows from the median of all distances,
+    so the search must not leave out any pair.
     """
 
     sigma_min_m: float
     sigma_m: float = float("inf")
-    """Scale of the previous iteration, which this one's does not exceed."""
+    """Scale of the previous iteration, the upper limit of the current one."""
 
     @classmethod
     def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> CeicpR:
-        """With the smallest scale of CEICP-A."""
+        """Return the first state, with the smallest scale of CEICP-A."""
         return cls(CeicpA.starting(config, source, target).sigma_min_m)
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """Pairs within three robust sigmas."""
+        """Weigh the pairs within three robust sigmas."""
         robust_m = MAD_TO_SIGMA * float(np.median(matching.distances_m))
         sigma_m = min(self.sigma_m, max(self.sigma_min_m, robust_m))
         gate_m = GATE_IN_SIGMAS * sigma_m
@@ -141,12 +141,12 @@ class CeicpR(PairWeighting):
         return PairWeights(rows, *entropy_weights(matching.distances_m[rows], sigma_m), gate_m=gate_m)
 
     def following(self, kept: PairWeights, still: bool) -> CeicpR:
-        """With the scale of the kept pairs as the bound of the next."""
+        """Return the next state, with the scale of the kept pairs as its upper limit."""
         return replace(self, sigma_m=kept.sigma_m)
 
 
 def _smallest_sigma_m(target: PointCloud, gate_m: float) -> float:
-    """0.6 times the target's median spacing, or its median depth noise if that is larger."""
+    """Return 0.6 times the target's median spacing, or its median depth noise if that is larger."""
     noise_m = 0.0
     if target.sigma_m is not None and np.isfinite(target.sigma_m).any():
         noise_m = float(np.nanmedian(target.sigma_m))
@@ -155,7 +155,7 @@ def _smallest_sigma_m(target: PointCloud, gate_m: float) -> float:
 
 
 def entropy_weights(distances_m: FloatArray, sigma_m: float) -> tuple[FloatArray, float, float]:
-    """Weights -p log p of a Gaussian p over pairs (SPEC 4.4), normalised.
+    """Compute normalised weights -p log p of a Gaussian p over pairs (SPEC 4.4).
 
     Returns:
         (M,) weights summing to one, the scale, and the entropy -sum p log p in nats.

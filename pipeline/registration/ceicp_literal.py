@@ -1,4 +1,4 @@
-"""CEICP as the thesis prints it (eqs. 3.10-3.17, SPEC 4.3): for comparison, not for use."""
+"""CEICP exactly as printed in the thesis (eqs. 3.10-3.17, SPEC 4.3): for comparison, not for use."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from pipeline.types import FloatArray, PointCloud
 Unit = Literal["mm", "m"]
 _PER_METRE = {"mm": 1000.0, "m": 1.0}
 _LEAST_SIGMA = 1.0 / np.sqrt(2.0 * np.pi)
-"""Scale in units below which the density exceeds one and its logarithm changes sign."""
+"""Scale, in the unit of length, below which the density exceeds one and its logarithm changes sign."""
 
 
 @dataclass(frozen=True, slots=True)
 class CeicpLiteral(PairWeighting):
-    """Weights -f log f, f a Gaussian density fitted to the kept distances in some unit of length.
+    """Weights -f log f, where f is a Gaussian density fitted to the kept distances in a unit of length.
 
-    f has the dimension of one over a length, so that the weights, and with them the answer, depend
-    on the unit. Centroids are unweighted (eq. 3.12). The corrections of SPEC 4.3 that do not touch the
-    weights hold here too: R = U V^T without reflections.
+    f has the dimension 1 / length, so the weights, and with them the result, depend on the unit.
+    Centroids are unweighted (eq. 3.12). The corrections of SPEC 4.3 that do not concern the weights are
+    applied: R = U V^T without reflections.
     """
 
     fixed_gate_m: float
@@ -34,11 +34,11 @@ class CeicpLiteral(PairWeighting):
 
     @classmethod
     def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> CeicpLiteral:
-        """With the configured gate and unit."""
+        """Return the first state, with the configured gate and unit."""
         return cls(config.gate_m, config.unit)
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """Pairs within the gate; mu and sigma are the mean and sample deviation of their distances."""
+        """Weigh the pairs within the gate; mu and sigma are mean and sample deviation of their distances."""
         rows = np.flatnonzero(matching.distances_m <= self.fixed_gate_m)
         if len(rows) < 2:
             return PairWeights(rows, np.ones(len(rows)))
@@ -55,11 +55,11 @@ class CeicpLiteral(PairWeighting):
 
     @property
     def unweighted_centroids(self) -> bool:
-        """As eq. 3.12 prints it."""
+        """True: centroids are unweighted, as printed in eq. 3.12."""
         return True
 
     def _refusal(self, sigma: float) -> InputError | DegenerateError:
-        """What negative weights come to: metres cannot work at all, millimetres end near the goal."""
+        """Return the error for negative weights: metres never work, millimetres only fail near the goal."""
         reason = (
             f"the distances' standard deviation is {sigma:.2g} {self.unit}, below {_LEAST_SIGMA:.3f} "
             f"{self.unit}: f is a density, which there exceeds 1/{self.unit}, so that log f changes sign and "
@@ -71,7 +71,7 @@ class CeicpLiteral(PairWeighting):
 
 
 def density_information(distances: FloatArray) -> tuple[FloatArray, float]:
-    """The thesis's weights -f log f of (M,) distances, M >= 2, negative where f > 1 (eqs. 3.10-3.11).
+    """Compute the thesis's weights -f log f of (M,) distances, M >= 2; negative if f > 1 (eqs. 3.10-3.11).
 
     Returns:
         (M,) weights, not normalised, and the sample standard deviation, in the unit of the distances.

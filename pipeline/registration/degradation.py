@@ -1,6 +1,6 @@
-"""Degrade a cloud as real depth is degraded: noise, outliers, holes, bias, less overlap.
+"""Artificial degradation of a cloud as in real depth data: noise, outliers, holes, bias, less overlap.
 
-The Fuse screen degrades the race's source with it, and the capture map and the claims use it as well.
+It is used for the source of the race on the Fuse screen, for the capture map and for the claims.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ LIMITS = {"noise_m": 0.2, "outlier_share": 0.8, "hole_share": 0.9, "depth_bias":
 """Largest value of each degradation."""
 HOLES = 12
 BIAS_WAVES = 24
-"""Plane waves that make up the bias; many random ones make a Gaussian field."""
+"""Number of plane waves in the bias; the sum of many random waves is a Gaussian field."""
 BIAS_SCALE_OF_VIEW = 0.3
-"""Correlation length of the bias over the larger side of the view; with it plain ICP errs as in SPEC 4.8."""
+"""Correlation length of the bias over the larger side of the view; plain ICP then errs as in SPEC 4.8."""
 
 
 @dataclass(frozen=True, slots=True)
 class Degradation:
-    """How much of each degradation; the default changes nothing.
+    """Amount of each degradation; the default changes nothing.
 
     Raises:
         InputError: a value outside 0 to its limit in ``LIMITS``.
@@ -32,13 +32,13 @@ class Degradation:
     noise_m: float = 0.0
     """Standard deviation of noise along the view ray, metres."""
     outlier_share: float = 0.0
-    """Share of the points replaced by points anywhere in the cloud's bounding box."""
+    """Share of the points replaced by uniform random points in the cloud's bounding box."""
     hole_share: float = 0.0
     """Share of the points removed in round patches of the view."""
     depth_bias: float = 0.0
-    """Standard deviation, over the points, of a smooth relative depth error without a mean."""
+    """Standard deviation over the points of a smooth relative depth error with mean zero."""
     crop_share: float = 0.0
-    """Share of the points removed at one side of the view, which lessens overlap."""
+    """Share of the points removed at one side of the view, which reduces the overlap."""
 
     def __post_init__(self) -> None:
         for part in fields(self):
@@ -48,20 +48,20 @@ class Degradation:
 
 
 def degrade(cloud: PointCloud, how: Degradation, seed: int) -> PointCloud:
-    """The cloud after crop, holes, depth bias, noise and outliers, applied in this order.
+    """Apply crop, holes, depth bias, noise and outliers to a cloud, in this order.
 
-    Every kind has its own random stream: changing one leaves the draws of the others as they were.
+    Every kind has its own random stream: a change of one does not change the draws of the others.
 
     Args:
-        cloud: in its camera's frame, z forward.
-        how: the degradations; shares are of the points that the earlier ones have left.
-        seed: of all five streams.
+        cloud: cloud in its camera's frame, z forward.
+        how: the degradations; each share refers to the points that remain after the earlier ones.
+        seed: random seed of all five streams.
 
     Returns:
-        The points that are left, with all their columns; only positions change.
+        The remaining points, with all their columns; only positions change.
 
     Raises:
-        InputError: there are no points, or some lie beside or behind the camera.
+        InputError: there are no points, or some have z <= 0 in the camera's frame.
     """
     if not len(cloud) or not np.all(cloud.points_m[:, 2] > 0):
         raise InputError("Only a cloud in front of its camera (z > 0) can be degraded.")
@@ -82,7 +82,7 @@ def degrade(cloud: PointCloud, how: Degradation, seed: int) -> PointCloud:
 
 
 def smooth_field(view: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """(N,) values of a random smooth function at (N, 2) view positions, with mean zero and variance one."""
+    """Evaluate a random smooth function at (N, 2) view positions: (N,) with mean zero and variance one."""
     scale = BIAS_SCALE_OF_VIEW * np.ptp(view, axis=0).max() + np.finfo(float).tiny
     waves = rng.standard_normal((2, BIAS_WAVES)) / scale
     field = np.cos(view @ waves + rng.uniform(0.0, 2.0 * np.pi, BIAS_WAVES)).sum(axis=1)
@@ -90,18 +90,18 @@ def smooth_field(view: FloatArray, rng: np.random.Generator) -> FloatArray:
 
 
 def _view(cloud: PointCloud) -> FloatArray:
-    """(N, 2) where each point stands in the view: x / z, y / z."""
+    """Return (N, 2) position of each point in the view: x / z, y / z."""
     return cloud.points_m[:, :2] / cloud.points_m[:, 2:]
 
 
 def _outside_crop(view: FloatArray, share: float, rng: np.random.Generator) -> BoolArray:
-    """(N,) True but for the share of the points farthest towards a random side."""
+    """Return (N,) False for the share of the points farthest towards a random side of the view."""
     angle_rad = rng.uniform(0.0, 2.0 * np.pi)
     return _without_least(-view @ np.array([np.cos(angle_rad), np.sin(angle_rad)]), share)
 
 
 def _outside_holes(view: FloatArray, share: float, rng: np.random.Generator) -> BoolArray:
-    """(N,) True outside round patches about random points, as large as the share needs."""
+    """Return (N,) False in round patches about random points, large enough for the share."""
     centers = view[rng.integers(0, len(view), HOLES)]
     radii = rng.uniform(0.4, 1.0, HOLES)
     inside = [np.sum((view - c) ** 2, axis=1) / r**2 for c, r in zip(centers, radii, strict=True)]
@@ -109,14 +109,14 @@ def _outside_holes(view: FloatArray, share: float, rng: np.random.Generator) -> 
 
 
 def _without_least(values: FloatArray, share: float) -> BoolArray:
-    """(N,) False for the share of the rows with the least values."""
+    """Return (N,) False for the share of the rows with the least values."""
     keep = np.ones(len(values), np.bool_)
     keep[np.argsort(values, kind="stable")[: round(share * len(values))]] = False
     return keep
 
 
 def _with_outliers(points_m: FloatArray, share: float, rng: np.random.Generator) -> FloatArray:
-    """(N, 3) the points, a share of them replaced by uniform ones in the bounding box of all."""
+    """Return (N, 3) points, a share of them replaced by uniform random points in their bounding box."""
     replaced = rng.permutation(len(points_m))[: round(share * len(points_m))]
     points_m = points_m.copy()
     low, high = points_m.min(axis=0), points_m.max(axis=0)

@@ -1,6 +1,6 @@
 """Fast and robust ICP: Welsch weights on a shrinking scale, accelerated (SPEC 4.6).
 
-The nearest published relative of CEICP-A.
+It is the published method most similar to CEICP-A.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from pipeline.registration.weighting import PairWeighting, PairWeights
 from pipeline.types import FloatArray, PointCloud
 
 FIRST_NU_OF_MEDIAN = 3.0
-"""First scale over the median distance of the first matching."""
+"""Ratio of the first scale to the median distance of the first matching."""
 LAST_NU_OF_SPACING = {"point": 1.0 / (3.0 * np.sqrt(3.0)), "plane": 1.0 / 6.0}
-"""Last scale over the target's spacing, by metric."""
+"""Ratio of the last scale to the target's spacing, by metric."""
 SHRINKING = 0.5
 SPACING_NEIGHBOURS = 6
 
 
 @dataclass(frozen=True, slots=True)
 class FastRobustIcp(PairWeighting):
-    """Weights exp(-d^2 / 2 nu^2); nu halves whenever the poses have come to rest at it.
+    """Weights exp(-d^2 / 2 nu^2); nu is halved whenever the poses have converged at it.
 
-    Every nu has a fixed energy, the mean of 1 - exp(-d^2 / 2 nu^2), which plain steps never raise and by
-    which extrapolated ones are judged. Distances are between points for both metrics.
+    For each nu the energy is the mean of 1 - exp(-d^2 / 2 nu^2), which plain steps never raise; extrapolated
+    steps that raise it are undone. Distances are between points for both metrics.
 
     Source: Zhang, Yao, Deng, "Fast and robust iterative closest point", TPAMI 2021; constants as in the
     authors' program.
@@ -38,16 +38,16 @@ class FastRobustIcp(PairWeighting):
     accelerated = True
     nu_min_m: float
     nu_m: float | None = None
-    """The scale; None takes it from the first matching."""
+    """Scale; None estimates it from the first matching."""
 
     @classmethod
     def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> FastRobustIcp:
-        """With the last scale from the target's spacing."""
+        """Return the first state, with the last scale from the target's spacing."""
         nu_min_m = LAST_NU_OF_SPACING[config.metric] * neighbourhood_m(target.points_m)
         return cls(max(nu_min_m, SIGMA_MIN_OF_GATE * config.gate_m))
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """All pairs, by the Welsch function."""
+        """Weigh all pairs by the Welsch function."""
         squared_m2 = matching.distances_m**2
         nu_m = max(self.nu_min_m, FIRST_NU_OF_MEDIAN * float(np.median(matching.distances_m)))
         if self.nu_m is not None:
@@ -63,11 +63,11 @@ class FastRobustIcp(PairWeighting):
         return self.nu_m is not None and self.nu_m <= self.nu_min_m
 
     def following(self, kept: PairWeights, still: bool) -> FastRobustIcp:
-        """With half the scale, if the poses have come to rest."""
+        """Return the next state, with half the scale if the poses have converged."""
         factor = SHRINKING if still else 1.0
         return replace(self, nu_m=max(self.nu_min_m, factor * kept.sigma_m))
 
 
 def neighbourhood_m(points_m: FloatArray) -> float:
-    """Median over (N, 3) points of their median distance to the nearest six others."""
+    """Return the median over (N, 3) points of their median distance to the nearest six others."""
     return float(np.median(np.median(neighbour_distances_m(points_m, SPACING_NEIGHBOURS), axis=1)))

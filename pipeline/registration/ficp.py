@@ -1,4 +1,4 @@
-"""Fractional ICP: the share of inliers among the pairs is found from their distances (SPEC 4.6)."""
+"""Fractional ICP: the share of inliers among the pairs is estimated from their distances (SPEC 4.6)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pipeline.registration.weighting import PairWeighting, PairWeights, closest_
 from pipeline.types import FloatArray
 
 LAMBDA = 0.95
-"""Exponent that pays for every pair kept, for points in space (libpointmatcher's default)."""
+"""Exponent that rewards every kept pair, for 3-D points (libpointmatcher's default)."""
 SMALLEST_FRACTION = 0.05
 
 
@@ -23,14 +23,14 @@ class Ficp(PairWeighting):
     """
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """The fraction of the closest pairs with the least fractional RMSD."""
+        """Keep the fraction of the closest pairs that has the least fractional RMSD."""
         return evenly(closest_rows(matching.distances_m, inlier_fraction(matching.distances_m)))
 
 
 def inlier_fraction(distances_m: FloatArray, exponent: float = LAMBDA) -> float:
-    """The f in [0.05, 1] that minimises FRMSD(f) = f^-lambda sqrt(mean of the f n smallest d^2).
+    """Find the f in [0.05, 1] that minimises FRMSD(f) = f^-lambda sqrt(mean of the f n smallest d^2).
 
-    Of several minima the largest, so that perfect pairs are all kept.
+    Of several minima the largest f is returned, so that perfect pairs are all kept.
 
     Args:
         distances_m: (M,) distances, M >= 1.

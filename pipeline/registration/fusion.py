@@ -1,4 +1,4 @@
-"""The sensor cloud and the inferred cloud of one node to one cloud (SPEC 4.9)."""
+"""Fusion of the sensor cloud and the inferred cloud of one node (SPEC 4.9)."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ FAR_SPACINGS = 2.0
 def fuse(
     sensor: PointCloud, inferred: PointCloud, mode: FusionMode, measured: BoolArray | None = None
 ) -> PointCloud:
-    """All sensor points, then the inferred points that ``mode`` lets in, each labelled with its source.
+    """Join all sensor points and the inferred points that ``mode`` admits, each labelled with its source.
 
-    ``union`` lets in all. ``fill`` lets in the inferred points of pixels that the sensor has not
-    measured: holes close up to their rim, no second layer grows over what the sensor saw, and no
-    measurement is replaced by a guess, not even one that the outlier filter has dropped. Clouds that
-    do not both know their pixels fall back to distance: an inferred point is let in if it is farther
-    from its nearest sensor point than twice the sensor cloud's spacing there.
+    ``union`` admits all. ``fill`` admits the inferred points of pixels that the sensor has not
+    measured: holes are closed up to their rim, no second layer covers measured surfaces, and no
+    measurement is replaced by an inferred one, even if the outlier filter has removed it. If a cloud has
+    no pixels, the distance decides: an inferred point is admitted if it is farther from its nearest
+    sensor point than twice the sensor cloud's spacing there.
 
     Args:
-        sensor: a node's sensor cloud, camera frame.
+        sensor: a node's sensor cloud in its camera's frame.
         inferred: the same node's inferred cloud on the same pixel grid and in the same frame.
         mode: ``union`` or ``fill``.
         measured: (H, W) pixels that the sensor has measured; None takes those of ``sensor``.
 
     Returns:
         A cloud with the columns that both clouds have. An inferred cloud without ``sigma_m`` gets it
-        from its disagreement with the sensor at the pixels both see: the confidence of SPEC 4.9.
+        from its difference to the sensor at the pixels that both have: the confidence of SPEC 4.9.
     """
     inferred = replace(
         inferred,
@@ -47,7 +47,7 @@ def fuse(
 
 
 def _fills(sensor: PointCloud, inferred: PointCloud, measured: BoolArray | None) -> BoolArray:
-    """(N,) True for the inferred points that lie where the sensor saw nothing."""
+    """Return (N,) True for the inferred points where the sensor measured nothing."""
     if measured is not None and inferred.pixels is not None:
         return ~measured[inferred.pixels[:, 1], inferred.pixels[:, 0]]
     if not len(sensor):
@@ -59,7 +59,7 @@ def _fills(sensor: PointCloud, inferred: PointCloud, measured: BoolArray | None)
 
 
 def _inferred_sigma_m(sensor: PointCloud, inferred: PointCloud) -> FloatArray | None:
-    """(N,) robust relative depth error at the shared pixels, times depth; None without shared pixels."""
+    """Return (N,) robust relative depth error at shared pixels, times depth; None without shared pixels."""
     if sensor.pixels is None or inferred.pixels is None or not len(sensor) or not len(inferred):
         return None
     (u, v), (inferred_u, inferred_v) = sensor.pixels.T, inferred.pixels.T
@@ -73,5 +73,5 @@ def _inferred_sigma_m(sensor: PointCloud, inferred: PointCloud) -> FloatArray | 
 
 
 def _pixel_keys(pixels: IntArray) -> IntArray:
-    """(N,) one integer per (u, v) pixel."""
+    """Return (N,) one integer per (u, v) pixel."""
     return pixels[:, 0].astype(np.int64) << 32 | pixels[:, 1]

@@ -1,4 +1,4 @@
-"""The gate from the data: of a ladder of gates, one after which the clouds lie best on each other."""
+"""Choice of the gate from the data: several gates are tried, and one with the best fit is taken."""
 
 from __future__ import annotations
 
@@ -19,36 +19,36 @@ from pipeline.registration.sample import draw
 from pipeline.types import FloatArray, PointCloud
 
 RUNGS = (1 / 20, 1 / 10, 1 / 5, 2 / 5)
-"""Gates tried, over the extent of the target: 0.3 to 2.4 m in a room of 6 m."""
+"""Tried gates over the extent of the target: 0.3 to 2.4 m in a room of 6 m."""
 LEAST_GATE_OF_SPACING = 6.0
-"""No gate is smaller than so many spacings of the points that take part."""
+"""Least gate, in median spacings of the sampled target points."""
 LADDER_POINTS = 3000
-"""Points of each cloud that climb the ladder."""
+"""Points of each cloud that are used to try the gates."""
 FIT_OF_SPACING = 1.5
-"""Points farther than so many spacings of the judged points from the other cloud count as not on it."""
+"""Limit of the misfit's distances, in median spacings of the sampled points."""
 ALIKE = 1.02
-"""Misfits whose ratio is less are of one place."""
+"""Largest ratio of two misfits that are taken as the same pose."""
 
 
 class Rung(NamedTuple):
-    """One gate and where it leads."""
+    """One tried gate with the pose that it leads to."""
 
     gate_m: float
     T_target_source: FloatArray
     misfit: float
-    """0 to 1."""
+    """Misfit of the clouds at this pose, 0 to 1."""
 
 
 class Misfit:
-    """How badly two clouds lie on each other at a pose, 0 to 1; the same measure for every gate and method.
+    """Misfit of two clouds at a pose, 0 to 1; the same measure for every gate and method.
 
-    The mean over the points of both of min(d, limit)^2 / limit^2, where d is the distance to the other
-    cloud's tangent plane at the nearest point, or the limit where that point is farther than it. So it falls
-    with overlap and with residual alike, and far points say no more than that they are far.
+    It is the mean over the points of both clouds of min(d, limit)^2 / limit^2, where d is the distance to the
+    other cloud's tangent plane at the nearest point, or the limit if that point is farther away. So more
+    overlap and smaller residuals both lower it, and all far points count alike.
     """
 
     def __init__(self, source: PointCloud, target: PointCloud, seed: int = 0) -> None:
-        """``seed`` draws the points that are judged."""
+        """Sample the clouds at random with ``seed``, and prepare trees and normals."""
         self._points_m = [
             draw(cloud, 2 * LADDER_POINTS, seed, name).points_m
             for cloud, name in ((source, "source"), (target, "target"))
@@ -58,13 +58,13 @@ class Misfit:
         self.limit_m = FIT_OF_SPACING * max(median_spacing_m(points_m) for points_m in self._points_m)
 
     def __call__(self, T_target_source: FloatArray) -> float:
-        """Of a (4, 4) pose."""
+        """Return the misfit at a (4, 4) pose."""
         there = self._squared(0, 1, T_target_source)
         back = self._squared(1, 0, np.linalg.inv(T_target_source))
         return float(np.mean(np.concatenate([there, back])))
 
     def _squared(self, moving: int, fixed: int, T: FloatArray) -> FloatArray:
-        """(N,) of the moving cloud's points."""
+        """Return (N,) min(d, limit)^2 / limit^2 of the moving cloud's points."""
         moved_m = apply(T, self._points_m[moving])
         distances_m, nearest = self._trees[fixed].query(
             moved_m, distance_upper_bound=self.limit_m, workers=-1
@@ -81,17 +81,17 @@ class Misfit:
 def ladder(
     source: PointCloud, target: PointCloud, config: RegistrationConfig, T_init: FloatArray, misfit: Misfit
 ) -> list[Rung]:
-    """Where each gate leads CEICP-A from a start pose, with few points.
+    """Register with CEICP-A and few points from a start pose, once with each of several gates.
 
     Args:
         source: the cloud that moves.
-        target: the cloud that stays; its extent and its spacing say which gates are worth trying.
-        config: metric, direction and seed; its gate does not count.
+        target: the cloud that stays; its extent and its spacing determine the gates.
+        config: metric, direction and seed; its gate is not used.
         T_init: (4, 4) start pose T_target_source.
-        misfit: of these two clouds.
+        misfit: misfit of these two clouds.
 
     Raises:
-        ReconstructionError: the widest gate holds no pair either.
+        ReconstructionError: even the widest gate contains no pair.
     """
     extent_m = middle_extent_m(target.points_m)
     few = draw(target, config.max_points, config.seed, "target").points_m
@@ -118,7 +118,7 @@ def ladder(
 
 
 def best_gate_m(rungs: Sequence[Rung]) -> float:
-    """Of the gates that lead as near as the best, the middle one: its neighbours lead there as well."""
+    """Return the middle one of the gates with nearly the least misfit: its neighbours fit as well."""
     least = min(rung.misfit for rung in rungs)
     alike = [rung.gate_m for rung in rungs if rung.misfit <= ALIKE * least]
     return alike[(len(alike) - 1) // 2]

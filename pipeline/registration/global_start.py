@@ -1,4 +1,4 @@
-"""A start pose without a first guess: the motion that most matched local features share."""
+"""Global registration without a start pose: a pose from matched local features (FPFH)."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from pipeline.kernels.point_sets import middle_extent_m
 from pipeline.types import FloatArray, PointCloud
 
 VOXELS_ACROSS = 50
-"""Edge of the thinning voxel as a part of the target's extent, where none is given."""
+"""Default number of thinning voxels across the target's extent."""
 NORMAL_REACH, FEATURE_REACH, PAIR_REACH = 2.0, 5.0, 1.5
-"""Radii of normals and features and the largest distance of a pair, in voxels (Open3D's own proportions)."""
+"""Radii of normals and features and largest distance of a pair, in voxels (Open3D's proportions)."""
 EDGE_RATIO = 0.9
-"""Least ratio of the lengths between matched points that a guess of RANSAC survives with."""
+"""Least ratio of the edge lengths between matched points in a hypothesis of RANSAC."""
 RANSAC_ITERATIONS, RANSAC_CONFIDENCE = 100_000, 0.999
 SMALLEST_SHARE = 0.15
-"""Least share of the source points that must find a partner."""
+"""Least share of the source points with a partner in the target."""
 
 
 def default_voxel_m(target: PointCloud) -> float:
-    """A fiftieth of the widest side of the box around nine tenths of the points.
+    """Return a fiftieth of the widest side of the box around nine tenths of the points.
 
     Raises:
-        InputError: no points, or all in one place.
+        InputError: there are no points, or all coincide.
     """
     if not len(target):
         raise InputError("The target cloud has no points; a start pose cannot be found, so check its file.")
@@ -37,20 +37,20 @@ def default_voxel_m(target: PointCloud) -> float:
 
 
 def global_start(source: PointCloud, target: PointCloud, voxel_m: float, seed: int = 0) -> FloatArray:
-    """The (4, 4) T_target_source, good to about two voxels, by FPFH features (Rusu et al. 2009).
+    """Find the (4, 4) T_target_source to about two voxels by FPFH features (Rusu et al. 2009).
 
-    RANSAC and fast global registration (Zhou, Park, Koltun 2016), both Open3D's, each propose a pose;
-    the one that brings more points together is taken. Normals that the clouds lack are made to look at
-    the origin, so the clouds should be in their camera's frames.
+    RANSAC and fast global registration (Zhou, Park, Koltun 2016), both from Open3D, each propose a pose;
+    the pose with more matched points is taken. Estimated normals are oriented towards the origin, so
+    clouds without normals should be in their cameras' frames.
 
     Args:
         source: the cloud that moves.
         target: the cloud that stays.
-        voxel_m: edge to which both are thinned first.
-        seed: of RANSAC.
+        voxel_m: voxel edge to which both clouds are first thinned.
+        seed: random seed of RANSAC.
 
     Raises:
-        ReconstructionError: neither pose brings enough points together.
+        ReconstructionError: neither pose matches enough points.
     """
     reach_m = PAIR_REACH * voxel_m
     (moving, moving_features), (fixed, fixed_features) = (
@@ -74,7 +74,7 @@ def global_start(source: PointCloud, target: PointCloud, voxel_m: float, seed: i
 
 
 def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[Any, Any]:
-    """The thinned cloud with normals, and its features."""
+    """Return the thinned cloud with normals, and its features."""
     points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points_m))
     if cloud.normals is not None:
         points.normals = o3d.utility.Vector3dVector(cloud.normals)
@@ -82,7 +82,7 @@ def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[Any, Any]:
     if cloud.normals is None:
         points.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(NORMAL_REACH * voxel_m, 30))
         points.orient_normals_towards_camera_location(np.zeros(3))
-    o3d_registration: Any = o3d.pipelines.registration  # its stubs ask for an optional argument
+    o3d_registration: Any = o3d.pipelines.registration  # its stubs require an optional argument
     reach = o3d.geometry.KDTreeSearchParamHybrid(FEATURE_REACH * voxel_m, 100)
     return points, o3d_registration.compute_fpfh_feature(points, reach)
 

@@ -1,4 +1,4 @@
-"""Hue-assisted ICP: neighbours are near in place and in hue (SPEC 4.6)."""
+"""Hue-assisted ICP: nearest neighbours in position and hue (SPEC 4.6)."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from pipeline.registration.icp import TrimmedIcp
 from pipeline.types import ByteArray, FloatArray, PointCloud
 
 LEAST_SATURATION = 0.1
-"""Below it a colour is grey and its hue is noise."""
+"""A colour with less saturation counts as grey, because its hue is noise."""
 
 
 @dataclass(frozen=True, slots=True)
 class Hicp(TrimmedIcp):
-    """HICP: the closest share of the pairs, matched by x, y, z and hue; the distances are in space.
+    """HICP: trimmed ICP with pairs matched by x, y, z and hue; the distances are spatial.
 
-    Source: Men, Gebre, Pochiraju, "Color point cloud registration with 4D ICP algorithm", ICRA 2011,
-    whose hue is a line from 0 to 1; here it is the circle that it is, so that reds meet.
+    Source: Men, Gebre, Pochiraju, "Color point cloud registration with 4D ICP algorithm", ICRA 2011.
+    Their hue is a number from 0 to 1; here it is an angle, so that all reds are near each other.
     """
 
     hue_weight_m: float
-    """Radius of the circle of hues."""
+    """Radius of the hue circle."""
 
     @classmethod
     def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> Hicp:
-        """For two clouds with colours.
+        """Return the first state, for two clouds with colours.
 
         Raises:
-            InputError: a cloud has none.
+            InputError: a cloud has no colours.
         """
         for name, cloud in (("source", source), ("target", target)):
             if cloud.colors is None:
@@ -42,19 +42,19 @@ class Hicp(TrimmedIcp):
         return cls(config.trim, config.hue_weight_m)
 
     def features(self, cloud: PointCloud) -> FloatArray | None:
-        """(N, 2) places on the circle of hues."""
+        """Return (N, 2) positions on the hue circle."""
         return None if cloud.colors is None else hue_coordinates(cloud.colors, self.hue_weight_m)
 
 
 def hue_coordinates(colors: ByteArray, weight_m: float) -> FloatArray:
-    """Places of colours on the circle of hues, w (cos 2 pi h, sin 2 pi h).
+    """Compute the positions of colours on the hue circle, w (cos 2 pi h, sin 2 pi h).
 
     Args:
         colors: (N, 3) RGB.
         weight_m: radius w of the circle.
 
     Returns:
-        (N, 2) metres; the centre where the saturation is below 0.1.
+        (N, 2) metres; colours with a saturation below 0.1 are at the centre.
     """
     if not len(colors):
         return np.empty((0, 2))

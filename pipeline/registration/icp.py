@@ -1,4 +1,4 @@
-"""Plain ICP, where every closest pair counts the same (thesis Table 3.1, SPEC 4.2), and trimmed ICP."""
+"""Plain ICP with equal weights for all closest pairs (thesis Table 3.1, SPEC 4.2), and trimmed ICP."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from pipeline.types import PointCloud
 
 @dataclass(frozen=True, slots=True)
 class Icp(PairWeighting):
-    """Equal weights, no gate."""
+    """Plain ICP: equal weights, no gate."""
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """All pairs, with equal weights."""
+        """Keep all pairs, with equal weights."""
         return evenly(np.arange(len(matching.distances_m)))
 
 
 @dataclass(frozen=True, slots=True)
 class TrimmedIcp(PairWeighting):
-    """Equal weights for a fixed share of the pairs, the closest ones.
+    """Trimmed ICP: equal weights for a fixed share of the pairs, the closest ones.
 
     Source: Chetverikov, Svirko, Stepanov, Krsek, "The trimmed iterative closest point algorithm",
-    ICPR 2002, with the overlap given instead of searched.
+    ICPR 2002; here the overlap is given, not searched.
     """
 
     share: float
@@ -34,9 +34,9 @@ class TrimmedIcp(PairWeighting):
 
     @classmethod
     def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> TrimmedIcp:
-        """With the configured share."""
+        """Return the first state, with the configured share."""
         return cls(config.trim)
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """The closest share, with equal weights."""
+        """Keep the closest share of the pairs, with equal weights."""
         return evenly(closest_rows(matching.distances_m, self.share))

@@ -1,4 +1,4 @@
-"""Kernel correlation: every point pulls on all near points of the other cloud (SPEC 4.4)."""
+"""Kernel correlation: every point is paired with all near points of the other cloud (SPEC 4.4)."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ class KernelCorrelation(CeicpA):
     def starting(
         cls, config: RegistrationConfig, source: PointCloud, target: PointCloud
     ) -> KernelCorrelation:
-        """On the schedule of CEICP-A, with all points at every scale."""
+        """Return the first state: the scales of CEICP-A, with all points at every scale."""
         first = CeicpA.starting(config, source, target)
         return cls(first.sigma_m, first.sigma_0_m, first.sigma_min_m, first.decay)
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """Pairs within three sigma."""
+        """Weigh the pairs within three sigma."""
         rows = np.flatnonzero(matching.distances_m <= self.gate_m)
         kernel = np.exp(-0.5 * (matching.distances_m[rows] / self.sigma_m) ** 2)
         return PairWeights(rows, kernel / max(kernel.sum(), np.finfo(float).tiny), self.sigma_m)
 
     @property
     def neighbours(self) -> int:
-        """Ten."""
+        """Number of neighbours of every point: ten."""
         return NEIGHBOURS

@@ -1,4 +1,4 @@
-"""The loop of all iterative closest-point methods: match, weigh, move, until the pose stays."""
+"""The loop of all iterative closest-point methods: match, weigh, move, until the pose converges."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def iterate_registration(
     T_init: FloatArray | None = None,
     method: MethodStart | None = None,
 ) -> Generator[RegistrationStep, None, str]:
-    """Register ``source`` to ``target`` one iteration at a time; the generator returns the stop reason.
+    """Register ``source`` to ``target``; yields each iteration's step and returns the stop reason.
 
     Args:
         source: the cloud that moves, (N, 3) points in its own frame, metres.
@@ -43,11 +43,11 @@ def iterate_registration(
         config: method, metric, direction and their parameters.
         T_init: (4, 4) start pose T_target_source; None is the identity. With ``config.start="global"``
             matched features give the start pose instead.
-        method: replaces the method that the config names, for experiments.
+        method: replaces the config's method, for experiments.
 
     Raises:
-        InputError: fewer than three points, points that are not finite, a start pose that is none.
-        ReconstructionError: not one pair lies within the gate at the start pose, or no start pose was found.
+        InputError: fewer than three points, points that are not finite, an invalid start pose.
+        ReconstructionError: no pair is within the gate at the start pose, or no start pose was found.
 
     >>> import numpy as np, packetmesh as pm
     >>> source = pm.PointCloud(np.random.default_rng(0).uniform(0.0, 1.0, (500, 3)))
@@ -73,14 +73,14 @@ def register(
     T_init: FloatArray | None = None,
     method: MethodStart | None = None,
 ) -> RegistrationResult:
-    """The fold of ``iterate_registration``: all its steps and the pose that they reach.
+    """Register ``source`` to ``target``: all steps of ``iterate_registration`` and the final pose.
 
     Args:
         source, target, config, T_init, method: as for ``iterate_registration``.
 
     Returns:
-        The (4, 4) T_target_source in metres, with its steps; ``converged`` also holds for ``stalled``. A
-        degenerate end keeps the last good pose.
+        The (4, 4) T_target_source in metres, with its steps; ``converged`` is also True for ``stalled``. If
+        the pairs become degenerate, the last good pose is returned.
 
     Raises:
         InputError, ReconstructionError: as for ``iterate_registration``.
@@ -102,10 +102,10 @@ def register_timed(
     T_init: FloatArray | None = None,
     method: MethodStart | None = None,
 ) -> tuple[RegistrationResult, FloatArray]:
-    """``register``, with the time apart from its deterministic result.
+    """Register as ``register`` does, and measure the time.
 
     Returns:
-        The result, and (K,) seconds from the call until each of its steps was done.
+        The deterministic result, and (K,) seconds from the call to the end of each step.
     """
     started = time.perf_counter()
     steps: list[RegistrationStep] = []
@@ -126,7 +126,7 @@ def register_timed(
 def _start_pose(
     source: PointCloud, target: PointCloud, config: RegistrationConfig, T_init: FloatArray | None
 ) -> FloatArray:
-    """(4, 4) T_target_source of the first matching."""
+    """Return the (4, 4) T_target_source of the first matching."""
     if config.start == "global":
         return global_start(source, target, default_voxel_m(target), config.seed)
     T = np.eye(4) if T_init is None else np.array(T_init, dtype=np.float64)
@@ -187,8 +187,8 @@ def _iterations(
 def _weigh(
     method: PairWeighting, matcher: Matcher, T: FloatArray, first: bool = False
 ) -> tuple[PairWeighting, Matching, PairWeights, float]:
-    """The method, widened if it keeps too few pairs; the pairs that it matches; those that it weighs; how
-    many of the same weight these count for.
+    """Match and weigh the pairs at a pose; returns the method (widened if it keeps too few pairs), the
+    matched pairs, the weighed pairs, and the effective number of pairs 1 / sum w^2.
     """
 
     def match(state: PairWeighting) -> Matching:
@@ -214,7 +214,7 @@ def _weigh(
 
 @compiled
 def _moments(distances: FloatArray, weights: FloatArray) -> tuple[float, float]:
-    """Mean and mean square with weights that sum to one."""
+    """Return the weighted mean and mean square; the weights sum to one."""
     mean = mean_squared = 0.0
     for m in range(len(distances)):
         mean += weights[m] * distances[m]
@@ -223,7 +223,7 @@ def _moments(distances: FloatArray, weights: FloatArray) -> tuple[float, float]:
 
 
 def _turn_rad(motion: FloatArray) -> float:
-    """Rotation angle of a rigid or similarity motion."""
+    """Return the rotation angle of a rigid or similarity motion."""
     return rotation_angle_rad(motion[:3, :3] / math.hypot(*motion[:3, 0].tolist()))
 
 
@@ -231,7 +231,7 @@ def _turn_rad(motion: FloatArray) -> float:
 def _side_by_side(
     source_rows: IntArray, of_source: IntArray, target_rows: IntArray, of_target: IntArray
 ) -> IntArray:
-    """(M, 2) rows of whole clouds, from those of the points that take part."""
+    """Convert rows of the two samples to (M, 2) rows of the whole clouds."""
     pairs = np.empty((len(of_source), 2), dtype=np.intp)
     for m in range(len(pairs)):
         pairs[m, 0], pairs[m, 1] = source_rows[of_source[m]], target_rows[of_target[m]]

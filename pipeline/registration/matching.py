@@ -25,7 +25,7 @@ from pipeline.types import ByteArray, FloatArray, IntArray, PointCloud
 
 @dataclass(frozen=True, slots=True)
 class Matching:
-    """Pairs of points at one pose; rows of all arrays belong together."""
+    """Pairs of points at one pose; row m of each array is for pair m."""
 
     source_rows: IntArray
     """(M,) rows of the source points."""
@@ -34,12 +34,12 @@ class Matching:
     moved_m: FloatArray
     """(M, 3) source points at this pose, in the target frame."""
     target_m: FloatArray
-    """(M, 3)."""
+    """(M, 3) target points."""
     distances_m: FloatArray
-    """(M,)."""
+    """(M,) distances of the pairs."""
 
     def select(self, rows: IntArray) -> Matching:
-        """The pairs at ``rows``, ascending."""
+        """Return the pairs at ``rows``, which must be ascending."""
         if len(rows) == len(self.distances_m):
             return self
         return Matching(
@@ -52,11 +52,11 @@ class Matching:
 
 
 BEYOND_GATE = 1.5
-"""How far a search for the nearest goes, over the gate."""
+"""Ratio of the search radius for the nearest point to the gate."""
 
 
 class Matcher:
-    """Finds pairs at any pose; every search tree is built once, in the frame of its own cloud."""
+    """Finds the closest pairs at any pose; each search tree is built once, in the frame of its cloud."""
 
     def __init__(
         self,
@@ -65,13 +65,13 @@ class Matcher:
         direction: Direction,
         features: Callable[[PointCloud], FloatArray | None] = lambda cloud: None,
     ) -> None:
-        """For two clouds.
+        """Prepare the matching of two clouds.
 
         Args:
             source: the cloud that moves.
             target: the cloud that stays.
-            direction: whose points look for their nearest neighbours.
-            features: gives (N, k) coordinates of a cloud's points beside x, y, z, in metres, or None.
+            direction: the cloud whose points are matched to their nearest neighbours in the other.
+            features: returns (N, k) further coordinates of a cloud's points after x, y, z, metres, or None.
         """
         self._source = _Cloud(source.points_m, features(source))
         self._target = _Cloud(target.points_m, features(target))
@@ -79,7 +79,7 @@ class Matcher:
 
     @property
     def target_tree(self) -> KdTree:
-        """Of all points of the target."""
+        """Search tree of all points of the target."""
         return self._target.subset(1.0).tree
 
     def match(
@@ -90,14 +90,14 @@ class Matcher:
         target_share: float = 1.0,
         gate_m: float = float("inf"),
     ) -> Matching:
-        """Closest pairs in the matcher's direction at a pose.
+        """Find the closest pairs at a pose, in the matcher's direction.
 
         Args:
-            T_target_source: (4, 4) rigid or similarity.
-            neighbours: how many nearest points are found for each; rows come in blocks, nearest first.
-            source_share: share of the source's points that take part, above 0 to 1.
-            target_share: share of the target's points that take part.
-            gate_m: a point whose nearest neighbour is farther may be left out, which saves its search.
+            T_target_source: (4, 4) rigid or similarity transform.
+            neighbours: number of nearest points for each point; rows come in blocks, nearest first.
+            source_share: share of the source's points that are used, above 0 to 1.
+            target_share: share of the target's points that are used.
+            gate_m: points whose nearest neighbour is farther may be left out, which saves time.
         """
         source, target = self._source.subset(source_share), self._target.subset(target_share)
         moved_m = _moved(T_target_source, source.points_m)
@@ -116,7 +116,7 @@ class Matcher:
 
 
 class _Subset:
-    """Some of a cloud's points; what searches among them is built at the first search."""
+    """A subset of a cloud's points, whose search structures are built at the first search."""
 
     def __init__(self, cloud: _Cloud, rows: IntArray) -> None:
         self.cloud, self.rows = cloud, rows
@@ -125,13 +125,13 @@ class _Subset:
 
     @cached_property
     def features(self) -> FloatArray | None:
-        """(n, k) coordinates beside x, y, z."""
+        """(n, k) further coordinates after x, y, z, or None."""
         return None if self.cloud.features is None else self.cloud.features[self.rows]
 
     def nearest(
         self, queries: _Subset, places_m: FloatArray, neighbours: int, gate_m: float
     ) -> tuple[IntArray, IntArray]:
-        """(M,) rows of ``queries``, whose points are at (n, 3) places, and of their nearest points here."""
+        """Return (M,) rows of ``queries``, now at (n, 3) ``places_m``, and of their nearest points here."""
         count = min(neighbours, len(self.points_m))
         if count > 1 or len(self.points_m) == 1 or self.features is not None:
             queries_m = _stacked(places_m, queries.features)
@@ -146,40 +146,40 @@ class _Subset:
 
     @cached_property
     def tree(self) -> KdTree:
-        """Of these points, whose order it keeps."""
+        """Search tree of these points; its results refer to their order."""
         return tree_of(self.points_m)
 
     @cached_property
     def _any_tree(self) -> cKDTree:
-        """For several neighbours, and for more coordinates than three."""
+        """Search tree for several neighbours, and for more than three coordinates."""
         return cKDTree(_stacked(self.points_m, self.features))
 
 
 class _Partners:
-    """The nearest points of one cloud's points in another, searched anew only where they may have changed.
+    """Nearest points of one cloud's points in another; searched again only if they may have changed.
 
     If a point's nearest was at d1 and the second nearest at d2, a motion by s brings the first to d1 + s at
     most and every other to d2 - s at least: the nearest stays nearest while s < (d2 - d1) / 2, and none is
-    within a gate g while s < d1 - g. A search goes some way beyond the gate, so that those without a partner
-    need not be searched at every motion, and begins with the distances of the old two, which rules most
-    others out.
+    within a gate g while s < d1 - g. A search radius larger than the gate saves the search for points without
+    a partner after small motions. A search starts with the distances of the old two points, which excludes
+    most others.
     """
 
     def __init__(self, tree: KdTree, count: int) -> None:
-        """For ``count`` points that look for partners among a tree's, two at least."""
+        """Prepare for ``count`` points that are matched to the points of a tree, at least two."""
         self._tree = tree
         self._two = np.full((count, 2), -1, dtype=np.intp)
-        """The nearest and the second nearest in the tree's order; -1 where the search did not go so far."""
+        """Nearest and second nearest point, in the tree's order; -1 if it is beyond the search radius."""
         self._places_m = np.zeros((count, 3))
-        """Where each was searched."""
+        """Position of each point at its last search."""
         self._clear_m = np.full((count, 2), -np.inf)
-        """How far the nearest and the second nearest were from there at least."""
+        """Lower limits of the distances to the nearest and the second nearest point at that position."""
 
     def nearest(self, rows: IntArray, places_m: FloatArray, gate_m: float) -> IntArray:
-        """Rows of the nearest points of those ``rows``, which are at (n, 3) places.
+        """Find the nearest points of the points ``rows``, which are at (n, 3) ``places_m``.
 
         Returns:
-            (n,), -1 where none is within the gate.
+            (n,) rows of the nearest points, -1 where none is within the gate.
         """
         tree, state = (*self._tree.parts, self._tree.order), (self._two, self._places_m, self._clear_m)
         found, unsure = np.empty((2, len(rows)), dtype=np.intp)
@@ -194,7 +194,7 @@ class _Partners:
 
 @compiled
 def _moved(T: FloatArray, points: FloatArray) -> FloatArray:
-    """(n, 3) points by a (4, 4) motion, as ``geometry.apply`` moves them, without a library's threads."""
+    """Transform (n, 3) points by a (4, 4) motion, as ``geometry.apply`` does, without a library's threads."""
     moved = np.empty_like(points)
     for i in range(len(points)):
         for k in range(3):
@@ -215,7 +215,7 @@ def _still_nearest(
     found: IntArray,
     unsure: IntArray,
 ) -> int:
-    """Write what is found without a search, and which have to be searched; gives how many those are."""
+    """Write the partners that need no search, and the rows that need one; returns the number of these."""
     count = 0
     for i in range(len(rows)):
         row, place = rows[i], places[i]
@@ -267,7 +267,7 @@ def _nearest_again(
 
 @compiled
 def _within(points: FloatArray, order: IntArray, place: FloatArray, partner: int, gate: float) -> int:
-    """The row of a tree's point, or -1 where it is none or beyond the gate."""
+    """Return the row of a tree's point; -1 if there is no partner or it is beyond the gate."""
     if partner >= 0 and squared_distance(place, points[partner]) <= gate * gate:
         return order[partner]
     return -1
@@ -275,7 +275,7 @@ def _within(points: FloatArray, order: IntArray, place: FloatArray, partner: int
 
 @compiled
 def _paired(found: IntArray) -> tuple[IntArray, IntArray]:
-    """Those that found a partner, and their partners."""
+    """Return the points that have a partner, and their partners."""
     near, count = np.empty((2, len(found)), dtype=np.intp), 0
     for i in range(len(found)):
         near[0, count], near[1, count] = i, found[i]
@@ -292,7 +292,7 @@ def _pairs(
     source_rows: IntArray,
     target_rows: IntArray,
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
-    """The arrays of a matching, whose rows are those of two subsets."""
+    """Build the arrays of a ``Matching`` from the paired rows of two subsets."""
     count = len(near)
     rows = np.empty((2, count), dtype=np.intp)
     points = np.empty((2, count, 3))
@@ -300,21 +300,21 @@ def _pairs(
     for m in range(count):
         i, j = near[m], partners[m]
         rows[0, m], rows[1, m] = source_rows[i], target_rows[j]
-        for k in range(3):  # a whole point at a time takes four times as long
+        for k in range(3):  # copying whole points takes four times as long
             points[0, m, k], points[1, m, k] = moved[i, k], targets[j, k]
         distances[m] = np.sqrt(squared_distance(moved[i], targets[j]))
     return rows[0], rows[1], points[0], points[1], distances
 
 
 class _Cloud:
-    """One cloud and the subsets of it that have been searched."""
+    """A cloud and those of its subsets that have been searched."""
 
     def __init__(self, points_m: FloatArray, features: FloatArray | None) -> None:
         self.points_m, self.features = points_m, features
         self._subsets: dict[int, _Subset] = {}
 
     def subset(self, share: float) -> _Subset:
-        """A random share of the points, in their own order; smaller shares lie within larger ones."""
+        """Return a random share of the points, in their order; larger shares contain the smaller ones."""
         count = min(len(self.points_m), max(6, round(share * len(self.points_m))))
         if count not in self._subsets:
             whole = count == len(self.points_m)

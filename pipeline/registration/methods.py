@@ -10,15 +10,15 @@ from pipeline.registration.weighting import PairWeighting
 from pipeline.types import PointCloud
 
 MethodStart = Callable[[config.RegistrationConfig, PointCloud, PointCloud], PairWeighting]
-"""Gives a method's first state from the config, the thinned source and the thinned target."""
+"""Function that returns a method's first state from the config, the thinned source and the thinned target."""
 
 
 def _start_of(place: str) -> MethodStart:
-    """``starting`` of the class at ``module.Class`` below this package."""
+    """Return the function ``starting`` of the class at ``module.Class`` in this package."""
     module, _, name = place.partition(".")
     start: MethodStart = getattr(import_module(f"pipeline.registration.{module}"), name).starting
     return start
 
 
 METHODS: dict[str, MethodStart] = {name: _start_of(place) for name, place in config.METHODS.items()}
-"""Every method by its name in the settings."""
+"""All methods by their names in the settings."""

@@ -1,4 +1,4 @@
-"""How far a registration is from the truth, and two clouds from each other (SPEC 4.7)."""
+"""Errors of a registration against the true pose, and the distance of two clouds (SPEC 4.7)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pipeline.types import FloatArray
 
 
 def point_error_m(T_estimated: FloatArray, T_true: FloatArray, points_m: FloatArray) -> float:
-    """RMS distance between (N, 3) points moved by the estimate and by the truth, metres; the primary error.
+    """Return the RMS distance in metres of (N, 3) points moved by estimate and truth: the primary error.
 
     >>> import numpy as np, packetmesh as pm
     >>> T_true = np.eye(4); T_true[0, 3] = 0.25
@@ -21,14 +21,14 @@ def point_error_m(T_estimated: FloatArray, T_true: FloatArray, points_m: FloatAr
 
 
 def rotation_error_rad(T_estimated: FloatArray, T_true: FloatArray) -> float:
-    """Angle between the rotations of two rigid (4, 4) transforms."""
+    """Return the angle between the rotations of two rigid (4, 4) transforms."""
     return rotation_angle_rad(T_estimated[:3, :3] @ T_true[:3, :3].T)
 
 
 def average_hausdorff_m(a_m: FloatArray, b_m: FloatArray) -> float:
-    """Average Hausdorff distance of (N, 3) and (M, 3) points: mean of both directed mean distances.
+    """Return the average Hausdorff distance of (N, 3) and (M, 3) points: mean of both directed means.
 
-    It hardly discriminates when one cloud has holes: judge by ``point_error_m`` where the truth is known.
+    It hardly discriminates when one cloud has holes: use ``point_error_m`` if the truth is known.
     """
     a_to_b_m, _ = cKDTree(b_m).query(a_m, workers=-1)
     b_to_a_m, _ = cKDTree(a_m).query(b_m, workers=-1)

@@ -1,4 +1,4 @@
-"""Spacing and surface normals of a cloud, from the nearest neighbours of its points."""
+"""Point spacing and surface normals of a cloud, from the nearest neighbours of its points."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from pipeline.types import BoolArray, FloatArray, IntArray
 
 NORMAL_NEIGHBOURS, SPACING_NEIGHBOURS = 20, 4
 FEW_POINTS = 20_000
-"""The normals of so few are all found at once, on all cores, rather than some at every iteration."""
+"""Clouds up to this size get all their normals at once, on all cores, instead of some at each iteration."""
 
 
 class Normals:
-    """Unit normals of a cloud's points, found when they are first asked for: of many points, only those.
+    """Unit normals of a cloud's points, computed at first use; in large clouds only for the used points.
 
-    They are those of the planes through each point's nearest 20, towards a camera at the origin.
+    Each is the normal of the plane through the point's nearest 20, oriented towards a camera at the origin.
     """
 
     def __init__(
         self, points_m: FloatArray, known: FloatArray | None = None, tree: Callable[[], KdTree] | None = None
     ) -> None:
-        """Of (N, 3) points; ``known`` are their normals if they have some, ``tree`` gives their tree."""
+        """Prepare for (N, 3) points; ``known`` are given normals, ``tree`` returns the points' tree."""
         self._points_m, self._tree_of = points_m, tree or partial(tree_of, points_m)
         self._found, self._all = np.full(len(points_m), known is not None), known is not None
         given = np.empty((len(points_m), 3)) if known is None else known
         self._normals = np.ascontiguousarray(given, dtype=np.float64)
 
     def at(self, rows: IntArray) -> FloatArray:
-        """(N, 3), of which those at the ``rows`` are found."""
+        """Return (N, 3) normals, of which at least those at ``rows`` are valid."""
         if self._all:
             return self._normals
         if len(self._found) <= FEW_POINTS:
@@ -47,7 +47,7 @@ class Normals:
 
     @cached_property
     def _places(self) -> IntArray:
-        """(N,) of the points in their tree."""
+        """(N,) position of each point in the tree's order."""
         places = np.empty_like(self._tree.order)
         places[self._tree.order] = np.arange(len(places))
         return places
@@ -59,7 +59,7 @@ class Normals:
 
 @compiled
 def _enter(rows: IntArray, entered: BoolArray) -> IntArray:
-    """Those of the ``rows`` that had not been entered, each once; now they have."""
+    """Mark ``rows`` as entered; returns, once each, those that were not entered before."""
     new, count = np.empty_like(rows), 0
     for row in rows:
         new[count] = row
@@ -70,7 +70,7 @@ def _enter(rows: IntArray, entered: BoolArray) -> IntArray:
 
 @compiled
 def _enter_facing(found: FloatArray, rows: IntArray, points: FloatArray, normals: FloatArray) -> None:
-    """Write what was found into the ``rows`` of the normals, turned towards the origin."""
+    """Write the found normals into ``rows`` of ``normals``, oriented towards the origin."""
     for i in range(len(rows)):
         row, along = rows[i], 0.0
         for k in range(3):
@@ -80,18 +80,18 @@ def _enter_facing(found: FloatArray, rows: IntArray, points: FloatArray, normals
 
 
 def pca_normals(points_m: FloatArray) -> FloatArray:
-    """(N, 3) unit normals of the planes through each point's nearest 20, towards a camera at the origin."""
+    """Compute (N, 3) unit normals from each point's nearest 20, oriented towards a camera at the origin."""
     return Normals(points_m).at(np.arange(len(points_m)))
 
 
 def median_spacing_m(points_m: FloatArray) -> float:
-    """Median distance of (N, 3) points to their nearest other point."""
+    """Return the median distance of (N, 3) points to their nearest other point."""
     tree = tree_of(points_m)
     return float(np.median(tree.nearest(tree.points_m, min(2, len(tree)))[0][:, 1:]))
 
 
 def local_spacing_m(points_m: FloatArray) -> FloatArray:
-    """(N,) mean distance of each point to its nearest four others; zero for a lone point."""
+    """Return (N,) mean distance of each point to its nearest four others; zero for a single point."""
     if len(points_m) < 2:
         return np.zeros(len(points_m))
     return neighbour_distances_m(points_m, SPACING_NEIGHBOURS).mean(axis=1)

@@ -1,4 +1,4 @@
-"""Which motions a surface leaves open: sliding along it, turning on it (SPEC 4.1, degenerate cases)."""
+"""Motions that a surface does not determine: sliding along it, turning on it (SPEC 4.1, degenerate cases)."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import numpy as np
 from pipeline.types import FloatArray
 
 OPEN_SHARE = 2e-3
-"""A motion is open if it changes the distances to the planes by less than this share (of squares) of what
-the best determined motion does; normals that are noisy by 2 degrees are worth 1e-3."""
+"""A motion is open if its squared change of the distances to the planes is below this share of that of the
+best determined motion; a noise of the normals by 2 degrees gives 1e-3."""
 
 
 def open_motions(points_m: FloatArray, normals: FloatArray, open_share: float = OPEN_SHARE) -> str:
-    """The motions that (N, 3) points with (N, 3) unit normals do not determine, in words; empty if none.
+    """Name the motions that (N, 3) points with (N, 3) unit normals do not determine; empty if none.
 
-    The 6 x 6 Gauss-Newton matrix of the point-to-plane distances is split: slides are the weak directions
-    of its translation block, turns those of the rotation block once the best translation is allowed for.
+    The 6 x 6 Gauss-Newton matrix of the point-to-plane distances is split: slides are the weak directions of
+    its translation block, turns those of the rotation block after elimination of the best translation.
     """
     arms = points_m - points_m.mean(axis=0)
     arms = arms / max(float(np.sqrt(np.mean(np.sum(arms**2, axis=1)))), np.finfo(float).tiny)
@@ -31,7 +31,7 @@ def open_motions(points_m: FloatArray, normals: FloatArray, open_share: float = 
 
 
 def _slides(axes: FloatArray, held: np.ndarray) -> str:
-    """(3, 3) axes in columns; the ones not held are open."""
+    """Name the open slides; the columns of ``axes`` (3, 3) that are not ``held`` are open."""
     open_count = int((~held).sum())
     if open_count == 3:
         return "sliding anywhere"
@@ -50,9 +50,9 @@ def _turns(axes: FloatArray, held: np.ndarray) -> str:
 
 
 def _named(direction: FloatArray) -> str:
-    """``x``, ``y`` or ``z`` where the direction is near that axis, else its coordinates."""
+    """Return ``x``, ``y`` or ``z`` if the direction is near that axis, else its coordinates."""
     strongest = int(np.argmax(np.abs(direction)))
     if abs(direction[strongest]) > 0.98:
         return "xyz"[strongest]
-    x, y, z = np.round(direction * np.sign(direction[strongest]), 2) + 0.0  # no minus before a zero
+    x, y, z = np.round(direction * np.sign(direction[strongest]), 2) + 0.0  # + 0.0 turns -0.0 into 0.0
     return f"({x:.2f}, {y:.2f}, {z:.2f})"

@@ -1,8 +1,8 @@
-"""Other people's registration programs behind one call, as baselines for ours (SPEC 4.6).
+"""Registration methods of other libraries as baselines, with one common interface (SPEC 4.6).
 
-Open3D comes with PacketMesh; small_gicp and pycpd take part where they are installed. Every peer gets
-the same points, start pose and gate, finds its normals, covariances and trees by itself, and that counts
-in its time. None of them thins the clouds, except CPD.
+Open3D is installed with PacketMesh; small_gicp and pycpd are used if they are installed. Every peer gets
+the same points, start pose and gate, and computes its own normals, covariances and trees, which count in
+its time. Only CPD thins the clouds.
 """
 
 from __future__ import annotations
@@ -27,41 +27,41 @@ from pipeline.types import FloatArray, PointCloud
 
 o3d_registration: Any = o3d.pipelines.registration
 NEIGHBOURS = 20
-"""Neighbours of a point for its normal or covariance, as in our plane metric."""
+"""Number of neighbours for a point's normal or covariance, as in our plane metric."""
 CPD_POINTS = 1500
-"""CPD compares every point with every other: more would take minutes."""
+"""Number of points of each cloud for CPD, which compares all pairs: more would take minutes."""
 CPD_OUTLIERS = 0.2
-"""Share of the points that CPD takes for outliers (w0 of SPEC 4.4)."""
+"""Outlier share that CPD assumes (w0 of SPEC 4.4)."""
 STAGES_M = (0.1, 0.06)
 """Last gates of the staged peers, after T_d and T_d / 2 (SPEC 4.6)."""
 RELATIVE_TOLERANCE = 1e-6
-"""Open3D's default: changes of fitness and RMSE below it end its loop."""
+"""Open3D's default: its loop stops when fitness and RMSE change by less."""
 MOTION_TOLERANCE = 1e-4
-"""small_gicp stops at a step below this many radians and metres, as our loop does."""
+"""small_gicp stops at a step below this many radians and metres, like our loop."""
 _NO_PAIRS = "degenerate: no pairs within the gate"
 
 
 @dataclass(frozen=True, slots=True)
 class PeerResult:
-    """What a peer found, and how long it took."""
+    """Pose and run time of a peer."""
 
     T_target_source: FloatArray
-    """(4, 4)."""
+    """(4, 4) final pose."""
     iterations: int | None
-    """None where the program does not report it."""
+    """Number of iterations; None if the library does not report it."""
     elapsed_s: float
-    """From points to pose, preparation included, imports not."""
+    """Time from points to pose, including preparation, excluding imports."""
     stop_reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What every peer gets."""
+    """Input of every peer."""
 
     source_m: FloatArray
-    """(N, 3)."""
+    """(N, 3) points that move."""
     target_m: FloatArray
-    """(M, 3)."""
+    """(M, 3) points that stay."""
     gate_m: float
     T_init: FloatArray
     max_iterations: int
@@ -73,15 +73,15 @@ Outcome = tuple[FloatArray, int | None, str]
 
 @dataclass(frozen=True, slots=True)
 class Peer:
-    """Another program's method."""
+    """A registration method of another library."""
 
     module: str
-    """What must be importable."""
+    """Name of the library's module."""
     solve: Callable[[Problem], Outcome]
 
 
 def available_peers() -> tuple[str, ...]:
-    """Names of the peers whose programs are installed."""
+    """Return the names of the peers whose libraries are installed."""
     return tuple(name for name, peer in PEERS.items() if find_spec(peer.module) is not None)
 
 
@@ -93,18 +93,18 @@ def run_peer(
     T_init: FloatArray | None = None,
     max_iterations: int = 100,
 ) -> PeerResult:
-    """Register ``source`` to ``target`` with one peer, all points of both.
+    """Register ``source`` to ``target`` with one peer, using all points of both.
 
     Args:
         name: one of ``available_peers()``.
         source: the cloud that moves; only its points are used.
         target: the cloud that stays.
-        gate_m: largest distance of a pair (first one of the staged peers; CPD has none).
+        gate_m: largest distance of a pair (in the first stage of the staged peers; CPD has none).
         T_init: (4, 4) start pose T_target_source; None is the identity.
-        max_iterations: in total, shared by the stages of the staged peers one after the other.
+        max_iterations: total number of iterations of all stages.
 
     Raises:
-        InputError: no such peer here, fewer than three points or points that are not finite.
+        InputError: the peer is not available, fewer than three points or points that are not finite.
     """
     if name not in available_peers():
         raise InputError(f"There is no peer '{name}' here; try one of {', '.join(available_peers())}")
@@ -125,7 +125,7 @@ def run_peer(
 
 
 def _open3d(problem: Problem, estimation: str) -> Outcome:
-    """One of Open3D's loops; it tells neither its iterations nor why it stopped."""
+    """Run one of Open3D's methods, which report neither the iterations nor the stop reason."""
     source, target = (
         o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points_m))
         for points_m in (problem.source_m, problem.target_m)
@@ -160,7 +160,7 @@ def _small_gicp(problem: Problem, staged: bool) -> Outcome:
 
 
 def _small_vgicp(problem: Problem, staged: bool) -> Outcome:
-    """Voxels as wide as the gate: a smaller voxel would be a smaller gate."""
+    """Run small_gicp's VGICP with voxels as wide as the gate: smaller ones would act as a smaller gate."""
     import small_gicp
 
     source, target = (small_gicp.PointCloud(points) for points in (problem.source_m, problem.target_m))
@@ -178,7 +178,7 @@ def _small_vgicp(problem: Problem, staged: bool) -> Outcome:
 def _in_stages(
     problem: Problem, staged: bool, align: Callable[[FloatArray, float, dict[str, Any]], Any]
 ) -> Outcome:
-    """small_gicp with the gate T_d, or with T_d, T_d / 2, 0.1 m, 0.06 m from the pose of the one before."""
+    """Run small_gicp with the gate T_d, or in stages with T_d, T_d / 2, 0.1 m and 0.06 m."""
     gates_m = {problem.gate_m}
     if staged:
         gates_m |= {0.5 * problem.gate_m, *(m for m in STAGES_M if m < problem.gate_m)}
@@ -203,7 +203,7 @@ def _threads() -> int:
 
 
 def _cpd(problem: Problem) -> Outcome:
-    """Coherent point drift (Myronenko & Song 2010) by pycpd, which solves for a scale as well; kept rigid."""
+    """Run pycpd's coherent point drift (Myronenko & Song 2010), restricted to rigid motions."""
     from pycpd import RigidRegistration
 
     source_m, target_m = (
@@ -222,7 +222,7 @@ def _cpd(problem: Problem) -> Outcome:
 
 
 def _rigid_cpd(base: Any) -> Any:
-    """pycpd's solver with its scale held at one; the formulas of Myronenko & Song, fig. 2, for s = 1."""
+    """Return pycpd's solver class with a scale of one (Myronenko & Song, fig. 2, for s = 1)."""
 
     class RigidCpd(base):
         s: float
@@ -253,5 +253,5 @@ PEERS: dict[str, Peer] = {
     "small-vgicp-staged": Peer("small_gicp", partial(_small_vgicp, staged=True)),
     "cpd": Peer("pycpd", _cpd),
 }
-"""Every peer by name, installed or not: Open3D's ICP and GICP, small_gicp's GICP and VGICP, both also in
+"""All peers by name, installed or not: Open3D's ICP and GICP, small_gicp's GICP and VGICP, both also in
 stages, and pycpd's CPD. Their gates are hard; CPD has none."""

@@ -1,4 +1,4 @@
-"""Picky ICP: coarse to fine, without far pairs and without shared points (SPEC 4.6)."""
+"""Picky ICP: coarse to fine, with distant pairs rejected and one-to-one matches (SPEC 4.6)."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ class Picp(CoarseToFine):
 
     @classmethod
     def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> Picp:
-        """At the coarsest level that the source allows."""
+        """Return the first state, at the coarsest level that the source allows."""
         level = coarsest_level(len(source), cls.thinning, LEVELS)
         return cls(level, max(1, config.max_iterations // LEVELS))
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """Without the pairs beyond median + 2.5 robust sigmas; of those that share a point the closest."""
+        """Keep pairs up to median + 2.5 robust sigmas, and of pairs that share a point the closest."""
         distances_m = matching.distances_m
         median_m = np.median(distances_m)
         spread_m = MAD_TO_SIGMA * np.median(np.abs(distances_m - median_m))
@@ -44,12 +44,12 @@ class Picp(CoarseToFine):
 
     @property
     def tolerance(self) -> float:
-        """Looser at coarse levels, by (l + 1)^2."""
+        """Factor (l + 1)^2 on the tolerances at level l."""
         return float(self.level + 1) ** 2
 
 
 def closest_of_each(points: IntArray, distances_m: FloatArray) -> IntArray:
-    """(K,) rows that keep, of the pairs with the same (M,) point, only the closest."""
+    """Return (K,) rows of the closest pair of each distinct point in ``points`` (M,)."""
     by_distance = np.argsort(distances_m, kind="stable")
     _, first = np.unique(points[by_distance], return_index=True)
     return np.sort(by_distance[first])

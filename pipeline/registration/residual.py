@@ -1,6 +1,6 @@
-"""The two residuals of a pair, and the motions that make them least (SPEC 4.1).
+"""The two residuals of a pair, and the motions that minimise them (SPEC 4.1).
 
-Point to point, and point to the target's tangent plane.
+They are point-to-point, and point-to-plane with the target's tangent plane.
 """
 
 from __future__ import annotations
@@ -29,38 +29,38 @@ class DegenerateError(ReconstructionError):
 
 @dataclass(frozen=True, slots=True)
 class PointResidual:
-    """The vector between the two points of a pair; ``PlaneResidual`` has the same two functions."""
+    """Point-to-point residual; ``PlaneResidual`` has the same two functions."""
 
     with_scale: bool
     unweighted_centroids: bool = False
-    """Plain centroids, as in eq. 3.12, which do not minimise the weighted error."""
+    """True for unweighted centroids, as in eq. 3.12, which do not minimise the weighted error."""
 
     def solve(self, pairs: Matching, weights: FloatArray) -> FloatArray:
-        """The (4, 4) motion, to follow the present pose: the exact minimum, but for plain centroids."""
+        """Return the (4, 4) motion to apply after the current pose; the minimum for weighted centroids."""
         return weighted_procrustes(
             pairs.moved_m, pairs.target_m, weights, self.with_scale, self.unweighted_centroids
         )
 
     def mean_squared_m2(self, pairs: Matching, weights: FloatArray, motion: FloatArray) -> float:
-        """Weighted mean squared distance after a motion."""
+        """Return the weighted mean squared distance after a motion."""
         apart_m = apply(motion, pairs.moved_m) - pairs.target_m
         return float(np.einsum("m,mi,mi->", weights, apart_m, apart_m))
 
 
 @dataclass(frozen=True, slots=True)
 class PlaneResidual:
-    """The distance of the source point from the plane through the target point."""
+    """Point-to-plane residual: distance of the source point from the plane through the target point."""
 
     normals: Normals
-    """Of the thinned target."""
+    """Normals of the thinned target."""
 
     def solve(self, pairs: Matching, weights: FloatArray) -> FloatArray:
-        """The (4, 4) motion, to follow the present pose: one Gauss-Newton step."""
+        """Return the (4, 4) motion to apply after the current pose: one Gauss-Newton step."""
         rows = pairs.target_rows
         return solve_plane(pairs.moved_m, pairs.target_m, self.normals.at(rows), weights, rows)
 
     def mean_squared_m2(self, pairs: Matching, weights: FloatArray, motion: FloatArray) -> float:
-        """Weighted mean squared distance along the normals after a motion."""
+        """Return the weighted mean squared distance along the normals after a motion."""
         rows = pairs.target_rows
         normals = self.normals.at(rows)
         return float(_mean_squared_height(pairs.moved_m, pairs.target_m, normals, rows, weights, motion))
@@ -69,7 +69,7 @@ class PlaneResidual:
 def residual_for(
     config: RegistrationConfig, target: PointCloud, matcher: Matcher, unweighted_centroids: bool = False
 ) -> PointResidual | PlaneResidual:
-    """The configured residual; normals the target does not have are estimated from its points."""
+    """Create the configured residual; a target without normals gets them from its points."""
     if config.metric == "point":
         return PointResidual(config.with_scale, unweighted_centroids)
     return PlaneResidual(Normals(target.points_m, target.normals, lambda: matcher.target_tree))
@@ -82,13 +82,13 @@ def weighted_procrustes(
     with_scale: bool = False,
     unweighted_centroids: bool = False,
 ) -> FloatArray:
-    """The (4, 4) motion that minimises sum w |s R q + t - p|^2 over (M, 3) pairs.
+    """Compute the (4, 4) motion that minimises sum w |s R q + t - p|^2 over (M, 3) pairs.
 
-    Corrects eqs. 3.12-3.16 of the thesis: weighted centroids, R = U V^T, and no reflections. With
+    It corrects eqs. 3.12-3.16 of the thesis: weighted centroids, R = U V^T, and no reflections. With
     ``unweighted_centroids`` the centroids are those of eq. 3.12, and the sum is not at its minimum.
 
     Raises:
-        DegenerateError: the points of one side lie on one line.
+        DegenerateError: the points of one cloud are collinear.
     """
     share = (weights / weights.sum())[:, None]
     at = np.full_like(share, 1.0 / len(share)) if unweighted_centroids else share
@@ -111,20 +111,20 @@ def solve_plane(
     weights: FloatArray,
     normal_rows: IntArray | None = None,
 ) -> FloatArray:
-    """The (4, 4) rigid step that minimises sum w (n . (q + omega x q + v - p))^2, linear in omega and v.
+    """Compute the (4, 4) rigid step that minimises sum w (n . (q + omega x q + v - p))^2 (linearised).
 
-    Rotation is taken about the pairs' centroid and lengths in units of their spread, so that neither
-    the damping nor the condition depends on where the origin is or what a metre is.
+    The rotation is about the pairs' centroid and lengths are in units of their spread, so that damping
+    and condition depend neither on the origin nor on the unit of length.
 
     Args:
         source_m: (M, 3) points q.
         target_m: (M, 3) points p.
         normals: (N, 3) unit normals n.
-        weights: (M,) of the pairs.
-        normal_rows: (M,) each pair's row of ``normals``; None where they come in the pairs' order.
+        weights: (M,) weights of the pairs.
+        normal_rows: (M,) each pair's row of ``normals``; None if they are in the pairs' order.
 
     Raises:
-        DegenerateError: the planes leave motions free (all parallel, one cylinder, one sphere).
+        DegenerateError: the planes leave motions undetermined (all parallel, one cylinder, one sphere).
     """
     rows = np.arange(len(normals)) if normal_rows is None else normal_rows
     motion, spread_m, values = _plane_step(source_m, target_m, normals, rows, weights)
@@ -140,7 +140,7 @@ def solve_plane(
 def _plane_step(
     source: FloatArray, target: FloatArray, normals: FloatArray, rows: IntArray, weights: FloatArray
 ) -> tuple[FloatArray, float, FloatArray]:
-    """The (4, 4) motion of ``solve_plane``, the pairs' spread, and the eigenvalues of a step's matrix."""
+    """Return ``solve_plane``'s (4, 4) motion, the pairs' spread, and the eigenvalues of the step's matrix."""
     motion = np.eye(4)
     center, spread, hessian, gradient = _normal_equations(source, target, normals, rows, weights)
     if spread == 0.0:
@@ -164,7 +164,7 @@ def _plane_step(
 
 @compiled
 def _rotation(x: float, y: float, z: float) -> FloatArray:
-    """``geometry.rotation_exp``, compiled."""
+    """Compute ``geometry.rotation_exp`` in compiled code."""
     angle = np.sqrt(x * x + y * y + z * z)
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sine = np.sin(angle) / angle if angle > 0.0 else 1.0
@@ -182,7 +182,7 @@ def _rotation(x: float, y: float, z: float) -> FloatArray:
 def _normal_equations(
     source: FloatArray, target: FloatArray, normals: FloatArray, rows: IntArray, weights: FloatArray
 ) -> tuple[FloatArray, float, FloatArray, FloatArray]:
-    """The pairs' weighted centre, their spread about it, a step's (6, 6) matrix and (6,) right side."""
+    """Return the pairs' weighted centre, their spread, the (6, 6) matrix and the (6,) right-hand side."""
     center, total = np.zeros(3), 0.0
     for m in range(len(weights)):
         total += weights[m]
@@ -225,7 +225,7 @@ def _mean_squared_height(
     weights: FloatArray,
     motion: FloatArray,
 ) -> float:
-    """Of moved points over the planes through their partners; the weights sum to one."""
+    """Return the mean squared distance of moved points to their partners' planes; weights sum to one."""
     mean = 0.0
     for m in range(len(rows)):
         height = 0.0

@@ -12,7 +12,7 @@ from pipeline.registration.weighting import MAD_TO_SIGMA, PairWeighting, PairWei
 from pipeline.types import FloatArray, PointCloud
 
 SUBSETS = 60
-"""Subsets an iteration; 34 find four good pairs with 99 % certainty among 40 % bad ones."""
+"""Subsets per iteration; if 40 % of the pairs are bad, one of 34 has four good ones with 99 % probability."""
 SUBSET_PAIRS = 4
 KEPT_SIGMAS = 2.5
 
@@ -21,8 +21,8 @@ KEPT_SIGMAS = 2.5
 class Ricp(PairWeighting):
     """RICP: equal weights for the pairs that agree with the motion of least median squared residual.
 
-    The candidates are the rigid motions of the subsets and the present pose. Pairs with a residual
-    within 2.5 robust standard deviations s = 1.4826 (1 + 5 / (n - 4)) sqrt(median) are kept.
+    The candidates are the rigid motions of the subsets and the current pose. Pairs with a residual
+    up to 2.5 robust standard deviations s = 1.4826 (1 + 5 / (n - 4)) sqrt(median) are kept.
 
     Source: Trucco, Fusiello, Roberto, "Robust motion and correspondence of noisy 3-D point sets with
     missing data", Pattern Recognition Letters 20, 1999.
@@ -33,11 +33,11 @@ class Ricp(PairWeighting):
 
     @classmethod
     def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> Ricp:
-        """With the configured seed."""
+        """Return the first state, with the configured seed."""
         return cls(config.seed)
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """The pairs that the best candidate explains, with equal weights."""
+        """Keep the pairs that agree with the best candidate, with equal weights."""
         rng = np.random.default_rng((self.seed, self.iteration))
         total = len(matching.distances_m)
         subsets = rng.integers(total, size=(SUBSETS, SUBSET_PAIRS))
@@ -52,19 +52,19 @@ class Ricp(PairWeighting):
         return evenly(np.flatnonzero(np.sqrt(squared_m2[best]) <= KEPT_SIGMAS * sigma_m))
 
     def following(self, kept: PairWeights, still: bool) -> Ricp:
-        """With other subsets."""
+        """Return the next state, which draws other subsets."""
         return replace(self, iteration=self.iteration + 1)
 
 
 def rigid_fits(source_m: FloatArray, target_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The rigid motions of many small sets of pairs at once, by Procrustes (SPEC 4.1).
+    """Compute the rigid motions of many small sets of pairs by Procrustes (SPEC 4.1).
 
     Args:
         source_m: (S, K, 3) points that move.
         target_m: (S, K, 3) their partners.
 
     Returns:
-        (S, 3, 3) rotations and (S, 3) translations; any of the best where a set leaves several.
+        (S, 3, 3) rotations and (S, 3) translations; an arbitrary best one if a set is ambiguous.
     """
     source_center_m, target_center_m = source_m.mean(axis=1), target_m.mean(axis=1)
     covariance = np.einsum(

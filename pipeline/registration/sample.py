@@ -1,4 +1,4 @@
-"""The points of a cloud that take part in a registration, checked and thinned."""
+"""Random samples of clouds for a registration, with checks of the points."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from pipeline.kernels.kdtree import compiled
 from pipeline.types import FloatArray, IntArray, PointCloud
 
 _KEY_PERIODS = (1e5, 2e5)
-"""Periods of the key over the mean squared distance, drawn by the seed: so many that points a hundredth of a
-millimetre apart have unrelated keys, so few that rounding hardly moves one."""
+"""Range of the number of key periods per mean squared distance, drawn by the seed: large enough that points
+0.01 mm apart have unrelated keys, small enough that rounding hardly changes a key."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,27 +21,27 @@ class Sample:
     """A random subset of a cloud, in the cloud's own order."""
 
     cloud: PointCloud
-    """The chosen points with all their columns; float64."""
+    """The drawn points with all their columns; float64."""
     rows: IntArray
-    """(n,) their rows in the whole cloud."""
+    """(n,) rows of the drawn points in the whole cloud."""
 
     @property
     def points_m(self) -> FloatArray:
-        """(n, 3) the chosen points."""
+        """(n, 3) drawn points."""
         return self.cloud.points_m
 
 
 def draw(cloud: PointCloud, max_points: int, seed: int, name: str) -> Sample:
-    """At most ``max_points`` of the cloud; all of it when it is smaller.
+    """Draw ``max_points`` random points of the cloud, or take all of a smaller cloud.
 
-    Source and target are drawn with the same seed, so that a cloud registered to itself stays put. Which
-    points are drawn depends neither on their order nor on the frame or the unit.
+    Source and target are drawn with the same seed, so that a cloud registered to itself does not move. The
+    choice of points depends neither on their order nor on the frame or the unit.
 
     Args:
         cloud: any cloud.
-        max_points: how many to draw.
-        seed: another seed draws other points.
-        name: of the cloud in errors.
+        max_points: number of points to draw.
+        seed: random seed; another seed draws other points.
+        name: name of the cloud in error messages.
 
     Raises:
         InputError: fewer than three points, or coordinates that are not finite.
@@ -64,11 +64,11 @@ def draw(cloud: PointCloud, max_points: int, seed: int, name: str) -> Sample:
 
 
 def random_keys(points_m: FloatArray, seed: int) -> FloatArray:
-    """(N,) pseudo-random numbers in [0, 1) by which to choose among (N, 3) points.
+    """Compute (N,) pseudo-random numbers in [0, 1) for a random choice among (N, 3) points.
 
-    A key follows from the point's distance to the cloud's centre over the cloud's size alone: it stays with
-    its point when the points come in another order, or when the whole cloud moves or is scaled. They are kept
-    as long as the points, which nobody changes: each node of a rig is drawn for every pair that it is in.
+    A key depends only on the point's distance to the cloud's centre, relative to the cloud's size: it does
+    not change if the points are reordered or the whole cloud is moved or scaled. Keys are cached while the
+    array exists (it must not change), because a node of a rig is sampled for every pair that it is in.
     """
     known = _keys.get((id(points_m), seed))
     if known is not None:
@@ -83,7 +83,7 @@ def random_keys(points_m: FloatArray, seed: int) -> FloatArray:
 
 @compiled
 def _squared_arms(points: FloatArray) -> FloatArray:
-    """(N,) squared distances of (N, 3) points from their mean."""
+    """Compute (N,) squared distances of (N, 3) points from their mean."""
     mean, squared = np.zeros(3), np.empty(len(points))
     for i in range(len(points)):
         for axis in range(3):

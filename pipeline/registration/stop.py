@@ -1,4 +1,4 @@
-"""When to stop iterating (SPEC 4.2)."""
+"""Stop rule of the registration loop (SPEC 4.2)."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ ROTATION_TOLERANCE_RAD = 1e-4
 TRANSLATION_TOLERANCE_OF_GATE = 1e-4 / 0.3
 """1e-4 m at the default gate of 0.3 m; relative, so that the unit of length does not matter."""
 RMSE_TOLERANCE = 1e-6
-"""Relative change of the RMSE that counts as none."""
+"""Relative change below which the RMSE counts as constant."""
 STILL_STEPS = 2
-"""Consecutive steps without a change of the RMSE that count as stalled."""
+"""Number of consecutive steps with constant RMSE after which the registration has stalled."""
 
 
 @dataclass(slots=True)
@@ -24,9 +24,9 @@ class StopRule:
     _still_steps: int = 0
 
     def reason(self, step: RegistrationStep, tolerance: float = 1.0) -> str | None:
-        """``converged`` after a negligible motion, ``stalled`` after an RMSE that stays, else None.
+        """Return ``converged`` after a negligible motion, ``stalled`` after constant RMSE, else None.
 
-        ``tolerance`` is a factor on what counts as negligible.
+        ``tolerance`` is a factor on all tolerances.
         """
         still = abs(self._rmse_m - step.rmse_m) <= tolerance * RMSE_TOLERANCE * self._rmse_m
         self._still_steps = self._still_steps + 1 if still else 0

@@ -1,4 +1,4 @@
-"""Which of a node's points another node's sensor can judge."""
+"""Visibility test: the points of a node that another node's sensor can confirm or refute."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from pipeline.kernels.geometry import apply, project
 from pipeline.types import BoolArray, CameraIntrinsics, DepthMap, FloatArray, PointCloud
 
 BEHIND = 1.1
-"""How much deeper than the measured surface a point must be to count as hidden by it; nearer ones are
-guesses about a surface that the sensor has measured."""
+"""Least ratio of a point's depth to the measured depth for the point to count as hidden; a nearer point is
+an estimate of the surface that the sensor has measured."""
 
 
 def hidden_from(
     cloud: PointCloud, T_camera_cloud: FloatArray, intrinsics: CameraIntrinsics, depth: DepthMap
 ) -> BoolArray:
-    """(N,) True for the points that another camera's sensor cannot confirm or refute.
+    """Return (N,) True for the points that another camera's sensor cannot confirm or refute.
 
-    Those are outside its image, at pixels without depth, or well behind what it measured. The other
-    points lie on a measured surface, or float in front of it where the sensor sees through them.
+    These points are outside its image, at pixels without depth, or well behind the measured surface. The
+    other points are on the measured surface, or in front of it, where the sensor's ray passes through them.
 
     Args:
         cloud: points in any frame.
         T_camera_cloud: (4, 4) from that frame to the other camera's.
-        intrinsics: the other camera.
-        depth: what its sensor measured.
+        intrinsics: intrinsics of the other camera.
+        depth: depth measured by the other camera's sensor.
     """
     points_m = apply(T_camera_cloud, cloud.points_m)
     hidden = np.ones(len(cloud), dtype=bool)

@@ -1,6 +1,6 @@
-"""What a registration method is: a rule that weighs the pairs of a matching.
+"""Base class of the registration methods: a method is a rule that weighs the pairs of a matching.
 
-A new method is a subclass of ``PairWeighting`` in a file of its own, entered in ``pipeline.config.METHODS``.
+A new method is a subclass of ``PairWeighting`` in its own file, listed in ``pipeline.config.METHODS``.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from pipeline.registration.matching import Matching
 from pipeline.types import FloatArray, IntArray, PointCloud
 
 MAD_TO_SIGMA = 1.4826
-"""Standard deviation of a normal distribution over its median absolute deviation."""
+"""Ratio of the standard deviation of a normal distribution to its median absolute deviation."""
 
 
 @dataclass(frozen=True, slots=True)
 class PairWeights:
-    """The pairs a method keeps, and how much each counts."""
+    """The pairs that a method keeps, and their weights."""
 
     rows: IntArray
     """(M,) kept rows of the matching."""
@@ -32,23 +32,23 @@ class PairWeights:
     entropy_nat: float = float("nan")
     """Entropy of the matching; NaN for methods without probabilities."""
     gate_m: float = float("inf")
-    """Distance beyond which no pair was kept, where it follows from the distances themselves."""
+    """Distance beyond which no pair was kept, if it is computed from the distances; else infinite."""
     energy: float = float("nan")
-    """What an accelerated method decreases, at this pose; NaN for all others."""
+    """Energy at this pose that an accelerated method minimises; NaN for all others."""
 
 
 @dataclass(frozen=True, slots=True)
 class PairWeighting(ABC):
-    """A method in the state of one iteration; plain defaults for all but the weights."""
+    """A method in the state of one iteration; subclasses must define the weights only."""
 
     direction: ClassVar[Direction | None] = None
-    """The direction the method insists on; None for the configured one."""
+    """Direction that the method requires; None for the configured one."""
     accelerated: ClassVar[bool] = False
     """Whether Anderson acceleration extrapolates the poses."""
 
     @classmethod
     def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> PairWeighting:
-        """The method in the state of its first iteration.
+        """Return the method in the state of its first iteration.
 
         Args:
             config: the method's parameters.
@@ -56,22 +56,22 @@ class PairWeighting(ABC):
             target: the thinned cloud that stays.
 
         Raises:
-            InputError: the clouds lack what the method needs.
+            InputError: the clouds lack a column that the method needs.
         """
         return cls()
 
     @abstractmethod
     def weigh(self, matching: Matching) -> PairWeights:
-        """Which pairs count, and how much."""
+        """Choose the pairs to keep and compute their weights."""
 
     @property
     def gate_m(self) -> float:
-        """Distance beyond which no pair counts, known before the search, which it shortens."""
+        """Distance beyond which no pair counts; known before the search, it makes the search faster."""
         return float("inf")
 
     @property
     def settled(self) -> bool:
-        """Whether the schedule has reached its end, so that a small update means convergence."""
+        """Whether the schedule is complete, so that a small update means convergence."""
         return True
 
     @property
@@ -81,48 +81,48 @@ class PairWeighting(ABC):
 
     @property
     def source_share(self) -> float:
-        """Share of the source's points that this iteration uses, always the same ones for one share."""
+        """Share of the source's points that this iteration uses; the same share gives the same points."""
         return 1.0
 
     @property
     def target_share(self) -> float:
-        """Share of the target's points that this iteration uses, always the same ones for one share."""
+        """Share of the target's points that this iteration uses; the same share gives the same points."""
         return 1.0
 
     @property
     def neighbours(self) -> int:
-        """Nearest points that every point is paired with; a matching's rows come in blocks, nearest first."""
+        """Number of nearest points paired with each point; a matching has them in blocks, nearest first."""
         return 1
 
     @property
     def unweighted_centroids(self) -> bool:
-        """Whether the point residual takes plain centroids of the kept pairs, as eq. 3.12 does."""
+        """Whether the point residual uses unweighted centroids of the kept pairs, as in eq. 3.12."""
         return False
 
     def features(self, cloud: PointCloud) -> FloatArray | None:
-        """(N, k) coordinates beside x, y, z in which neighbours are near, in metres; None for none."""
+        """Return (N, k) further coordinates for the neighbour search after x, y, z, in metres, or None."""
         return None
 
     def following(self, kept: PairWeights, still: bool) -> PairWeighting:
-        """The method in the state of the next iteration.
+        """Return the method in the state of the next iteration.
 
         Args:
-            kept: what this state weighed.
-            still: whether the motion of this iteration was below the tolerances.
+            kept: pairs and weights of this state.
+            still: whether the stop rule was fulfilled at this iteration.
         """
         return self
 
     def widened(self) -> PairWeighting | None:
-        """A wider state to try when too few pairs are kept, or None."""
+        """Return a wider state to try when too few pairs are kept, or None."""
         return None
 
 
 def evenly(rows: IntArray) -> PairWeights:
-    """The pairs at (K,) ``rows``, all with the same weight."""
+    """Keep the pairs at (K,) ``rows``, all with the same weight."""
     return PairWeights(rows, np.full(len(rows), 1.0 / max(len(rows), 1)))
 
 
 def closest_rows(distances_m: FloatArray, share: float) -> IntArray:
-    """(K,) rows of the smallest ``share`` of (M,) distances, rounded up, in their own order."""
+    """Return (K,) ascending rows of the smallest ``share`` (rounded up) of (M,) distances."""
     count = int(np.ceil(share * len(distances_m) - 1e-9))
     return np.sort(np.argsort(distances_m, kind="stable")[:count])

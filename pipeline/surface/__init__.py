@@ -1,1 +1,1 @@
-"""From an oriented cloud to a triangle mesh and its measures (SPEC 5)."""
+"""Surface reconstruction: a triangle mesh from an oriented cloud, and measures of it (SPEC 5)."""

@@ -1,4 +1,4 @@
-"""Suggested ball radii: those whose balls close given shares of the surface (SPEC 5)."""
+"""Suggested ball radii, wide enough for given shares of the surface (SPEC 5)."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ LEVELS = {"finest": 0.50, "even": 0.90, "widest": 0.99}
 _AGREES = 0.5
 """Cosine of the angle up to which a neighbour's normal puts it on the same sheet."""
 _MARGIN = 1e-6
-"""A ball of exactly the needed radius would be decided by rounding."""
+"""Relative margin on the radius, because rounding decides for a ball of exactly the needed radius."""
 _WORTH_SAYING = 0.03
 
 
 def suggest_radii(cloud: PointCloud) -> tuple[Suggestion, ...]:
-    """Radii with a meaning: wide enough for half, 90 % and 99 % of the surface.
+    """Suggest ball radii that are wide enough for 50 %, 90 % and 99 % of the surface.
 
     A ball bridges the triangles around a point if it is at least as wide as the largest of their
     circumcircles (``needed_radii_m``); the radii are quantiles of that over a fixed sample. Points
-    at a border need an endless ball and are left out. Being wide enough is necessary, not enough:
-    at an edge, in a fold or between doubled layers a ball rests on some points and never reaches
-    those behind them, the more the larger it is. So each ball is rolled once, and ``share`` is what
-    it closed. In the living room that is 0.49 at half, 0.88 and 0.85 at 90 %, 0.94 and 0.86 at 99 %
-    (the sensor's cloud, the fused one).
+    at a border need an infinite ball and are left out. A sufficient width is necessary, but not
+    sufficient: at an edge, in a fold or between doubled layers a ball rests on some points and never
+    reaches those behind them, more so the larger it is. So each ball is rolled once, and ``share`` is
+    the share that it closed: in the living room 0.49 at 50 %, 0.88 and 0.85 at 90 %, 0.94 and 0.86
+    at 99 % (sensor cloud, fused cloud).
 
     Args:
         cloud: points with normals.
 
     Returns:
-        One for each of ``LEVELS``, ascending; none if no sampled point has neighbours all around.
+        A suggestion for each of ``LEVELS``, ascending; none if no sampled point is surrounded by neighbours.
 
     Raises:
         InputError: fewer than four points, or no normals.
@@ -57,14 +57,14 @@ def suggest_radii(cloud: PointCloud) -> tuple[Suggestion, ...]:
 
 
 def needed_radii_m(cloud: PointCloud, rows: IntArray) -> FloatArray:
-    """(R,) radius that a ball needs to close the surface around each of the points at ``rows``.
+    """Compute (R,) radius that a ball needs to close the surface around each point at ``rows``.
 
-    It is the largest circumradius among the Delaunay triangles at the point, in its tangent plane,
+    It is the largest circumradius of the Delaunay triangles at the point, in its tangent plane,
     among the nearest 24 points of the same sheet (their normals are within 60 degrees). Neighbours
-    keep their distance from the point when they are turned into the plane, so that a wall seen
-    edge-on does not fold onto its foot. Infinite, a border, where the triangles do not surround the
-    point, or where a circle reaches farther than the farthest neighbour, beyond which more points
-    might lie in it.
+    keep their distance from the point when they are rotated into the plane, so that a wall at right
+    angles to it is not projected onto its foot. The radius is infinite (a border) where the triangles
+    do not surround the point, or where a circle extends beyond the farthest neighbour, because it
+    might contain more points there.
 
     Raises:
         InputError: fewer than four points, or no normals.
@@ -80,7 +80,7 @@ def needed_radii_m(cloud: PointCloud, rows: IntArray) -> FloatArray:
     same_sheet = np.einsum("nkc,nc->nk", cloud.normals[found], normals) > _AGREES
     flat_m = np.einsum("nkc,nca->nka", offsets_m, _tangents(normals))
     length_m = np.linalg.norm(flat_m, axis=-1)
-    # Turned into the plane and inverted in one step: direction over distance.
+    # Rotation into the plane and inversion in one step: direction over distance.
     counts = same_sheet & (length_m > 1e-9 * distances_m[:, -1:])
     scale = np.divide(1.0, length_m * distances_m, out=np.zeros_like(length_m), where=counts)
     needed_m = _largest_circumradius(scale[..., None] * flat_m)
@@ -88,7 +88,7 @@ def needed_radii_m(cloud: PointCloud, rows: IntArray) -> FloatArray:
 
 
 def closed_fans(triangles: IntArray, points: int) -> BoolArray:
-    """(points,) True where triangles surround a point without a gap."""
+    """Return (points,) True where triangles surround a point without a gap."""
     edges, faces = edges_and_faces(triangles)
     closed = np.zeros(points, dtype=bool)
     closed[edges] = True
@@ -106,7 +106,7 @@ def _suggestion(cloud: PointCloud, rows: IntArray, name: str, radius_m: float, w
 
 
 def _tangents(normals: FloatArray) -> FloatArray:
-    """(N, 3, 2) two unit vectors at right angles to each normal and each other, as columns."""
+    """Return (N, 3, 2): two unit vectors orthogonal to each normal and to each other, as columns."""
     aside = np.where(np.abs(normals[:, :1]) < 0.6, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
     first = np.cross(normals, aside)
     first /= np.maximum(np.linalg.norm(first, axis=1, keepdims=True), 1e-300)
@@ -114,14 +114,14 @@ def _tangents(normals: FloatArray) -> FloatArray:
 
 
 def _largest_circumradius(inverted: FloatArray) -> FloatArray:
-    """(N,) largest circumradius of the Delaunay triangles at the origin; infinite at a border.
+    """Compute (N,) largest circumradius of the Delaunay triangles at the origin; infinite at a border.
 
-    Inversion turns circles through the origin into lines: a line at distance h is a circle of
-    diameter 1 / h. Empty circles through two neighbours are the edges of the convex hull of the
-    inverted neighbours, which is walked here for all points at once.
+    Inversion maps circles through the origin to lines: a circle of diameter 1 / h to a line at
+    distance h. Empty circles through two neighbours are the edges of the convex hull of the
+    inverted neighbours, which is traversed here for all points in parallel.
 
     Args:
-        inverted: (N, K, 2) neighbours q / |q|^2; zero for those that do not count.
+        inverted: (N, K, 2) neighbours q / |q|^2; zero for those that are not used.
     """
     rows = np.arange(len(inverted))
     start = (inverted**2).sum(axis=-1).argmax(axis=1)  # the nearest neighbour is always on the hull

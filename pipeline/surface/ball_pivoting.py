@@ -1,4 +1,4 @@
-"""A surface from a cloud by ball pivoting (Bernardini et al. 1999, SPEC 5)."""
+"""Surface reconstruction from a cloud by ball pivoting (Bernardini et al. 1999, SPEC 5)."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ def iterate_ball(
     Args:
         cloud: (N, 3) points with unit normals towards the outside, metres.
         radii_m: ball radii.
-        batch: new triangles in a step at most.
+        batch: most new triangles per step.
 
     Yields:
-        The new triangles as rows of ``cloud``, where the ball lay, and the front.
+        The new triangles as rows of ``cloud``, the ball's centres, and the front.
 
     Returns:
-        The surface, its vertices those points of the cloud that a triangle uses; closing the generator
-        earlier cancels.
+        The surface, whose vertices are the points of the cloud that a triangle uses; closing the
+        generator earlier cancels.
 
     Raises:
         InputError: fewer than three points, no normals, or a radius that is not positive.
-        ReconstructionError: the balls fall through everywhere.
+        ReconstructionError: no ball makes a triangle.
 
     >>> import numpy as np, packetmesh as pm
     >>> xyz_m = np.stack(np.meshgrid(np.arange(5.0), np.arange(5.0), [0.0]), axis=-1).reshape(-1, 3)
@@ -59,7 +59,7 @@ def iterate_ball(
 
 
 def roll_ball(cloud: PointCloud, radii_m: Sequence[float]) -> Surface:
-    """The fold of ``iterate_ball``: roll balls over an oriented cloud, the smallest first.
+    """Roll balls over an oriented cloud, the smallest first; returns the result of ``iterate_ball``.
 
     Args:
         cloud: (N, 3) points with unit normals towards the outside, metres.
@@ -80,12 +80,12 @@ def roll_ball(cloud: PointCloud, radii_m: Sequence[float]) -> Surface:
 def reconstruct_surface(
     cloud: PointCloud, radii_m: Sequence[float], cameras: Sequence[Camera] = ()
 ) -> SurfaceResult:
-    """``roll_ball``, and the measures of its surface.
+    """Reconstruct a surface with ``roll_ball`` and measure its quality.
 
     Args:
         cloud: points with normals towards the outside.
         radii_m: ball radii.
-        cameras: whose rays measure the share without a surface; NaN without any.
+        cameras: cameras whose rays measure the share without a surface; this is NaN without cameras.
 
     Raises:
         InputError, ReconstructionError: as for ``iterate_ball``.
@@ -94,10 +94,10 @@ def reconstruct_surface(
 
 
 def roll_or_nothing(cloud: PointCloud, radii_m: Sequence[float]) -> Surface:
-    """``roll_ball``, with a surface of no triangle where the balls fall through everywhere.
+    """Run ``roll_ball``; returns an empty surface if no ball makes a triangle.
 
     Raises:
-        InputError: as ``roll_ball``.
+        InputError: as for ``roll_ball``.
     """
     try:
         return roll_ball(cloud, radii_m)

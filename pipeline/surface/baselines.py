@@ -11,31 +11,31 @@ from pipeline.surface.quality import measured
 from pipeline.types import FloatArray, IntArray, PointCloud, Surface, SurfaceResult
 
 CUBE_SCALE = 1.1
-"""Edge of Poisson's cube over the widest side of the cloud."""
+"""Ratio of the edge of Poisson's cube to the widest side of the cloud."""
 SHALLOWEST, DEEPEST = 2, 10
 TRIM_SPACINGS = 3.0
-"""Poisson closes everything; what lies farther than this from every point goes."""
+"""Poisson closes all holes; surface farther than this many spacings from all points is removed."""
 
 
 def poisson_depth(points_m: FloatArray, spacing_m: float) -> int:
-    """Depth of the octree whose finest cells are as wide as the spacing, or a little less; at most 10."""
+    """Return the octree depth (2 to 10) whose finest cells are as wide as the spacing, or a little less."""
     cells = CUBE_SCALE * float(np.ptp(points_m, axis=0).max()) / spacing_m
     return int(np.clip(np.ceil(np.log2(max(cells, 1.0))), SHALLOWEST, DEEPEST))
 
 
 def poisson_surface(cloud: PointCloud, spacing_m: float) -> SurfaceResult:
-    """Screened Poisson reconstruction (Kazhdan and Hoppe 2013, Open3D's), cut off away from the points.
+    """Reconstruct by screened Poisson (Kazhdan and Hoppe 2013, Open3D), trimmed away from the points.
 
-    Its vertices are no input points: each has the colour, normal and source of the nearest one, and no
-    input point counts as unused. It runs on one thread, as with more of them its result varies.
+    The vertices are not input points: each has the colour, normal and source of the nearest one, and no
+    input point counts as unused. Poisson runs on one thread, because its result varies with more.
 
     Args:
         cloud: points with normals towards the outside.
-        spacing_m: about the distance of neighbouring points.
+        spacing_m: approximate distance of neighbouring points.
 
     Raises:
-        InputError: fewer than three points, all in one place, no normals, or a spacing that is not positive.
-        ReconstructionError: nothing is left near the points.
+        InputError: fewer than three points, all coincident, no normals, or a spacing that is not positive.
+        ReconstructionError: no triangle is near the points.
     """
     _check(cloud, spacing_m, "point spacing")
     mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(
@@ -56,27 +56,27 @@ def poisson_surface(cloud: PointCloud, spacing_m: float) -> SurfaceResult:
 
 
 def alpha_surface(cloud: PointCloud, alpha_m: float) -> SurfaceResult:
-    """The boundary of the alpha shape (Edelsbrunner and Muecke 1994, Open3D's).
+    """Compute the boundary of the alpha shape (Edelsbrunner and Muecke 1994, Open3D).
 
-    Its vertices are input points. The shape is what the tetrahedra fill whose circumscribed ball is
-    smaller than ``alpha_m``. Open3D leaves out the triangles that bound no such tetrahedron, which the
-    full alpha shape has: a rough wall comes out as a slab with two sides, a smooth one with gaps, and
-    an exact sphere only if ``alpha_m`` is larger than its radius. Every triangle is turned to where
-    the normals of its corners point.
+    The vertices are input points. The shape is the union of the tetrahedra whose circumscribed ball is
+    smaller than ``alpha_m``. Unlike the full alpha shape, Open3D's has no triangles without such a
+    tetrahedron: a rough wall becomes a slab with two sides, a smooth one has gaps, and an exact sphere
+    needs an ``alpha_m`` larger than its radius. Every triangle is oriented like the normals of its
+    corners.
 
     Args:
         cloud: points with normals.
         alpha_m: radius of the largest ball.
 
     Raises:
-        InputError: fewer than three points, all in one place, no normals, or an alpha that is not positive.
+        InputError: fewer than three points, all coincident, no normals, or an alpha that is not positive.
         ReconstructionError: no tetrahedron is small enough.
     """
     _check(cloud, alpha_m, "alpha")
     assert cloud.normals is not None
     try:
         mesh = o3d.geometry.TriangleMesh.create_from_point_cloud_alpha_shape(_open3d_cloud(cloud), alpha_m)
-    except RuntimeError:  # qhull's, which has no tetrahedron for points in a plane
+    except RuntimeError:  # from qhull, which has no tetrahedron for points in a plane
         mesh = o3d.geometry.TriangleMesh()
     triangles = np.asarray(mesh.triangles)
     if not len(triangles):
@@ -114,7 +114,7 @@ def _open3d_cloud(cloud: PointCloud) -> o3d.geometry.PointCloud:
 
 
 def _surface(columns: PointCloud, vertices_m: FloatArray, corners: IntArray, points: int) -> SurfaceResult:
-    """The result whose vertices have the columns of a cloud with as many rows."""
+    """Build the result; its vertices get the columns of a cloud with as many rows."""
     triangles = corners.reshape(-1, 3).astype(np.int32)
     surface = Surface(vertices_m, triangles, columns.colors, (), columns.normals, columns.source)
     return measured(surface, (), points)

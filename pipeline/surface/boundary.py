@@ -1,4 +1,4 @@
-"""Where a mesh ends: edges with one face, and the loops they make."""
+"""Boundary of a mesh: edges with one face, and the closed loops that they form."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from pipeline.kernels.ordering import stable_order
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 LONGEST_HOLE_M = 1.0
-"""A boundary loop of this length or more is a rim of the scene, not a hole (SPEC 5)."""
+"""A boundary loop of at least this length is a rim of the scene, not a hole (SPEC 5)."""
 
 
 def directed_edges(triangles: IntArray) -> IntArray:
-    """(3 F, 2) edges of (F, 3) triangles: row 3 t + k leads from corner k of triangle t to its next."""
+    """Return (3 F, 2) edges of (F, 3) triangles: row 3 t + k is from corner k of triangle t to the next."""
     return triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
 
 
 def edges_and_faces(triangles: IntArray) -> tuple[IntArray, IntArray]:
-    """(E, 2) undirected edges, smaller index first, and (E,) how many faces share each."""
+    """Return (E, 2) undirected edges, smaller index first, and (E,) number of faces at each."""
     directed = directed_edges(triangles)
     order, begins = _by_edge(directed)
     first = np.flatnonzero(begins)
@@ -31,11 +31,11 @@ def edges_and_faces(triangles: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def boundary_loops(triangles: IntArray) -> list[IntArray]:
-    """The boundary of a mesh as closed loops of vertex indices, the first vertex not repeated.
+    """Return the boundary of a mesh as closed loops of vertex indices, the first vertex not repeated.
 
-    Each edge with exactly one face is walked once, in the direction that its face gives it (a hole's
-    loop is seen clockwise from outside). Loops that touch in a vertex are parted there, so no loop
-    meets itself.
+    Each edge with exactly one face is used once, in the direction that it has in its face (a hole's
+    loop is clockwise seen from outside). Loops that touch at a vertex are separated there, so no loop
+    visits a vertex twice.
     """
     following = _boundary_successors(triangles)
     loops = []
@@ -46,13 +46,13 @@ def boundary_loops(triangles: IntArray) -> list[IntArray]:
 
 
 def connected_parts(edges: IntArray, vertices: int) -> IntArray:
-    """(vertices,) label of the connected part each vertex belongs to, from (E, 2) edges."""
+    """Return (vertices,) label of each vertex's connected component, from (E, 2) edges."""
     graph = coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), (vertices, vertices))
     return connected_components(graph, directed=False)[1]
 
 
 def loop_edges(loops: Sequence[IntArray]) -> tuple[IntArray, IntArray]:
-    """(E, 2) directed edges of all closed loops, one loop after the other, and (L,) where each begins."""
+    """Return (E, 2) directed edges of all closed loops, loop by loop, and (L,) first row of each loop."""
     sizes = np.array([len(loop) for loop in loops])
     first = np.cumsum(sizes) - sizes
     starts = np.concatenate(loops)
@@ -62,10 +62,10 @@ def loop_edges(loops: Sequence[IntArray]) -> tuple[IntArray, IntArray]:
 
 
 def loop_measures(vertices_m: FloatArray, loops: Sequence[IntArray]) -> tuple[FloatArray, FloatArray]:
-    """(L,) lengths in m and (L,) areas in square metres of closed loops.
+    """Return (L,) lengths in m and (L,) areas in square metres of closed loops.
 
-    The area is that of the fan of triangles from a loop's first vertex, added as vectors, which is
-    exact for flat loops that are not convex.
+    The area is the vector sum of the fan of triangles from a loop's first vertex, which is exact for
+    flat loops, also if they are not convex.
     """
     edges, first = loop_edges(loops)
     start_m, end_m = vertices_m[edges].swapaxes(0, 1)
@@ -74,13 +74,13 @@ def loop_measures(vertices_m: FloatArray, loops: Sequence[IntArray]) -> tuple[Fl
 
 
 def loop_areas_m2(start_m: FloatArray, end_m: FloatArray, first: IntArray) -> FloatArray:
-    """(L, 3) area vectors of loops, from the (E, 3) ends of their edges and (L,) the first edge of each."""
+    """Return (L, 3) area vectors of loops, from their edges' ends (E, 3) and (L,) first edge of each loop."""
     apex_m = np.repeat(start_m[first], np.diff(first, append=len(start_m)), axis=0)
     return 0.5 * np.add.reduceat(np.cross(start_m - apex_m, end_m - apex_m), first, axis=0)
 
 
 def _boundary_successors(triangles: IntArray) -> dict[int, list[int]]:
-    """Where the boundary's directed edges lead from each of its vertices."""
+    """Return, for each boundary vertex, the vertices to which its directed boundary edges lead."""
     directed = directed_edges(triangles)
     order, begins = _by_edge(directed)
     alone = begins & np.append(begins[1:], True)[: len(begins)]
@@ -92,7 +92,7 @@ def _boundary_successors(triangles: IntArray) -> dict[int, list[int]]:
 
 
 def _by_edge(directed: IntArray) -> tuple[IntArray, BoolArray]:
-    """(N,) the order of (N, 2) directed edges that brings both directions of an edge side by side, ascending,
+    """Return (N,) the sorted order of (N, 2) directed edges in which both directions of an edge are adjacent,
     and (N,) True for the first of each edge in that order.
     """
     lower, upper = np.minimum(*directed.T), np.maximum(*directed.T)
@@ -102,10 +102,10 @@ def _by_edge(directed: IntArray) -> tuple[IntArray, BoolArray]:
 
 
 def _walk(start: int, following: dict[int, list[int]]) -> list[IntArray]:
-    """Use up the edges of one trail from ``start``, split into simple loops.
+    """Remove the edges of one trail from ``start``, split into simple loops.
 
-    Only where faces disagree in their orientation does a trail end without closing; what is left
-    then counts as a loop of its own.
+    A trail stops without closing only where faces disagree in their orientation; its remaining
+    vertices then count as one loop.
     """
     loops = []
     trail = [start]

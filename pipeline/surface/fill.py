@@ -1,6 +1,6 @@
-"""Closing holes without any measurement: the smallest skin over each loop.
+"""Filling of holes without measurements, by the triangulation of least area over each loop.
 
-Open3D's ``fill_holes`` chooses loops by a radius, closes rims too and faces its triangles inward.
+Open3D's ``fill_holes`` selects loops by a radius, also closes rims and orients its triangles inwards.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from pipeline.types import BoolArray, FloatArray, IntArray, Surface, SurfaceResu
 AnySurface = TypeVar("AnySurface", bound=Surface)
 
 MOST_VERTICES = 256
-"""Loops with more vertices stay open: the triangulation's time grows with their third power."""
+"""Loops with more vertices stay open: the time of the triangulation grows with their cube."""
 _TIE = 1e-6
-"""Weight of a chord's squared length beside the area: among equal areas, short chords win."""
+"""Weight of a chord's squared length relative to area: among equal areas, short chords are preferred."""
 
 _log = logging.getLogger(__name__)
 
@@ -34,21 +34,21 @@ class Filled:
     """A surface with its small holes closed."""
 
     surface: SurfaceResult
-    """The old triangles first, in their order; quality without cameras."""
+    """The old triangles in their order, then the new ones; quality is measured without cameras."""
     filled: BoolArray
-    """(F,) True for the triangles that no ball made."""
+    """(F,) True for the new triangles."""
     holes: int
-    """How many were closed."""
+    """Number of closed holes."""
     area_m2: float
-    """Of the new triangles."""
+    """Area of the new triangles."""
 
 
 def fill_holes(surface: SurfaceResult, longest_m: float) -> Filled:
-    """Span the triangulation of least area over every hole whose loop is short enough.
+    """Close every hole whose loop is short enough by the triangulation of least area.
 
-    Rims and islands stay, as do loops of more than 256 vertices and those over which every skin would
-    need an edge that the mesh has already: filling leaves no edge with more than two faces, and all
-    triangles anticlockwise from outside.
+    Rims and islands stay open, as do loops of more than 256 vertices and those for which every
+    triangulation needs an edge that the mesh already has: no edge gets more than two faces. All new
+    triangles are anticlockwise from outside.
 
     Args:
         surface: a mesh whose triangles agree in their orientation.
@@ -73,17 +73,17 @@ def fill_holes(surface: SurfaceResult, longest_m: float) -> Filled:
 
 
 def without_seams(surface: AnySurface) -> AnySurface:
-    """The surface as a picture shows it best: with its smallest holes closed, and its measures as they were.
+    """Close the smallest holes of a surface for display; its measures are not changed.
 
-    Where guess and measurement do not quite meet, the ball leaves a seam of holes through which the
-    background shines; loops of up to ``SEAM_M`` get the smallest skin.
+    Where inferred and measured surface do not quite meet, the ball leaves a seam of holes through which the
+    background is visible; loops of up to ``SEAM_M`` are closed by the triangulation of least area.
     """
     triangles = np.concatenate([surface.triangles, *_patches(surface, SEAM_M)])
     return replace(surface, triangles=triangles.astype(surface.triangles.dtype))
 
 
 def _patches(surface: Surface, longest_m: float) -> list[IntArray]:
-    """The triangles that close each hole whose loop is no longer."""
+    """Return the new triangles of each hole whose loop is at most ``longest_m`` long."""
     count = len(surface.vertices_m)
     edges = set((surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2) @ [count, 1]).tolist())
     patches: list[IntArray] = []
@@ -103,16 +103,16 @@ def _patches(surface: Surface, longest_m: float) -> list[IntArray]:
 
 
 def least_area(corners_m: FloatArray, allowed: BoolArray | None = None) -> IntArray | None:
-    """The triangulation of a closed polygon in space that has the least area (Barequet and Sharir 1995).
+    """Triangulate a closed polygon in space with the least area (Barequet and Sharir 1995).
 
-    Dynamic programming over the polygon's pieces, O(L^3) in time and O(L^2) in memory.
+    It uses dynamic programming over the polygon's pieces, O(L^3) in time and O(L^2) in memory.
 
     Args:
-        corners_m: (L, 3), at least three.
-        allowed: (L, L) symmetric; False where no chord may lie between two corners that are no neighbours.
+        corners_m: (L, 3) corners, at least three.
+        allowed: (L, L) symmetric; False where a chord between two non-neighbouring corners is forbidden.
 
     Returns:
-        (L - 2, 3) indices of corners in the polygon's direction; None if the chords do not suffice.
+        (L - 2, 3) indices of corners in the polygon's direction; None if the allowed chords do not suffice.
     """
     count = len(corners_m)
     cost = np.zeros((count, count))
@@ -136,14 +136,14 @@ def least_area(corners_m: FloatArray, allowed: BoolArray | None = None) -> IntAr
 
 
 def skin_points_m(corners_m: FloatArray, count: int) -> FloatArray:
-    """Points on the smallest skin over a loop: drawn by area, and the centres of its widest gaps.
+    """Draw points by area on the triangulation of least area over a loop; add its triangles' circumcentres.
 
     Args:
-        corners_m: (L, 3) of the loop; beyond 256, the skin is a fan from their mean.
-        count: how many to draw.
+        corners_m: (L, 3) corners of the loop; more than 256 are triangulated as a fan from their mean.
+        count: number of points to draw.
 
     Returns:
-        (count + K, 3); the corners themselves where the loop has no area.
+        (count + K, 3) points; the corners themselves if the loop has no area.
     """
     skin = least_area(corners_m) if len(corners_m) <= MOST_VERTICES else None
     if skin is None:
@@ -157,7 +157,7 @@ def skin_points_m(corners_m: FloatArray, count: int) -> FloatArray:
 
 
 def _circumcenters_m(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
-    """(K, 3) circumcentres of those of (F, 3) triangles that contain theirs."""
+    """Return (K, 3) circumcentres of those triangles (F corners each in a, b, c) that contain theirs."""
     sides_m2 = np.stack([np.sum((p - q) ** 2, axis=1) for p, q in ((b, c), (c, a), (a, b))], axis=1)
     weights = sides_m2 * (sides_m2.sum(axis=1, keepdims=True) - 2.0 * sides_m2)
     inside = np.all(weights >= 0.0, axis=1) & np.any(weights > 0.0, axis=1)
@@ -166,7 +166,7 @@ def _circumcenters_m(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
 
 
 def _unfolded(split: IntArray) -> IntArray:
-    """The triangles of the pieces that the whole polygon was split into."""
+    """Collect the triangles from the table of splits, starting with the whole polygon."""
     pieces, triangles = [(0, len(split) - 1)], []
     while pieces:
         start, end = pieces.pop()
@@ -178,11 +178,11 @@ def _unfolded(split: IntArray) -> IntArray:
 
 
 def _patch(vertices_m: FloatArray, loop: IntArray, edges: set[int]) -> IntArray | None:
-    """(L - 2, 3) triangles that close a loop; None if it must stay open.
+    """Return (L - 2, 3) triangles that close a loop; None if it must stay open.
 
     Args:
-        vertices_m: (V, 3).
-        loop: (L,) vertex indices in the direction of the mesh's own edges.
+        vertices_m: (V, 3) vertices.
+        loop: (L,) vertex indices in the direction of the mesh's edges.
         edges: V * start + end of every directed edge of the mesh.
     """
     polygon = loop[::-1].astype(np.int64)
@@ -197,6 +197,6 @@ def _patch(vertices_m: FloatArray, loop: IntArray, edges: set[int]) -> IntArray 
 
 
 def _taken(start: IntArray, end: IntArray, count: int, edges: set[int]) -> BoolArray:
-    """Whether the mesh has the directed edge, for all pairs."""
+    """Return for each pair of vertices whether the mesh has this directed edge."""
     keys = start * count + end
     return np.array([key in edges for key in keys.ravel().tolist()]).reshape(keys.shape)

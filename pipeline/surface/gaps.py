@@ -1,4 +1,4 @@
-"""Holes as a person counts them: patches of the cameras' pictures behind which there is no surface."""
+"""Gaps, the holes that a viewer sees: connected regions of the cameras' images without a surface."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from pipeline.kernels.rays import Camera
 from pipeline.types import BoolArray, DepthMap, FloatArray, Gaps
 
 LARGE_M2 = 0.01
-"""A gap of this area or more is large: a hand fits through it."""
+"""Least area of a large gap: a hand fits through it."""
 
 
 def gaps_of(seen: Sequence[DepthMap], cameras: Sequence[Camera]) -> Gaps:
-    """The gaps in the depth images of a mesh.
+    """Find and measure the gaps in the depth images of a mesh.
 
-    Nothing else counts: the outer rim of a scene is no gap, as no camera looks past it, nor is an edge of
-    the mesh that stands before other surface.
+    The outer rim of a scene is no gap if no camera looks past it, nor is an edge of the mesh in front of
+    other surface.
 
     Args:
         seen: depth of the mesh in each camera, NaN where a ray misses.
-        cameras: of these images.
+        cameras: cameras of these images.
     """
     areas_m2 = [
         _areas_m2(depth, camera) for depth, camera in zip(seen, cameras, strict=True) if depth.valid.any()
@@ -32,7 +32,7 @@ def gaps_of(seen: Sequence[DepthMap], cameras: Sequence[Camera]) -> Gaps:
 
 
 def _areas_m2(depth: DepthMap, camera: Camera) -> FloatArray:
-    """(G,) of the gaps in one picture that has a pixel with depth."""
+    """Return (G,) areas of the gaps in one image, which must have a pixel with depth."""
     missed = ~depth.valid
     count, patch = cv2.connectedComponents(missed.astype(np.uint8), connectivity=4)
     pixel_m2 = _filled_m(depth, missed) ** 2 / (camera.intrinsics.fx_px * camera.intrinsics.fy_px)
@@ -41,7 +41,7 @@ def _areas_m2(depth: DepthMap, camera: Camera) -> FloatArray:
 
 
 def _filled_m(depth: DepthMap, missed: BoolArray) -> FloatArray:
-    """(H, W) depth where there is one, and elsewhere that of the nearest pixel that has one."""
+    """Return (H, W) depth, at pixels without depth that of the nearest pixel with depth."""
     _, nearest = cv2.distanceTransformWithLabels(
         missed.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )

@@ -1,4 +1,4 @@
-"""The cause of a hole, found by rolling again: which change would make the ball close it."""
+"""Diagnosis of a hole: its cause, found by rolling balls again around it with one change after the other."""
 
 from __future__ import annotations
 
@@ -19,42 +19,42 @@ from pipeline.surface.ray_parts import Known, View, known_there
 from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud, PointSource, SurfaceResult
 
 MOST = 0.5
-"""More than this share of a hole decides."""
+"""A cause must hold for more than this share of a hole."""
 GROWTH = 1.25
-"""Each ball that is tried is larger than the one before by this factor."""
+"""Ratio of the radii of two consecutively tried balls."""
 WIDE = 10.0
 """Without views, a gap of this many point spacings counts as unmeasured."""
 _MOST_POINTS = 4000
-"""Points that one explanation rolls over, so that it takes a fraction of a second."""
+"""Most points that are used for one explanation, so that it takes a fraction of a second."""
 _BALLS_AROUND = 4.0
 """Balls up to this many times the largest so far, or twice the hole, are tried."""
 _PLACES = 8
-"""Edges of a large rim that stand for all."""
+"""Number of edges of a large rim that are examined as a sample."""
 _WHOLE = 6.0
-"""A rim within this many balls' radii of its centre is examined whole."""
+"""A rim up to this many ball radii around its centre is examined completely."""
 _SAMPLES = 200
 
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """The cloud around a hole, or around some edges of a long rim, with what is to be closed there."""
+    """The cloud around a hole, or around some edges of a long rim, and samples of the open region."""
 
     points_m: FloatArray
-    """(n, 3)."""
+    """(n, 3) points of the cloud."""
     normals: FloatArray
-    """(n, 3)."""
+    """(n, 3) their normals."""
     agreed: FloatArray
-    """(n, 3) one direction for all points: the mean of the normals at the loop, or at the nearest edge."""
+    """(n, 3) consistent normals for all points: the mean normal at the loop, or at the nearest edge."""
     edges: IntArray
     """(E, 2) rows of the loop's edges, in the direction of their triangles."""
     ends: bool
-    """True for a rim: the surface ends here, and it is the edges that a ball must cross."""
+    """True for a rim, where the surface ends and a ball must roll on over the edges."""
     samples_m: FloatArray
     """(S, 3) points in the hole, or just beyond each edge of a rim."""
     directions: FloatArray
-    """(S, 3) what is outside at each."""
+    """(S, 3) outward direction at each sample."""
     height_m: float
-    """How far a surface that closes the hole may bulge from its smallest skin."""
+    """Largest distance of a surface that closes the hole from the triangulation of least area."""
     spacing_m: float
     """Median distance of nearest points."""
     widest_gap_m: float
@@ -65,17 +65,17 @@ class _Place:
 
 @dataclass(frozen=True, slots=True)
 class _Findings:
-    """The results of rolling again and of the cameras' views."""
+    """Results of the repeated rolling and of the cameras' views."""
 
     known: Known
     layered: float
-    """Share that triangles lie over or under already."""
+    """Share of the hole that triangles already cover from above or below."""
     gained: float
-    """Share that the same balls close if the normals agree, and do not if they are as they are."""
+    """Share that the same balls close with consistent normals, but not with the actual ones."""
     radius_m: float | None
-    """Smallest ball that closes."""
+    """Smallest ball that closes the hole."""
     most_radius_m: float | None
-    """Smallest ball that closes more than nine tenths, and is not known to close all."""
+    """Smallest ball that closes more than nine tenths but not all of it."""
     most: float
     """Share that the largest ball closes."""
 
@@ -83,23 +83,23 @@ class _Findings:
 def explain_hole(
     hole: Hole, surface: SurfaceResult, cloud: PointCloud, views: Sequence[View] = ()
 ) -> Explanation:
-    """Find out why a hole is there by rolling again over the points around it.
+    """Find the cause of a hole by rolling balls again over the points around it.
 
-    The causes are tried in this order. **outside view**: no camera sees most of the hole's inside, or
-    they look past a rim onto something farther. **normals**: the same balls close most of it once the
-    normals there agree, and do not otherwise. **no points**: at most of its pixels nothing gave the
-    surface a depth; without views, the hole is ten point spacings wide, or a rim that no ball crosses.
-    **gap**: all else.
+    The causes are tested in this order. **outside view**: no camera sees most of the hole's inside, or
+    cameras look past a rim onto a farther surface. **normals**: the same balls close most of it with
+    consistent normals, but not with the actual ones. **no points**: most of its pixels have no depth
+    that the surface uses; without views, the hole is ten point spacings wide, or a rim that no ball
+    crosses. **gap**: all other cases.
 
-    A ball closes a hole if every edge of its loop gets its second triangle, and no triangle of the patch
-    that is added there has an edge with one face. It closes a rim if more than half of the edges looked
-    at get their second triangle: all, or eight of a large one. Islands are explained like rims.
+    A ball closes a hole if every edge of its loop gets its second triangle, and no new triangle of the
+    patch there has an edge with one face. It closes a rim if more than half of the examined edges (all,
+    or eight of a large rim) get their second triangle. Islands are explained like rims.
 
     Args:
-        hole: of ``surface``.
-        surface: made by balls, the smallest first.
-        cloud: what those balls rolled over.
-        views: what the cameras know; without any, the points alone decide.
+        hole: a hole of ``surface``.
+        surface: surface made by balls, the smallest first.
+        cloud: cloud over which those balls rolled.
+        views: known pixels of the cameras; without views, the points alone decide.
 
     Raises:
         InputError: no ball made the surface, its vertices are not points of the cloud, or a view's mask
@@ -151,7 +151,7 @@ def _has_inferred(surface: SurfaceResult) -> bool:
 
 
 def _place(hole: Hole, surface: SurfaceResult, cloud: PointCloud) -> _Place:
-    """Cut the cloud out around a hole."""
+    """Select the points of the cloud around a hole."""
     ends = hole.rim or hole.island
     loop_m = surface.vertices_m[hole.loop]
     edges = np.stack([hole.loop, np.roll(hole.loop, -1)], axis=1)
@@ -188,7 +188,7 @@ def _place(hole: Hole, surface: SurfaceResult, cloud: PointCloud) -> _Place:
 def _cut(
     points_m: FloatArray, centers_m: FloatArray, radius_m: float, ball_m: float
 ) -> tuple[IntArray, IntArray, float]:
-    """Rows of the cloud near the centres, each place once; the nearest centre of each; how far they reach."""
+    """Return rows of distinct points near the centres, the nearest centre of each, and the cut distance."""
     distances_m, nearest = cKDTree(centers_m).query(points_m)
     wanted_m = radius_m + 2.0 * max(_BALLS_AROUND * ball_m, 2.0 * radius_m)
     last = min(_MOST_POINTS, len(points_m)) - 1
@@ -201,7 +201,7 @@ def _cut(
 
 
 def _rows_of(tree: cKDTree, places_m: FloatArray) -> IntArray:
-    """(M,) the points that lie exactly at (M, 3) places."""
+    """Return (M,) rows of the points that are exactly at (M, 3) positions."""
     distance_m, rows = tree.query(places_m)
     if np.any(distance_m > 0.0):
         raise InputError(
@@ -212,16 +212,16 @@ def _rows_of(tree: cKDTree, places_m: FloatArray) -> IntArray:
 
 
 def _means(vectors: FloatArray, owner: IntArray, count: int) -> FloatArray:
-    """(count, 3) unit mean of the (M, 3) vectors of each owner."""
+    """Return (count, 3) mean direction of the (M, 3) vectors of each owner."""
     sums = np.stack([np.bincount(owner, weights=part, minlength=count) for part in vectors.T], axis=1)
     return sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), 1e-12)
 
 
 def _grow(place: _Place, radii_m: Sequence[float]) -> tuple[float | None, float | None, float]:
-    """Let balls grow until one closes the hole, and does so too when it alone follows the given ones.
+    """Roll larger and larger balls until one closes the hole, also if it directly follows the given balls.
 
     Returns:
-        The radius that closes; the one that closes nine tenths; the share that the last one closes.
+        The radius that closes it; the radius that closes nine tenths; the share that the last ball closes.
     """
 
     def closes(rolled: Rolled) -> bool:
@@ -245,9 +245,9 @@ def _grow(place: _Place, radii_m: Sequence[float]) -> tuple[float | None, float 
 
 
 def _closed(rolled: Rolled, place: _Place) -> BoolArray:
-    """(E,) the edges of a rim that have two triangles, or (S,) the samples of a hole that one covers.
+    """Return (E,) True for a rim's edges with two triangles, or (S,) True for a hole's covered samples.
 
-    A triangle covers a sample that lies under or over it, if it faces outside like the loop.
+    A triangle covers a sample that is below or above it, if it faces outwards like the loop.
     """
     if place.ends:
         return half_edges(rolled.triangles, place.edges[:, ::-1]) >= 0
@@ -259,7 +259,7 @@ def _closed(rolled: Rolled, place: _Place) -> BoolArray:
 
 
 def _sentences(reason: Reason, place: _Place, surface: SurfaceResult, found: _Findings) -> tuple[str, str]:
-    """The sentence with the cause, and the one or two with the remedy."""
+    """Return the sentence with the cause, and the one or two sentences with the remedy."""
     if reason == "outside view":
         return _unseen_sentences(place, found.known)
     if reason == "normals":
@@ -275,7 +275,7 @@ def _sentences(reason: Reason, place: _Place, surface: SurfaceResult, found: _Fi
 
 
 def _length(length_m: float) -> str:
-    """A length in the unit that suits it."""
+    """Format a length in centimetres or millimetres."""
     if length_m >= 0.1:
         return f"{100 * length_m:.0f} cm"
     return f"{1000 * length_m:.0f} mm" if length_m >= 0.01 else f"{1000 * length_m:.1f} mm"
@@ -341,7 +341,7 @@ def _gap_sentences(place: _Place, ball_m: float, found: _Findings) -> tuple[str,
 
 
 def _ball_sentence(place: _Place, found: _Findings) -> str:
-    """What larger balls do."""
+    """Return the sentence about the effect of larger balls."""
     if found.radius_m is not None:
         does = "goes on beyond most of this rim" if place.ends else "closes it"
         return f"A ball of {_length(found.radius_m)} radius {does}, at the price of smaller details."

@@ -1,4 +1,4 @@
-"""The loops at which a mesh ends, one by one: holes, and the rims around its parts."""
+"""Classification of a mesh's boundary loops: holes, rims around its components, and islands."""
 
 from __future__ import annotations
 
@@ -28,32 +28,32 @@ class Hole:
     """(L,) vertex indices, the first not repeated; a hole's are clockwise seen from outside."""
     length_m: float
     area_m2: float
-    """Of the fan of triangles from the loop's first vertex."""
+    """Area of the fan of triangles from the loop's first vertex."""
     center_m: FloatArray
-    """(3,) mean of the loop's edges by their length."""
+    """(3,) mean of the loop's edges, weighted by their length."""
     rim: bool
-    """True where the surface ends: the longest loop of a connected part, or one of 1 m or more."""
+    """True where the surface ends: the longest loop of a connected component, or one of 1 m or more."""
     island: bool = False
-    """True for another loop that runs around a piece, which hangs on its part by a point: nothing is to be
-    closed inside it."""
+    """True for any other loop that runs around a piece of surface which is attached to its component at a
+    single point: there is nothing to close inside it."""
 
     @property
     def open(self) -> bool:
-        """Whether it is a hole in the surface: neither rim nor island."""
+        """Whether the loop is a hole in the surface: neither rim nor island."""
         return not (self.rim or self.island)
 
 
 def find_holes(
     vertices_m: FloatArray, triangles: IntArray, parts: IntArray | None = None
 ) -> tuple[Hole, ...]:
-    """All boundary loops of a mesh: holes, the largest first, then rims and islands, the longest first.
+    """Find all boundary loops of a mesh: holes, largest first, then rims and islands, longest first.
 
-    Those that are open add up to ``open_area_m2``.
+    The areas of those that are ``open`` add up to ``open_area_m2``.
 
     Args:
-        vertices_m: (V, 3).
-        triangles: (F, 3).
-        parts: (V,) label of the connected part of each vertex; found if left out.
+        vertices_m: (V, 3) vertices.
+        triangles: (F, 3) vertex indices.
+        parts: (V,) label of each vertex's connected component; computed if None.
     """
     loops = boundary_loops(triangles)
     if not loops:
@@ -81,12 +81,12 @@ def find_holes(
 
 
 def open_area_m2(vertices_m: FloatArray, triangles: IntArray, parts: IntArray | None = None) -> float:
-    """Area of all holes of a mesh, without rims and islands; the arguments are those of ``find_holes``."""
+    """Return the area of all holes of a mesh, without rims and islands; arguments as for ``find_holes``."""
     return sum((hole.area_m2 for hole in find_holes(vertices_m, triangles, parts) if hole.open), 0.0)
 
 
 def _rims(lengths_m: FloatArray, part: IntArray) -> BoolArray:
-    """(L,) True for loops that are no holes, longest of their part or 1 m and longer."""
+    """Return (L,) True for rims: the longest loop of each component, and loops of 1 m or more."""
     order = np.lexsort((lengths_m, part))
     rims = lengths_m >= LONGEST_HOLE_M
     rims[order[np.append(part[order][1:] != part[order][:-1], True)]] = True
@@ -94,7 +94,7 @@ def _rims(lengths_m: FloatArray, part: IntArray) -> BoolArray:
 
 
 def _run_around(vertices_m: FloatArray, triangles: IntArray, edges: IntArray, first: IntArray) -> BoolArray:
-    """(L,) True for loops that run anticlockwise about the mean normal of the triangles along them."""
+    """Return (L,) True for loops that run anticlockwise about the mean normal of their triangles."""
     enclosed = loop_areas_m2(vertices_m[edges[:, 0]], vertices_m[edges[:, 1]], first)
     face = half_edges(triangles, edges) // 3
     a, b, c = vertices_m[triangles[face]].swapaxes(0, 1)
@@ -104,10 +104,10 @@ def _run_around(vertices_m: FloatArray, triangles: IntArray, edges: IntArray, fi
 
 
 def half_edges(triangles: IntArray, edges: IntArray) -> IntArray:
-    """(E,) where each directed edge is in a mesh: 3 t + k leads from corner k of triangle t to the next.
+    """Find (E,) half-edge numbers of directed edges: 3 t + k is from corner k of triangle t to the next.
 
     Args:
-        triangles: (F, 3).
+        triangles: (F, 3) vertex indices.
         edges: (E, 2) vertex indices.
 
     Returns:
@@ -125,14 +125,14 @@ def half_edges(triangles: IntArray, edges: IntArray) -> IntArray:
 
 
 def is_closed(triangles: IntArray, added: BoolArray, loop: IntArray) -> bool:
-    """Whether new triangles closed a loop without a remainder.
+    """Return whether new triangles have closed a loop completely.
 
-    Every edge of the loop must have its second triangle; and of the patches of new triangles that hang
-    together by edges, those at the loop must have no edge with one face.
+    Every edge of the loop must have its second triangle, and those edge-connected patches of new
+    triangles that touch the loop must have no edge with one face.
 
     Args:
-        triangles: (F, 3) of the mesh with the new ones.
-        added: (F,) True for the new ones.
+        triangles: (F, 3) triangles of the mesh, including the new ones.
+        added: (F,) True for the new triangles.
         loop: (L, 2) edges, directed as in the old triangles along them.
     """
     back = half_edges(triangles, loop[:, ::-1])
@@ -148,7 +148,7 @@ def is_closed(triangles: IntArray, added: BoolArray, loop: IntArray) -> bool:
 
 
 def beyond_m(vertices_m: FloatArray, triangles: IntArray, edges: IntArray, distance_m: float) -> FloatArray:
-    """(E, 3) points at a distance from (E, 2) directed edges, in their triangles' planes but outside them."""
+    """Return (E, 3) points at a distance from directed edges, in their triangles' planes but outside them."""
     half = half_edges(triangles, edges)
     opposite_m = vertices_m[triangles[half // 3, (half % 3 + 2) % 3]]
     a, b = vertices_m[edges].swapaxes(0, 1)
@@ -160,7 +160,7 @@ def beyond_m(vertices_m: FloatArray, triangles: IntArray, edges: IntArray, dista
 
 
 def _centers_m(ends_m: FloatArray, first: IntArray) -> FloatArray:
-    """(L, 3) means of the loops' (E, 2, 3) edges by their length."""
+    """Return (L, 3) means of the loops' (E, 2, 3) edges, weighted by their length."""
     weights = np.maximum(np.linalg.norm(ends_m[:, 1] - ends_m[:, 0], axis=1), 1e-12)
     sums = np.add.reduceat(ends_m.mean(axis=1) * weights[:, None], first, axis=0)
     return sums / np.add.reduceat(weights, first)[:, None]

@@ -1,4 +1,4 @@
-"""From the file of any point cloud to the file of its surface: what `packetmesh mesh` does."""
+"""Meshing of a point cloud file into a surface file, the work of `packetmesh mesh`."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ _log = logging.getLogger(__name__)
 
 LEAST_POINTS = 3
 USUAL_M = 0.05, 50.0
-"""Between these widths are things, rooms and houses."""
+"""Usual range of widths: from objects to houses."""
 OUTER_PERCENT = 1.0
-"""On either side of the middle of a cloud: what may be outliers does not count for its width."""
+"""Per cent of the points on either side that do not count for a cloud's width, because of outliers."""
 LARGEST_M, SMALLEST_M = 1e9, 1e-12
-"""No place is farther from the origin; a smaller cloud is a point."""
+"""Largest allowed coordinate, and the extent below which a cloud counts as one point."""
 _COARSE = 0.1
-"""A mesh file's numbers must be finer than this share of the smallest ball."""
+"""Coordinates in a mesh file must be resolved to this share of the smallest ball."""
 _LINE = 1e-6
 """A cloud is a line if it is thinner than this share of its length."""
 
@@ -49,21 +49,21 @@ ESTIMATED_OUTWARDS = "estimated, consistent among neighbours and outwards"
 
 @dataclass(frozen=True, slots=True)
 class MeshOptions:
-    """How a cloud becomes a mesh.
+    """Options for meshing a cloud.
 
     Raises:
-        InputError: a radius or a viewpoint that is no such thing, or counts that are too small.
+        InputError: an invalid radius or viewpoint, or counts that are too small.
     """
 
     radii_m: tuple[float, ...] | None = None
     """Ball radii; None takes them from the points (``chosen_radii``)."""
     viewpoint_m: tuple[float, float, float] | None = None
-    """Where the normals point to; without it they stay as given, or are estimated to point outwards."""
+    """Point that the normals face; None keeps given normals, or estimates normals that point outwards."""
     max_points: int | None = None
-    """Thin to about this many points first."""
+    """Thin the cloud to about this many points first."""
     smoothing_passes: int = 0
     metres_per_unit: float = 1.0
-    """Of the cloud's coordinates; 0.001 for millimetres."""
+    """Unit of the cloud's coordinates in metres; 0.001 for millimetres."""
 
     def __post_init__(self) -> None:
         for radius_m in self.radii_m or ():
@@ -82,17 +82,17 @@ class MeshOptions:
 
 @dataclass(frozen=True, slots=True)
 class MeshedCloud:
-    """The surface of a cloud, and what it was made from."""
+    """The surface of a cloud, and facts about the cloud."""
 
     surface: SurfaceResult
     points: int
-    """How many points the ball rolled over."""
+    """Number of points that the ball rolled over."""
     normals: str
     """Origin of the points' normals: ``GIVEN``, ``GIVEN_TURNED``, ``ESTIMATED_...``."""
     width_m: float
-    """Of the cloud, without its outermost points."""
+    """Width of the cloud, without its outermost points."""
     doubt: str | None
-    """Why its unit may be another than the metre."""
+    """Reason why the cloud's unit may not be the metre, or None."""
 
 
 def iterate_mesh_file(
@@ -101,15 +101,15 @@ def iterate_mesh_file(
     """Read a cloud, roll the ball over it, write the mesh.
 
     Args:
-        path: whatever ``read_cloud`` reads.
-        out: whatever ``write_mesh`` writes; whole or not at all.
+        path: file of a type that ``read_cloud`` reads.
+        out: file of a type that ``write_mesh`` writes; it is written completely or not at all.
 
     Returns:
-        The quality report, at the generator's end.
+        The quality report.
 
     Raises:
         InputError: a file, points or options that cannot be used.
-        ReconstructionError: the balls fall through everywhere.
+        ReconstructionError: no ball makes a triangle.
     """
     started = time.perf_counter()
     suffix = mesh_suffix(out)
@@ -124,11 +124,11 @@ def iterate_mesh_file(
 
 
 def iterate_mesh_cloud(cloud: PointCloud, options: MeshOptions) -> Generator[Progress, None, MeshedCloud]:
-    """The surface of a cloud with or without normals.
+    """Reconstruct the surface of a cloud with or without normals.
 
     Raises:
         InputError: points that make no surface, or a ball larger than the cloud.
-        ReconstructionError: the balls fall through everywhere.
+        ReconstructionError: no ball makes a triangle.
     """
     yield Progress("looking for repeated points", 0.05)
     cloud = in_metres(usable_points(cloud), options.metres_per_unit)
@@ -155,7 +155,7 @@ def iterate_mesh_cloud(cloud: PointCloud, options: MeshOptions) -> Generator[Pro
 
 
 def mesh_report(meshed: MeshedCloud) -> dict[str, Any]:
-    """The numbers of a mesh; its genus only if it is closed and in one piece, None otherwise."""
+    """Return the measures of a mesh; its genus is None unless it is closed and in one piece."""
     surface, quality = meshed.surface, meshed.surface.quality
     euler = len(surface.vertices_m) - len(edges_and_faces(surface.triangles)[0]) + len(surface.triangles)
     closed = quality.boundary_loops == 0 and quality.non_manifold_edges == 0 and quality.components == 1
@@ -178,10 +178,10 @@ def mesh_report(meshed: MeshedCloud) -> dict[str, Any]:
 
 
 def usable_points(cloud: PointCloud) -> PointCloud:
-    """The distinct points, in their order; with normals only where they are known.
+    """Return the distinct points in their order, without those whose normal is unknown (unless all are).
 
     Raises:
-        InputError: fewer than three points, or all of them in one place or on a line.
+        InputError: fewer than three points, or all of them coincident or collinear.
     """
     first = distinct_rows(cloud.points_m)
     if len(first) < len(cloud):
@@ -193,20 +193,20 @@ def usable_points(cloud: PointCloud) -> PointCloud:
 
 
 def check_unit(metres_per_unit: float) -> None:
-    """Refuse what is no length.
+    """Check the length of a unit.
 
     Raises:
-        InputError: not finite or not positive.
+        InputError: the length is not finite or not positive.
     """
     if not (math.isfinite(metres_per_unit) and metres_per_unit > 0.0):
         raise InputError(f"There cannot be {metres_per_unit:g} metres in a unit; try 0.001 for millimetres")
 
 
 def in_metres(cloud: PointCloud, metres_per_unit: float) -> PointCloud:
-    """The cloud in metres.
+    """Convert a cloud to metres.
 
     Raises:
-        InputError: a unit that is no length.
+        InputError: the unit's length is not finite or not positive.
     """
     check_unit(metres_per_unit)
     if metres_per_unit == 1.0:
@@ -215,13 +215,13 @@ def in_metres(cloud: PointCloud, metres_per_unit: float) -> PointCloud:
 
 
 def width_of(cloud: PointCloud) -> float:
-    """Longest side of the box around all but the outermost percents of the points along each axis."""
+    """Return the longest side of the box around the points, without ``OUTER_PERCENT`` at each end."""
     low_m, high_m = np.percentile(cloud.points_m, [OUTER_PERCENT, 100.0 - OUTER_PERCENT], axis=0)
     return float((high_m - low_m).max())
 
 
 def doubtful_unit(width_m: float, metres_per_unit: float) -> str | None:
-    """What to say of a cloud that is larger than houses, or smaller than what a depth camera measures."""
+    """Return a warning for a cloud that is larger than a house or too small for a depth camera, or None."""
     if USUAL_M[0] <= width_m <= USUAL_M[1]:
         return None
     if width_m > USUAL_M[1]:
@@ -232,7 +232,7 @@ def doubtful_unit(width_m: float, metres_per_unit: float) -> str | None:
 
 
 def with_normals(cloud: PointCloud, viewpoint_m: Sequence[float] | None) -> tuple[PointCloud, str]:
-    """The cloud with unit normals, and where they came from."""
+    """Return the cloud with unit normals, and the origin of the normals."""
     place_m = None if viewpoint_m is None else np.array(viewpoint_m, dtype=np.float64)
     if cloud.normals is None:
         cloud = oriented_normals(cloud, place_m)
@@ -243,10 +243,10 @@ def with_normals(cloud: PointCloud, viewpoint_m: Sequence[float] | None) -> tupl
 
 
 def chosen_radii(cloud: PointCloud, radii_m: tuple[float, ...] | None) -> tuple[float, ...]:
-    """The ball radii, ascending and no larger than the cloud.
+    """Choose the ball radii, ascending and no larger than the cloud.
 
-    Without given ones those by which a point's neighbours surround it; for a cloud whose points are not
-    surrounded the rule r_F + {0, 1, 2, 4} sigma_D.
+    Without given radii they are the distances within which a point's neighbours surround it; for a cloud
+    whose points are not surrounded, the rule r_F + {0, 1, 2, 4} sigma_D.
 
     Raises:
         InputError: a given radius larger than the cloud.
@@ -268,7 +268,7 @@ def chosen_radii(cloud: PointCloud, radii_m: tuple[float, ...] | None) -> tuple[
 
 
 def _known_normals(cloud: PointCloud) -> PointCloud:
-    """Normals made unit; points without one left out, or all normals if no point has one."""
+    """Normalise the normals; leave out points without one, or all normals if no point has one."""
     if cloud.normals is None:
         return cloud
     lengths = np.linalg.norm(cloud.normals, axis=1)
@@ -305,7 +305,7 @@ def _check_shape(points_m: FloatArray) -> None:
 
 
 def _check_resolution(points_m: FloatArray, radius_m: float) -> None:
-    """Refuse points so far away that the 32 bits of a mesh file would round their surface off."""
+    """Refuse points so far from the origin that the 32-bit floats of a mesh file are too coarse."""
     reach_m = float(np.abs(points_m).max())
     step_m = float(np.spacing(np.float32(reach_m)))
     if step_m > _COARSE * radius_m:

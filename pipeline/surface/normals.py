@@ -1,4 +1,4 @@
-"""Normals of a cloud: from its points, and turned to one side."""
+"""Estimation and orientation of a cloud's normals."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from pipeline.surface.boundary import connected_parts
 from pipeline.types import FloatArray, IntArray, PointCloud
 
 NEIGHBOURS = 20
-"""Points, itself included, that make a point's tangent plane."""
+"""Number of points, itself included, that define a point's tangent plane."""
 GRAPH_NEIGHBOURS = 10
-"""Neighbours of a point that it can get its side from."""
+"""Number of neighbours from which a point can get its orientation."""
 _LEAST_WEIGHT = 1e-6
-"""An edge of weight zero would be no edge."""
+"""Least weight of an edge: a sparse matrix drops weights of zero."""
 MOST_NEIGHBOURS = 320
-"""Of points whose nearer neighbours all lie on a line, as along a LiDAR's ring."""
+"""Most neighbours, for points whose nearer neighbours are all on a line, as along a LiDAR's ring."""
 LINE = 0.05
-"""Of the largest variance of the neighbours' places: below it the second largest makes no plane."""
+"""Neighbours are on a line if the second largest variance is below this share of the largest."""
 _CHUNK = 400_000
-"""Neighbours that are held at a time."""
+"""Most neighbours in memory."""
 _FLAT = 0.02
-"""A part whose volume is a smaller share of what it could be has no outside."""
+"""A component whose volume is a smaller share of its largest possible one counts as flat."""
 
 
 def estimate_normals(cloud: PointCloud, viewpoint_m: FloatArray, neighbours: int = NEIGHBOURS) -> PointCloud:
-    """``cloud`` with unit normals, by principal components, that point to the side of the viewpoint.
+    """Estimate unit normals by principal components, oriented towards the viewpoint.
 
     Args:
         cloud: at least three points.
-        viewpoint_m: (3,) the observing camera, in the cloud's frame.
-        neighbours: how many points, itself included, make a point's tangent plane.
+        viewpoint_m: (3,) position of the observing camera, in the cloud's frame.
+        neighbours: number of points, itself included, that define a point's tangent plane.
 
     Raises:
         InputError: fewer than three points or neighbours.
@@ -52,15 +52,15 @@ def estimate_normals(cloud: PointCloud, viewpoint_m: FloatArray, neighbours: int
 
 
 def oriented_normals(cloud: PointCloud, viewpoint_m: FloatArray | None = None) -> PointCloud:
-    """``cloud`` with unit normals that point to the viewpoint, or consistently outwards without one.
+    """Estimate unit normals, oriented towards the viewpoint, or consistently outwards without one.
 
-    Without a viewpoint, neighbours agree along a minimum spanning tree of their tangent planes (Hoppe et
-    al. 1992), and each connected part is turned so that it encloses a positive volume. A flat part
-    has no outside; its normals point up, or along x or y if it stands.
+    Without a viewpoint, orientation is propagated along a minimum spanning tree of the tangent planes
+    (Hoppe et al. 1992), and each connected component is oriented so that its volume is positive. A flat
+    component has no outside; its normals point up, or along x or y if it is upright.
 
     Args:
         cloud: at least three points.
-        viewpoint_m: (3,) the observing camera, in the cloud's frame.
+        viewpoint_m: (3,) position of the observing camera, in the cloud's frame.
 
     Raises:
         InputError: fewer than three points.
@@ -77,7 +77,7 @@ def oriented_normals(cloud: PointCloud, viewpoint_m: FloatArray | None = None) -
 
 
 def turned_to_viewpoint(cloud: PointCloud, viewpoint_m: FloatArray) -> PointCloud:
-    """``cloud`` with the normals it has, those turned round that point away from the viewpoint.
+    """Flip those normals of a cloud that point away from the viewpoint.
 
     Raises:
         InputError: a viewpoint that is not three finite numbers.
@@ -91,7 +91,7 @@ def turned_to_viewpoint(cloud: PointCloud, viewpoint_m: FloatArray) -> PointClou
 
 
 def _with_normals(cloud: PointCloud, neighbours: int) -> PointCloud:
-    """Unit normals of either sign."""
+    """Estimate unit normals without orientation."""
     if min(len(cloud), neighbours) < 3:
         raise InputError(
             f"Normals need at least 3 points and 3 neighbours, not {len(cloud)} and {neighbours}; try more"
@@ -100,7 +100,7 @@ def _with_normals(cloud: PointCloud, neighbours: int) -> PointCloud:
 
 
 def _off_lines(points_m: FloatArray, normals: FloatArray) -> FloatArray:
-    """(N, 3) normals; where the neighbours lie on a line, from two, four and more times as many."""
+    """Return (N, 3) normals; points with collinear neighbours get theirs from 2, 4, ... times as many."""
     tree, normals = cKDTree(points_m), normals.copy()
     count, left = NEIGHBOURS, np.arange(len(points_m))
     while len(left) and count <= min(MOST_NEIGHBOURS, len(points_m)):
@@ -118,7 +118,7 @@ def _off_lines(points_m: FloatArray, normals: FloatArray) -> FloatArray:
 
 
 def _turned_outwards(points_m: FloatArray, normals: FloatArray) -> FloatArray:
-    """(N, 3) normals, neighbours alike and every connected part outwards."""
+    """Return (N, 3) normals, consistent among neighbours, every connected component outwards."""
     count = min(GRAPH_NEIGHBOURS + 1, len(points_m))
     distances_m, rows = cKDTree(points_m).query(points_m, k=count, workers=-1)
     normals = normals * _agreeing_signs(normals, rows[:, 1:])[:, None]
@@ -129,13 +129,13 @@ def _turned_outwards(points_m: FloatArray, normals: FloatArray) -> FloatArray:
 
 
 def _facing(points_m: FloatArray, normals: FloatArray, areas_m2: FloatArray, part: IntArray) -> FloatArray:
-    """(N,) positive where the normals of a point's part face outwards: where its volume is positive.
+    """Return (N,) positive values where the normals of a point's component face outwards (volume > 0).
 
     Args:
-        points_m: (N, 3).
-        normals: (N, 3), consistent within each part.
-        areas_m2: (N,) of the surface around each point, up to a factor.
-        part: (N,) labels from 0.
+        points_m: (N, 3) points.
+        normals: (N, 3) normals, consistent within each component.
+        areas_m2: (N,) area of the surface around each point, up to a factor.
+        part: (N,) component labels from 0.
     """
 
     def totals(rows: FloatArray) -> FloatArray:
@@ -152,11 +152,11 @@ def _facing(points_m: FloatArray, normals: FloatArray, areas_m2: FloatArray, par
 
 
 def _agreeing_signs(normals: FloatArray, neighbours: IntArray) -> FloatArray:
-    """(N,) 1 or -1 for every normal, so that those joined by the spanning tree agree.
+    """Return (N,) sign 1 or -1 of every normal, so that normals joined by the spanning tree agree.
 
     Args:
-        normals: (N, 3) of either sign.
-        neighbours: (N, k) rows.
+        normals: (N, 3) normals of either sign.
+        neighbours: (N, k) rows of the neighbours.
     """
     n, k = neighbours.shape
     ends = np.repeat(np.arange(n), k), neighbours.reshape(-1)
@@ -165,13 +165,13 @@ def _agreeing_signs(normals: FloatArray, neighbours: IntArray) -> FloatArray:
     parent = _parents(tree.tocoo(), n)
     signs = np.where(np.einsum("ni,ni->n", normals, normals[parent]) < 0.0, -1.0, 1.0)
     while not np.array_equal(grand := parent[parent], parent):
-        signs *= signs[parent]  # the product along a path whose length doubles every time
+        signs *= signs[parent]  # product along a path whose length doubles at each step
         parent = grand
     return signs
 
 
 def _parents(forest: coo_matrix, n: int) -> IntArray:
-    """(n,) the next vertex on the way to the root of each vertex's tree; roots are their own."""
+    """Return (n,) the parent of each vertex in its tree; a root is its own parent."""
     _, first = np.unique(connected_components(forest, directed=False)[1], return_index=True)
     joint = coo_matrix(  # vertex n is a root above all roots, so that one search finds all trees
         (

@@ -1,4 +1,4 @@
-"""Pictures of meshes by ray casting, made without a display."""
+"""Images of meshes by ray casting, without a display."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MISSED = (255, 0, 255)
 
 
 def beside(camera: Camera, surface: Surface, angle_deg: float = 20.0) -> Camera:
-    """A camera that has gone around the middle of what it sees, upright in the world."""
+    """Return the camera rotated about the world's vertical axis through the middle of the surface."""
     if not len(surface.vertices_m):
         return camera
     middle_m = np.median(surface.vertices_m, axis=0)
@@ -26,13 +26,13 @@ def beside(camera: Camera, surface: Surface, angle_deg: float = 20.0) -> Camera:
 def mesh_picture(
     surface: Surface, camera: Camera, colored: bool = True, texture: Texture | None = None
 ) -> ByteArray:
-    """(H, W, 3) picture of a mesh from a camera; rays that hit nothing show ``MISSED``.
+    """Render a mesh: (H, W, 3) image from a camera; rays that hit nothing show ``MISSED``.
 
     Args:
-        surface: what is seen.
-        camera: from where.
-        colored: use the vertex colours; without, a grey surface whose shading shows its shape.
-        texture: photographs that the surface wears in place of its colours, unshaded.
+        surface: surface to render.
+        camera: camera of the image.
+        colored: True uses the vertex colours, False a shaded grey surface.
+        texture: photographs to show on the surface instead of its colours, unshaded.
     """
     hits = camera_hits(triangle_scene(surface.vertices_m, surface.triangles), camera)
     hit = np.isfinite(hits["t_hit"].numpy())

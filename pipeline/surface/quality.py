@@ -1,4 +1,4 @@
-"""How good a mesh is: holes first (SPEC 5)."""
+"""Quality measures of a mesh: holes, gaps, and agreement with the sensors (SPEC 5)."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ from pipeline.types import (
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What one camera sees of a mesh."""
+    """A mesh as seen by one camera."""
 
     depth: DepthMap
-    """(H, W) NaN where a ray misses."""
+    """(H, W) depth of the mesh; NaN where a ray misses."""
     guessed: BoolArray | None
-    """(H, W) rays that meet a triangle most of whose corners were inferred; None if nothing says so."""
+    """(H, W) rays that hit a triangle most of whose corners were inferred; None if sources are unknown."""
 
 
 def measure_quality(
@@ -49,15 +49,15 @@ def measure_quality(
     sensed: Sequence[DepthMap] = (),
     source: ByteArray | None = None,
 ) -> SurfaceQuality:
-    """All measures of a mesh that has no unused vertex.
+    """Compute all measures of a mesh without unused vertices.
 
     Args:
-        vertices_m: (V, 3).
-        triangles: (F, 3).
-        cameras: whose pixel rays look for the surface; without any, shares of rays are NaN.
-        n_input_points: points the mesh was made from.
-        sensed: what each camera's sensor has measured; without it, shares of measured pixels are NaN.
-        source: (V,) of the vertices; without it, the share of rays that a guess closes is NaN.
+        vertices_m: (V, 3) vertices.
+        triangles: (F, 3) vertex indices.
+        cameras: cameras whose pixel rays are traced; without cameras, shares of rays are NaN.
+        n_input_points: number of points from which the mesh was made.
+        sensed: depth measured by each camera's sensor; without it, shares of measured pixels are NaN.
+        source: (V,) source of each vertex; without it, the share of rays on inferred surface is NaN.
     """
     views = list(seen_by(vertices_m, triangles, cameras, source))
     seen = [view.depth for view in views]
@@ -86,7 +86,7 @@ def measure_quality(
 def measured(
     surface: Surface, cameras: Sequence[Camera], n_input_points: int, sensed: Sequence[DepthMap] = ()
 ) -> SurfaceResult:
-    """A surface with all its measures; the arguments are those of ``measure_quality``."""
+    """Add all measures to a surface; the arguments are those of ``measure_quality``."""
     quality = measure_quality(
         surface.vertices_m, surface.triangles, cameras, n_input_points, sensed, surface.source
     )
@@ -97,47 +97,47 @@ def measured(
 def seen_by(
     vertices_m: FloatArray, triangles: IntArray, cameras: Sequence[Camera], source: ByteArray | None
 ) -> Iterator[Seen]:
-    """What each camera sees of a mesh; ``source`` is (V,) of the vertices, where it is known."""
+    """Yield the view of a mesh in each camera; ``source`` is (V,) of the vertices, or None."""
     scene = triangle_scene(vertices_m, triangles)
     guessed = None if source is None else np.append(guessed_triangles(triangles, source), False)
     for camera in cameras:
         hits = camera_hits(scene, camera)
-        triangle = np.minimum(hits["primitive_ids"].numpy(), len(triangles))  # beyond all of them for none
+        triangle = np.minimum(hits["primitive_ids"].numpy(), len(triangles))  # a miss has a larger id
         yield Seen(depth_of(hits), None if guessed is None else guessed[triangle])
 
 
 def no_hit_ray_share(vertices_m: FloatArray, triangles: IntArray, cameras: Sequence[Camera]) -> float:
-    """Share of all cameras' pixel rays that miss the mesh, 0 to 1; NaN without cameras."""
+    """Return the share of all cameras' pixel rays that miss the mesh, 0 to 1; NaN without cameras."""
     return missed_share(list(hit_depths(vertices_m, triangles, cameras)))
 
 
 def missed_share(seen: Sequence[DepthMap]) -> float:
-    """Share of the pixels of all cameras without a hit, 0 to 1; NaN without cameras."""
+    """Return the share of all cameras' pixels without a hit, 0 to 1; NaN without cameras."""
     if not seen:
         return float("nan")
     return 1.0 - sum(int(depth.valid.sum()) for depth in seen) / sum(depth.z_m.size for depth in seen)
 
 
 def guessed_share(views: Sequence[Seen]) -> float:
-    """Share of the pixels of all cameras that see inferred surface, 0 to 1; NaN if nothing says so."""
+    """Return the share of all cameras' pixels on inferred surface, 0 to 1; NaN if sources are unknown."""
     guessed = [view.guessed for view in views if view.guessed is not None]
     return float(np.mean(np.concatenate([part.ravel() for part in guessed]))) if guessed else float("nan")
 
 
 def kept_share(seen: Sequence[DepthMap], sensed: Sequence[DepthMap], within: float) -> float:
-    """Share of the measured pixels whose ray meets the mesh near the measurement.
+    """Return the share of the measured pixels whose ray hits the mesh near the measurement.
 
     Args:
         seen: depth of the mesh in each camera.
-        sensed: what that camera's sensor has measured, on the same pixel grid.
-        within: the largest distance from the measurement that counts as near, as a share of it.
+        sensed: depth measured by each camera's sensor, on the same pixel grid.
+        within: largest difference from the measurement, as a share of it.
 
     Returns:
-        A share from 0 to 1; NaN where nothing was measured.
+        A share from 0 to 1; NaN if nothing was measured.
     """
     kept = total = 0
     for mesh, sensor in zip(seen, sensed, strict=True):
         total += int(np.count_nonzero(sensor.valid))
-        near = np.abs(mesh.z_m - sensor.z_m) <= within * sensor.z_m  # not where one of both is unknown
+        near = np.abs(mesh.z_m - sensor.z_m) <= within * sensor.z_m  # False if either is NaN
         kept += int(np.count_nonzero(near))
     return kept / total if total else float("nan")

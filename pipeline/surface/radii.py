@@ -1,4 +1,4 @@
-"""Which balls to roll: the thesis's rule r_F to r_F + sigma_D, and wider ones (SPEC 5)."""
+"""Ball radii by rule: the thesis's r_F to r_F + sigma_D, and wider ones (SPEC 5)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SIGMAS = {"thesis": (0.0, 0.25, 0.5, 1.0), "thesis+": (0.0, 1.0, 2.0, 4.0)}
 
 
 def nearest_distances_m(points_m: FloatArray) -> FloatArray:
-    """(N,) distance of each of (N, 3) points to its nearest neighbour.
+    """Return (N,) distance of each of (N, 3) points to its nearest neighbour.
 
     Raises:
         InputError: fewer than two points.
@@ -27,7 +27,7 @@ def nearest_distances_m(points_m: FloatArray) -> FloatArray:
 
 
 def spacing(points_m: FloatArray) -> tuple[float, float]:
-    """r_F and sigma_D of (N, 3) points, metres: mean and deviation of the nearest-neighbour distance.
+    """Return r_F and sigma_D of (N, 3) points, metres: mean and deviation of nearest-neighbour distances.
 
     Raises:
         InputError: fewer than two points.
@@ -41,10 +41,10 @@ def spacing(points_m: FloatArray) -> tuple[float, float]:
 
 
 def radii(config: SurfaceConfig, r_F_m: float, sigma_D_m: float) -> tuple[float, ...]:
-    """The ball radii of a config, metres, ascending and each once.
+    """Return the distinct ball radii of a config, metres, ascending.
 
     Raises:
-        InputError: a radius that is not positive, as of points that all coincide.
+        InputError: a radius is not positive, for example because all points coincide.
     """
     if config.radius_rule == "manual":
         chosen = config.radii_m

@@ -1,4 +1,4 @@
-"""What the cameras' pixel rays meet: a surface that was measured, one that was inferred, or nothing."""
+"""Classification of the cameras' pixel rays: they hit measured surface, inferred surface, or nothing."""
 
 from __future__ import annotations
 
@@ -15,46 +15,46 @@ from pipeline.surface.findings import RayParts
 from pipeline.types import BoolArray, FloatArray, IntArray, SurfaceResult
 
 _FOLDED = 1e-3
-"""A pixel whose ray misses its point by more than this (z = 1) is an artefact of the distortion."""
+"""A projected pixel whose ray misses the point by more than this (at z = 1) is a distortion artefact."""
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What one camera knows of its pixels."""
+    """Masks of one camera's pixels with measured and with inferred depth."""
 
     camera: Camera
     sensor_valid: BoolArray
     """(H, W) True where the sensor measured a depth."""
     inferred_valid: BoolArray | None
-    """(H, W) True where the network's depth is known; None if it did not run."""
+    """(H, W) True where the depth network gives a depth; None if it did not run."""
 
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """What all cameras together know of some places; NaN without views."""
+    """Visibility and depth of some points in all cameras together; NaN without views."""
 
     outside_share: float
-    """Share of the places that are in no camera's image."""
+    """Share of the points that are in no camera's image."""
     hidden_share: float
-    """Share of the places that are in images, but behind the surface in all of them."""
+    """Share of the points that are in images, but behind the surface in all of them."""
     past_share: float
-    """Share of the places past which a camera sees the surface farther away."""
+    """Share of the points past which a camera sees the surface farther away."""
     sensor_share: float
-    """Share of the pixels, in all cameras that see the places, where the sensor measured."""
+    """Share of the pixels, in all cameras that see the points, with measured depth."""
     inferred_share: float
-    """Share of those where only the network's depth is known."""
+    """Share of these pixels with only the network's depth."""
     unknown_share: float
-    """Share of those where neither is."""
+    """Share of these pixels without any depth."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """How one camera sees (N, 3) points beside a surface."""
+    """Visibility of (N, 3) points near a surface in one camera."""
 
     in_image: BoolArray
-    """(N,) True where a pixel sees the point or what stands before it."""
+    """(N,) True where the point is projected into the image."""
     hidden: BoolArray
-    """(N,) True where the surface stands before the point."""
+    """(N,) True where the surface is in front of the point."""
     past: BoolArray
     """(N,) True where the camera looks past the point onto a surface farther away."""
     pixels: IntArray
@@ -62,7 +62,7 @@ class Sight:
 
 
 def ray_parts(surface: SurfaceResult, views: Sequence[View]) -> RayParts:
-    """Classify the pixel rays of all views by what they meet, or by which depth is known where they miss.
+    """Classify the pixel rays of all views by the surface that they hit, or by the pixel's depth if none.
 
     Raises:
         InputError: a mask that does not have its camera's image size.
@@ -76,7 +76,7 @@ def ray_parts(surface: SurfaceResult, views: Sequence[View]) -> RayParts:
     counts = np.zeros(5)
     for view in views:
         sensor, network = _known_pixels(view)
-        triangle = camera_hits(scene, view.camera)["primitive_ids"].numpy()  # beyond all of them for none
+        triangle = camera_hits(scene, view.camera)["primitive_ids"].numpy()  # a miss has a larger id
         hit = triangle < len(inferred)
         on_inferred = np.zeros(hit.shape, dtype=bool)
         on_inferred[hit] = inferred[triangle[hit]]
@@ -94,13 +94,13 @@ def ray_parts(surface: SurfaceResult, views: Sequence[View]) -> RayParts:
 
 
 def known_there(points_m: FloatArray, surface: SurfaceResult, views: Sequence[View], slack_m: float) -> Known:
-    """What cameras know of (N, 3) places in or beside a surface.
+    """Determine visibility and depth of (N, 3) points in or near a surface in all cameras.
 
     Args:
-        points_m: (N, 3).
-        surface: what may stand before them or behind them.
-        views: of all cameras.
-        slack_m: what the surface does within this distance of a place does not count.
+        points_m: (N, 3) points.
+        surface: surface that may be in front of them or behind them.
+        views: views of all cameras.
+        slack_m: surface within this distance of a point along the ray does not count.
 
     Raises:
         InputError: a mask that does not have its camera's image size.
@@ -126,7 +126,7 @@ def known_there(points_m: FloatArray, surface: SurfaceResult, views: Sequence[Vi
 
 
 def _known_pixels(view: View) -> tuple[BoolArray, BoolArray]:
-    """(H, W) where the sensor measured, and where the network's depth is known.
+    """Return (H, W) masks of pixels with measured depth, and with the network's depth.
 
     Raises:
         InputError: a mask that does not have the camera's image size.
@@ -146,7 +146,7 @@ def _known_pixels(view: View) -> tuple[BoolArray, BoolArray]:
 def sight(
     points_m: FloatArray, scene: o3d.t.geometry.RaycastingScene, camera: Camera, slack_m: float
 ) -> Sight:
-    """How a camera sees (N, 3) points; what the surface does within ``slack_m`` of them does not count."""
+    """Find the visibility of (N, 3) points in a camera; surface within ``slack_m`` of them is ignored."""
     in_camera_m = apply(inverse(camera.T_world_camera), points_m)
     in_image = in_camera_m[:, 2] > slack_m
     uv = project(camera.intrinsics, in_camera_m[in_image])

@@ -11,20 +11,20 @@ from pipeline.types import IntArray, PointCloud
 
 NEIGHBOURS = 20
 KERNEL_SHARE = 0.5
-"""Standard deviation of the Gaussian weight over the distance of the farthest neighbour."""
+"""Ratio of the Gaussian weight's standard deviation to the distance of the farthest neighbour."""
 
 
 def smooth(cloud: PointCloud, passes: int, rows: IntArray | None = None) -> PointCloud:
     """Move every point along its normal onto the plane that fits its neighbours best.
 
-    The first-order moving least squares of Alexa et al. 2003, with 20 neighbours. Where the noise is
-    as thick as the points are apart, a ball that should roll along a wall gets caught inside it; this
-    makes walls thin again. Points move along normals only, so their density stays.
+    This is first-order moving least squares (Alexa et al. 2003) with 20 neighbours. If the noise is as
+    large as the point spacing, a ball that should roll along a wall gets stuck inside it; smoothing makes
+    the wall thin again. Points move along normals only, so their density does not change.
 
     Args:
-        cloud: points with normals; the new normals keep their side.
-        passes: how often; 0 changes nothing.
-        rows: (M,) of the points to return; None for all.
+        cloud: points with normals; the new normals keep their orientation.
+        passes: number of passes; 0 changes nothing.
+        rows: (M,) rows of the points to return; None for all.
     """
     for _ in range(passes - 1):
         cloud = _pass(cloud, np.arange(len(cloud)))
@@ -34,7 +34,7 @@ def smooth(cloud: PointCloud, passes: int, rows: IntArray | None = None) -> Poin
 
 
 def _pass(cloud: PointCloud, rows: IntArray) -> PointCloud:
-    """Of the points at (M,) rows; the others only lie around them."""
+    """Smooth the points at (M,) rows once; the others serve as neighbours only."""
     kept = cloud.select(rows)
     if kept.normals is None or len(cloud) < 4:
         return kept

@@ -1,9 +1,9 @@
-"""Balls for any sampling: as wide as a point's neighbours have to be apart to surround it.
+"""Ball radii for uneven sampling: the distance within which a point's neighbours surround it.
 
-The mean distance to the nearest point and its deviation (``radii``) say little where sampling is uneven: one
+For uneven sampling, mean and deviation of the nearest-neighbour distance (``radii``) are not suitable: one
 outlier in twenty multiplies the deviation, and along a LiDAR's ring the nearest point is many times nearer
-than the next ring. Whether neighbours surround a point is the angle criterion of Bendels, Schnabel and Klein
-(Detecting holes in point set surfaces, 2006).
+than the next ring. The test whether neighbours surround a point is the angle criterion of Bendels, Schnabel
+and Klein (Detecting holes in point set surfaces, 2006).
 """
 
 from __future__ import annotations
@@ -14,27 +14,27 @@ from scipy.spatial import cKDTree
 from pipeline.types import BoolArray, FloatArray
 
 SAMPLE = 2000
-"""Points that are looked at."""
+"""Most points that are sampled."""
 COUNTS = (3, 4, 5, 6, 7, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80, 96, 128, 160, 192)
-"""Nearest neighbours that are tried, fewest first."""
+"""Numbers of nearest neighbours that are tried in turn."""
 LARGEST_GAP = np.radians(130.0)
-"""Between the directions of two neighbours, one after the other around the normal."""
+"""Largest angle between consecutive neighbours around the normal of a surrounded point."""
 SHARES = (0.1, 0.5, 0.75, 0.9)
-"""Of the points that a ball of each radius finds surrounded."""
+"""Shares of the points that are surrounded within each radius."""
 LEAST_SURROUNDED = 0.5
-"""Share of the points; with fewer the cloud is hardly a surface."""
+"""Least share of surrounded points in a cloud that is a surface."""
 
 
 def surrounding_radii(points_m: FloatArray, normals: FloatArray, seed: int = 0) -> tuple[float, ...]:
-    """Ball radii, ascending: a tenth to nine tenths of the points are surrounded within them.
+    """Choose ball radii, ascending, within which 10 %, 50 %, 75 % and 90 % of the points are surrounded.
 
     Args:
-        points_m: (N, 3) distinct.
-        normals: (N, 3) unit, of either sign.
-        seed: draws the points that are looked at.
+        points_m: (N, 3) distinct points.
+        normals: (N, 3) unit normals of either sign.
+        seed: random seed of the sample of points.
 
     Returns:
-        Nothing if most points are not surrounded.
+        The radii; none if most points are not surrounded.
     """
     distances_m = surrounding_distances_m(points_m, normals, seed)
     found = distances_m[np.isfinite(distances_m)]
@@ -44,9 +44,9 @@ def surrounding_radii(points_m: FloatArray, normals: FloatArray, seed: int = 0) 
 
 
 def surrounding_distances_m(points_m: FloatArray, normals: FloatArray, seed: int = 0) -> FloatArray:
-    """(S,) the distance within which the neighbours of a point surround it, of at most ``SAMPLE`` points.
+    """Return (S,) distance within which neighbours surround each of at most ``SAMPLE`` random points.
 
-    It is infinite where the nearest 192 leave a gap: at a rim, or for an outlier.
+    It is infinite where even the nearest 192 leave a gap: at a rim, or for an outlier.
     """
     rows = np.random.default_rng(seed).permutation(len(points_m))[:SAMPLE]
     most = min(COUNTS[-1], len(points_m) - 1)
@@ -65,14 +65,14 @@ def surrounding_distances_m(points_m: FloatArray, normals: FloatArray, seed: int
 
 
 def _surrounded(angles: FloatArray) -> BoolArray:
-    """(N,) whether (N, k) directions leave no gap."""
+    """Return (N,) whether (N, k) directions leave no gap wider than ``LARGEST_GAP``."""
     angles = np.sort(angles, axis=1)
     gaps = np.diff(np.column_stack([angles, angles[:, 0] + 2.0 * np.pi]), axis=1)
     return gaps.max(axis=1) <= LARGEST_GAP
 
 
 def _tangents(normals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Two (N, 3) unit vectors, at right angles to each other and to (N, 3) normals."""
+    """Return two (N, 3) unit vectors, orthogonal to each other and to (N, 3) normals."""
     least = np.eye(3)[np.abs(normals).argmin(axis=1)]
     across = np.cross(normals, least)
     across /= np.linalg.norm(across, axis=1, keepdims=True)

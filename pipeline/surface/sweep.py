@@ -1,4 +1,4 @@
-"""A sweep of the ball radius: the same cloud meshed with one ball after another, each alone."""
+"""Sweep of the ball radius: the same cloud is meshed separately with each of several balls."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from pipeline.types import PointCloud, RigTruth
 
 STEPS = 12
 NARROWEST, WIDEST = 0.5, 6.0
-"""Ends of a sweep, in mean nearest-neighbour distances r_F."""
+"""Smallest and largest radius of a sweep, in mean nearest-neighbour distances r_F."""
 
 
 def sweep_radii_m(r_F_m: float, others_m: Iterable[float] = ()) -> tuple[float, ...]:
-    """Twelve radii from r_F / 2 to 6 r_F in equal ratios, and others beside them, ascending.
+    """Return twelve radii from r_F / 2 to 6 r_F in equal ratios, and given others, ascending.
 
     Raises:
         InputError: r_F is not positive.
@@ -36,13 +36,13 @@ def sweep_radii_m(r_F_m: float, others_m: Iterable[float] = ()) -> tuple[float, 
 def iterate_sweep(
     cloud: PointCloud, radii_m: Sequence[float], cameras: Sequence[Camera] = (), truth: RigTruth | None = None
 ) -> Generator[SweepPoint]:
-    """Roll each ball alone over the cloud, one for each step.
+    """Mesh the cloud with each ball separately; yields the measures of each surface.
 
     Args:
         cloud: points with normals towards the outside.
-        radii_m: in the order in which they are rolled.
-        cameras: whose rays look for the surface; with a truth, one for each of the truth's.
-        truth: what the surface is compared with.
+        radii_m: ball radii, in the order of the results.
+        cameras: cameras whose rays are traced; with a truth, one for each of the truth's.
+        truth: true surface for comparison.
 
     Raises:
         InputError: fewer than three points, no normals, a radius that is not positive, or a truth
@@ -50,7 +50,7 @@ def iterate_sweep(
     """
     if truth is not None and not cameras:
         raise InputError("The truth is placed by the cameras and there are none; give the rig's cameras")
-    compile_all()  # or the first ball's time would hold it
+    compile_all()  # so that the first ball's time does not include it
     yardstick = None if truth is None else yardstick_of(truth)
     for radius_m in radii_m:
         yield _sweep_point(cloud, float(radius_m), cameras, truth, yardstick)

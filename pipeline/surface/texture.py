@@ -1,8 +1,8 @@
-"""The cameras' photographs on a mesh: every triangle takes its colours from the camera that sees it best.
+"""Texture of a mesh from photographs: every triangle is textured by the camera that sees it best.
 
-After Lempitsky and Ivanov, "Seamless Mosaicing of Image-Based Texture Maps", CVPR 2007: one photograph a
-triangle, chosen so that neighbours share it; exposures are evened, not blended. Nothing is painted: where no
-camera sees a triangle, it has no texture.
+The method follows Lempitsky and Ivanov, "Seamless Mosaicing of Image-Based Texture Maps", CVPR 2007: one
+photograph per triangle, chosen so that neighbours share it; exposures are equalised, not blended. A triangle
+that no camera sees has no texture.
 """
 
 from __future__ import annotations
@@ -17,37 +17,37 @@ from pipeline.kernels.rays import Camera, hit_depths
 from pipeline.types import WHITE_ROWS, BoolArray, ByteArray, FloatArray, IntArray, Surface, Texture
 
 DEPTH_WIDTH_PX = 320
-"""Of the depth images that tell what hides what, at most."""
+"""Largest width of the depth images that are used to test occlusion."""
 HIDDEN_M, HIDDEN_SHARE = 0.03, 0.015
-"""A triangle farther behind the first surface than the larger of both, the share of its depth, is hidden."""
+"""A triangle is hidden if it is farther behind the first surface than both (the share is of its depth)."""
 NEAR_RIM_PX = 3
-"""Width of the window of these images in which nothing may stand before a triangle, for the photograph and
-the mesh do not meet to the pixel; a camera in which something does is taken only if no other sees it."""
+"""Width of the window of a depth image that must have no surface in front of a triangle, as photograph and
+mesh are not aligned to the pixel; otherwise the camera is used only if no other sees the triangle."""
 AT_RIM = 0.05
-"""What is left of a camera's score there."""
+"""Factor on a camera's score in that case."""
 LEAST_COSINE = 0.08
-"""Of the angle at which a camera sees a triangle; less would smear a few pixels over it."""
+"""Least cosine of the viewing angle; at a smaller one a few pixels would be stretched over the triangle."""
 SMOOTHING_ROUNDS = 12
-"""Scores are averaged so often with those of the neighbours, so that patches of one camera are large."""
+"""Number of times that scores are averaged with those of the neighbours, for large patches per camera."""
 MOST_GAIN = 1.5
 DARK = 8.0
 """Added to colours before their ratios are taken."""
 FAR_OUTSIDE_PX = -1e5
 LEAST_COMMON = 200
-"""Triangles that two cameras must both see before their exposures are compared."""
+"""Least number of triangles that two cameras must both see to compare their exposures."""
 LARGEST_SIDE_PX = 4096
-"""Of the image: what every browser's graphics can hold."""
+"""Largest side of the texture image, which every browser supports."""
 
 
 def photographed(
     surface: Surface, cameras: Sequence[Camera], pictures: Sequence[tuple[ByteArray, BoolArray | None]]
 ) -> Texture:
-    """Dress a mesh.
+    """Compute the texture of a mesh from photographs.
 
     Args:
-        surface: world frame.
-        cameras: of the pictures.
-        pictures: (H, W, 3) RGB of each camera and (H, W) True where it is known, None for everywhere.
+        surface: mesh in the world frame.
+        cameras: cameras of the pictures.
+        pictures: (H, W, 3) RGB of each camera, and (H, W) True where it is known; None means everywhere.
     """
     vertices_m, triangles = surface.vertices_m, surface.triangles
     small = [Camera(scaled(camera.intrinsics, _shrink(camera)), camera.T_world_camera) for camera in cameras]
@@ -70,12 +70,12 @@ def photographed(
 
 
 def _shrink(camera: Camera) -> float:
-    """Factor from a camera's size to that of its depth image."""
+    """Return the factor from a camera's image size to that of its depth image."""
     return min(1.0, DEPTH_WIDTH_PX / camera.intrinsics.width_px)
 
 
 def _pixels(camera: Camera, points_m: FloatArray) -> FloatArray:
-    """(N, 2) of world points; far outside for those behind the camera."""
+    """Return (N, 2) pixels of world points; far outside the image for points behind the camera."""
     own_m = apply(inverse(camera.T_world_camera), points_m)
     ahead = own_m[:, 2] > 1e-3
     pixels = np.full((len(points_m), 2), FAR_OUTSIDE_PX)
@@ -91,15 +91,15 @@ def _scores(
     z_m: FloatArray,
     known: BoolArray | None,
 ) -> FloatArray:
-    """(F,) how many pixels a camera has for an area of each triangle; 0 where it does not see it.
+    """Return (F,) scores: a camera's pixels per area of each triangle, up to a factor; 0 if not seen.
 
     Args:
-        surface: whose triangles are judged by their corners and middles.
-        camera: at full size.
-        pixels: (V, 2) of the vertices.
-        middles: (F, 2) of the triangles.
-        z_m: (h, w) depth of the first surface, smaller.
-        known: (H, W) where there is a photograph.
+        surface: mesh, whose triangles are tested at their corners and middles.
+        camera: camera at full image size.
+        pixels: (V, 2) pixels of the vertices.
+        middles: (F, 2) pixels of the triangles' middles.
+        z_m: (h, w) depth of the first surface, at reduced size.
+        known: (H, W) True where the photograph is known, or None.
     """
     shape = camera.intrinsics.height_px, camera.intrinsics.width_px
     limits = np.array([shape[1] - 1.0, shape[0] - 1.0])
@@ -124,13 +124,13 @@ def _scores(
 
 
 def _places(pixels: FloatArray, shape: tuple[int, ...]) -> tuple[IntArray, IntArray]:
-    """Rows and columns of (N, 2) pixels in an image of that shape, clipped to it."""
+    """Return rows and columns of (N, 2) pixels, clipped to an image of this shape."""
     column, row = np.rint(np.clip(pixels, 0, (shape[1] - 1, shape[0] - 1))).astype(int).T
     return row, column
 
 
 def _chosen(scores: FloatArray, triangles: IntArray) -> IntArray:
-    """(F,) the best camera of each triangle by (C, F) scores, as its neighbours see it, too; -1 for none."""
+    """Return (F,) best camera of each triangle by (C, F) scores smoothed over neighbours; -1 for none."""
     seen = scores > 0.0
     relative = scores / np.maximum(scores.max(axis=0), 1e-12)
     beside = _neighbours(triangles)
@@ -141,7 +141,7 @@ def _chosen(scores: FloatArray, triangles: IntArray) -> IntArray:
 
 
 def _neighbours(triangles: IntArray) -> IntArray:
-    """(F, 3) the triangle beyond each edge; itself where the surface ends or is no surface."""
+    """Return (F, 3) triangle beyond each edge; at the boundary the triangle itself."""
     count = len(triangles)
     edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1)
     keys = edges[:, 0] << 32 | edges[:, 1]
@@ -154,12 +154,12 @@ def _neighbours(triangles: IntArray) -> IntArray:
 
 
 def _gains(seen: BoolArray, middles: Sequence[FloatArray], pictures: Sequence[ByteArray]) -> FloatArray:
-    """(C, 3) factors that make what several cameras see alike, by the medians of the logarithmic ratios.
+    """Return (C, 3) factors that equalise the cameras' exposures, from medians of logarithmic ratios.
 
     Args:
-        seen: (C, F) which triangles each camera sees.
+        seen: (C, F) True for the triangles that each camera sees.
         middles: (F, 2) pixels of the triangles in each camera.
-        pictures: of the cameras.
+        pictures: photographs of the cameras.
     """
     count = len(pictures)
     logs = [
@@ -182,7 +182,7 @@ def _gains(seen: BoolArray, middles: Sequence[FloatArray], pictures: Sequence[By
 def _side_by_side(
     pictures: Sequence[ByteArray], gains: FloatArray
 ) -> tuple[ByteArray, list[tuple[int, int]], float]:
-    """All photographs in one image, where each begins (x, y), and by how much they were made smaller."""
+    """Join all photographs in one image; returns it, the corner (x, y) of each, and the scale factor."""
     height = max(rgb.shape[0] for rgb in pictures)
     width = max(rgb.shape[1] for rgb in pictures)
     columns = int(np.ceil(np.sqrt(len(pictures))))

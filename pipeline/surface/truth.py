@@ -1,4 +1,4 @@
-"""Errors of a surface against the true one (SPEC 5)."""
+"""Errors of a surface against the true surface (SPEC 5)."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ from pipeline.types import FloatArray, IntArray, RigTruth
 
 TOLERANCES_M = (0.01, 0.03, 0.05)
 SAMPLES = 20_000
-"""Points drawn on each surface: a standard error of at most 0.4 percentage points."""
+"""Number of points drawn on each surface: a standard error of at most 0.4 percentage points."""
 _CLOSE_DEPTH = 0.05
 _SELF_HIT_M = 1e-3
-"""What a ray hits this near to its point is the point itself."""
+"""A hit within this distance of a ray's target point is the point itself."""
 _DRAWS_A_SAMPLE = 4
-"""Points drawn on the whole true surface for each wanted on the part that cameras see."""
+"""Points drawn on the whole true surface per point needed on the part that cameras see."""
 
 
 @dataclass(frozen=True, slots=True)
 class Yardstick:
-    """What every comparison with one truth needs, whatever the mesh."""
+    """Data that every comparison with one truth needs, independent of the mesh."""
 
     scene: o3d.t.geometry.RaycastingScene
-    """The true surface."""
+    """Ray casting scene of the true surface."""
     cameras: tuple[Camera, ...]
-    """Where they truly are."""
+    """Cameras at their true poses."""
     seen_m: FloatArray
-    """(at most SAMPLES, 3) points uniform by area on what at least one camera sees of the true surface."""
+    """(at most SAMPLES, 3) points, uniform by area, on the part of the true surface that cameras see."""
     rng: np.random.Generator
-    """As it is after these have been drawn."""
+    """Random generator, in its state after these points were drawn."""
 
 
 def yardstick_of(truth: RigTruth, seed: int = 0) -> Yardstick:
-    """The yardstick of a truth; ``seed`` draws the sample points."""
+    """Create the yardstick of a truth; ``seed`` draws the sample points."""
     scene, rng = triangle_scene(truth.vertices_m, truth.triangles), np.random.default_rng(seed)
     cameras = tuple(Camera(*one) for one in zip(truth.intrinsics, truth.T_world_camera, strict=True))
     points_m = sample_surface(truth.vertices_m, truth.triangles, _DRAWS_A_SAMPLE * SAMPLES, rng)
@@ -58,17 +58,17 @@ def compare_with_truth(
     cameras: Sequence[Camera],
     yardstick: Yardstick | None = None,
 ) -> dict[str, float]:
-    """Measures of a mesh beside the true surface.
+    """Measure a mesh against the true surface.
 
-    Registration knows the nodes' places only relative to each other, so the mesh is first moved to
-    where its first camera truly is.
+    Registration finds only the relative poses of the nodes, so the mesh is first moved so that its
+    first camera is at its true pose.
 
     Args:
-        vertices_m: (V, 3) world frame of ``cameras``.
-        triangles: (F, 3).
+        vertices_m: (V, 3) vertices in the world frame of ``cameras``.
+        triangles: (F, 3) vertex indices.
         truth: the true surface, poses and depth maps.
         cameras: one for each of the truth's, with the poses the mesh was made with.
-        yardstick: of this truth and these cameras, for those who compare many meshes; None makes one.
+        yardstick: yardstick of this truth, to compare many meshes faster; None creates one.
 
     Returns:
         For each of 1, 3 and 5 cm: ``coverage_1cm``, share of the true surface that a camera sees and
@@ -90,13 +90,13 @@ def compare_with_truth(
 
 
 def distances_to_truth_m(vertices_m: FloatArray, truth: RigTruth, cameras: Sequence[Camera]) -> FloatArray:
-    """(N,) distances of (N, 3) points to the true surface, after ``compare_with_truth``'s move."""
+    """Return (N,) distances of (N, 3) points to the true surface, moved as in ``compare_with_truth``."""
     true_scene = triangle_scene(truth.vertices_m, truth.triangles)
     return _distances_m(true_scene, _in_true_frame(vertices_m, truth, cameras))
 
 
 def _in_true_frame(vertices_m: FloatArray, truth: RigTruth, cameras: Sequence[Camera]) -> FloatArray:
-    """The points moved so that their first camera stands where it truly does."""
+    """Move the points so that their first camera is at its true pose."""
     return apply(truth.T_world_camera[0] @ inverse(cameras[0].T_world_camera), vertices_m)
 
 
@@ -133,7 +133,7 @@ def _ray_measures(
 def sample_surface(
     vertices_m: FloatArray, triangles: IntArray, count: int, rng: np.random.Generator
 ) -> FloatArray:
-    """(count, 3) points uniform by area on a mesh."""
+    """Draw (count, 3) points uniformly by area on a mesh."""
     area_m2 = triangle_areas_m2(vertices_m, triangles)
     a, b, c = vertices_m[triangles[rng.choice(len(triangles), count, p=area_m2 / area_m2.sum())]].swapaxes(
         0, 1
@@ -143,5 +143,5 @@ def sample_surface(
 
 
 def _distances_m(scene: o3d.t.geometry.RaycastingScene, points_m: FloatArray) -> FloatArray:
-    """(N,) exact distance of each point to the nearest triangle."""
+    """Return (N,) exact distance of each point to the nearest triangle."""
     return scene.compute_distance(tensor(points_m, np.float32)).numpy()

@@ -1,4 +1,4 @@
-"""Thinning a cloud to one averaged point a voxel."""
+"""Thinning of a cloud to one averaged point per voxel."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from pipeline.kernels.ordering import stable_order
 from pipeline.types import BoolArray, ByteArray, FloatArray, IntArray, PointCloud
 
 _COUNT_TOLERANCE = 0.02
-"""How near the wanted number of points is near enough, as a share of it."""
+"""Tolerance of the number of points, as a share of it."""
 _FINEST = 1e-6
 """Smallest voxel that is tried, as a share of the cloud's extent."""
 _MAX_TRIALS = 40
 
 
 def voxel_average(cloud: PointCloud, voxel_m: float) -> PointCloud:
-    """One point for every occupied cube of edge ``voxel_m``: the mean of its points.
+    """Replace the points in every occupied cube of edge ``voxel_m`` by their mean.
 
-    The cubes have a corner at the origin, so clouds in one frame are thinned on one grid, and the
+    The cubes have a corner at the origin, so clouds in one frame are thinned on one grid; the
     result is ordered by x, then y, then z of the cubes. Colours and sigmas are averaged, normals
-    averaged and made unit again; the source is that of the majority, the sensor's in a tie. Pixels
+    averaged and normalised; the source is that of the majority, the sensor's in a tie. Pixels
     have no mean and are dropped.
 
     Raises:
@@ -42,19 +42,19 @@ def voxel_average(cloud: PointCloud, voxel_m: float) -> PointCloud:
 
 
 def in_cubes_of(points_m: FloatArray, others_m: FloatArray, voxel_m: float) -> BoolArray:
-    """(M,) True for those of (M, 3) others in a cube of edge ``voxel_m`` with one of (N, 3) points."""
+    """Return (M,) True for each of (M, 3) others that shares a cube of edge ``voxel_m`` with a point."""
     keys = _cube_keys(np.concatenate([points_m, others_m]), voxel_m)
     return np.isin(keys[len(points_m) :], keys[: len(points_m)])
 
 
 def voxel_for_count(points_m: FloatArray, count: int, least_m: float = 0.0) -> float:
-    """The voxel edge, metres, that thins (N, 3) points to about ``count``, but at least ``least_m``.
+    """Find the voxel edge, metres, that thins (N, 3) points to about ``count``, but at least ``least_m``.
 
-    Tiny if there are no more points. Bisection that first guesses by the rule of surfaces, count ~ 1 /
-    voxel^2.
+    The edge is tiny if there are no more than ``count`` points. It is found by bisection with guesses from
+    count ~ 1 / voxel^2, the law for surfaces.
 
     Raises:
-        InputError: no point, or all in one place.
+        InputError: no point, or all coincident.
     """
     lower_m, upper_m = _bounds(np.ascontiguousarray(points_m, np.float64))
     extent_m = float((upper_m - lower_m).max())
@@ -81,13 +81,13 @@ def voxel_for_count(points_m: FloatArray, count: int, least_m: float = 0.0) -> f
 
 
 def _occupied(points_m: FloatArray, voxel_m: float) -> int:
-    """How many cubes hold one of (N, 3) points."""
+    """Count the cubes that contain at least one of (N, 3) points."""
     keys = _cube_keys(points_m, voxel_m)
     return 1 + int(np.count_nonzero(np.diff(keys[stable_order(keys)])))
 
 
 def _cube_keys(points_m: FloatArray, voxel_m: float) -> IntArray:
-    """(N,) one integer a cube of (N, 3) points, ascending in x, then y, then z."""
+    """Return (N,) integer key of each point's cube, ascending in x, then y, then z."""
     if not voxel_m > 0.0:
         raise InputError(f"The voxel size is {voxel_m} m; try a positive one, for example 0.01")
     if not len(points_m):
@@ -103,7 +103,7 @@ def _cube_keys(points_m: FloatArray, voxel_m: float) -> IntArray:
 
 @numba.njit(cache=True, nogil=True)
 def _bounds(points_m):  # type: ignore[no-untyped-def]
-    """(3,) least and (3,) greatest coordinates of (N, 3) points; NaN if any is not finite."""
+    """Return (3,) least and (3,) greatest coordinates of (N, 3) points; NaN if any is not finite."""
     least_m, most_m = np.full(3, np.inf), np.full(3, -np.inf)
     for row in range(len(points_m)):
         for axis in range(3):
@@ -116,7 +116,7 @@ def _bounds(points_m):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _keys(points_m, voxel_m, first, sizes):  # type: ignore[no-untyped-def]
-    """(N,) the cube of each of (N, 3) points in a grid of ``sizes`` that begins at cube ``first``."""
+    """Return (N,) cube of each of (N, 3) points in a grid of ``sizes`` that begins at cube ``first``."""
     keys = np.empty(len(points_m), np.int64)
     for row in range(len(points_m)):
         key = 0
@@ -127,14 +127,14 @@ def _keys(points_m, voxel_m, first, sizes):  # type: ignore[no-untyped-def]
 
 
 def _cubes(keys: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-    """(V,) first row of each cube by ascending key, (N,) each row's cube, and (V,) how many rows each has."""
+    """Return (V,) first row of each cube by ascending key, (N,) cube of each row, (V,) rows per cube."""
     first, cell, count, cubes = _in_order(keys, stable_order(keys))
     return first[:cubes], cell, count[:cubes]
 
 
 @numba.njit(cache=True, nogil=True)
 def _in_order(keys, order):  # type: ignore[no-untyped-def]
-    """The same, with room for as many cubes as there are keys, and how many there are."""
+    """Compute the arrays of ``_cubes``, as long as the keys, and the number of cubes."""
     first, cell, count = np.empty_like(order), np.empty_like(order), np.zeros_like(order)
     cubes = 0
     for place in range(len(order)):
@@ -149,7 +149,7 @@ def _in_order(keys, order):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _sums(column, cell, cells):  # type: ignore[no-untyped-def]
-    """(cells, K) float64 sums of the rows of an (N, K) column that are in each cell."""
+    """Return (cells, K) float64 sums, over each cell, of the rows of an (N, K) column."""
     sums = np.zeros((cells, column.shape[1]))
     for row in range(len(column)):
         for part in range(column.shape[1]):
@@ -158,6 +158,6 @@ def _sums(column, cell, cells):  # type: ignore[no-untyped-def]
 
 
 def _unit(vectors: FloatArray, fallback: FloatArray) -> FloatArray:
-    """Unit vectors; ``fallback`` where opposite ones cancelled out."""
+    """Normalise vectors; use ``fallback`` where opposite normals cancelled out."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     return np.where(length > 1e-6, vectors / np.maximum(length, 1e-6), fallback)

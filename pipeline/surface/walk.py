@@ -1,4 +1,4 @@
-"""The record of a rolling ball, pivot by pivot, which can be played forwards and backwards."""
+"""Record of ball pivoting, pivot by pivot, which can be replayed forwards and backwards."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from pipeline.surface.pivoting import BallPivotStep, iterate_roll
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 _NO_TURN_RAD = 1e-3
-"""A ball that turned back by less than this met its next point at once, but for rounding."""
+"""A backward turn smaller than this is rounding: the ball met its next point at once."""
 _REPORTED = 0.02
 _PLACES_TRIED = 100
 
 
 class Kind(IntEnum):
-    """What made a triangle."""
+    """Operation that made a triangle."""
 
     SEED = 0
-    """The ball was put down on three unused points."""
+    """The ball was placed on three unused points."""
     JOIN = 1
-    """It turned about an edge onto an unused point."""
+    """The ball pivoted about an edge onto an unused point."""
     GLUE = 2
-    """It turned onto a point of the front."""
+    """The ball pivoted about an edge onto a point of the front."""
 
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """All that a ball did, in the order in which it did it.
+    """All operations of the balls, in their order.
 
-    Half-edge 3 t + k starts at corner k of triangle t. It is open after n triangles if its own is among
-    them and ``glued_by`` is n or more. An open one is on the front after a step if ``left_front`` is beyond
-    that step; at any other, the ball has found nothing.
+    Half-edge 3 t + k starts at corner k of triangle t. It is open after n triangles if its own triangle is
+    among them and ``glued_by`` is n or more. An open half-edge is on the front after a step if ``left_front``
+    is beyond that step; about any other open half-edge the ball has found nothing.
     """
 
     vertices_m: FloatArray
@@ -46,38 +46,38 @@ class Walk:
     triangles: IntArray
     """(F, 3) int32, anticlockwise from the outside."""
     ball_centers_m: FloatArray
-    """(F, 3) where the ball lay that made each triangle."""
+    """(F, 3) centre of the ball that made each triangle."""
     radii_m: tuple[float, ...]
     radius_index: ByteArray
-    """(F,) which ball made each triangle."""
+    """(F,) index of the ball that made each triangle."""
     parent: IntArray
-    """(F,) int32 triangle from which the ball came, over its own first edge; -1 for a seed."""
+    """(F,) int32 triangle from which the ball came, over the new triangle's first edge; -1 for a seed."""
     kind: ByteArray
-    """(F,) what made each triangle, a ``Kind``."""
+    """(F,) ``Kind`` of each triangle."""
     start_m: FloatArray
     """(F, 3) centre of the same ball where it rested on the parent."""
     turn_rad: FloatArray
-    """(F,) how far it turned about the edge; 0 for a seed."""
+    """(F,) angle by which it pivoted about the edge; 0 for a seed."""
     step_ends: IntArray
-    """(S,) triangles after each step; the last step of every ball is the one that leaves no front."""
+    """(S,) number of triangles after each step; after the last step of every ball its front is empty."""
     step_radius: ByteArray
-    """(S,) which ball rolled."""
+    """(S,) index of the ball that rolled."""
     glued_by: IntArray
-    """(3 F,) int32 triangle that took a half-edge off the boundary, F for none."""
+    """(3 F,) int32 triangle that closed each half-edge; F for none."""
     left_front: IntArray
-    """(R, 3 F) int32 first step without the half-edge on each ball's front; 0 if no step ends with it."""
+    """(R, 3 F) int32 first step after which a half-edge is not on each ball's front; 0 if it never was."""
 
 
 def iterate_walk(
     points_m: FloatArray, normals: FloatArray | None, radii_m: Sequence[float], batch: int = 1
 ) -> Generator[Progress, None, Walk]:
-    """Roll balls over an oriented cloud and keep every step; see ``iterate_roll`` for the arguments.
+    """Roll balls over an oriented cloud and record every step; arguments as for ``iterate_roll``.
 
     Steps before the first triangle are left out.
 
     Raises:
         InputError: see ``iterate_roll``.
-        ReconstructionError: no ball finds three points to rest on.
+        ReconstructionError: no ball rests on three points.
     """
     radii_m = tuple(radii_m)
     steps: list[BallPivotStep] = []
@@ -99,13 +99,13 @@ def iterate_walk(
 
 
 def ball_on_arc(walk: Walk, triangle: int | IntArray, share: float) -> FloatArray:
-    """Centre of the ball on its way to a triangle, after a share from 0 to 1 of its turn about the edge.
+    """Return the ball's centre after a share (0 to 1) of its pivot to a triangle.
 
-    It turns from its rest on the parent about the line through the edge's ends (SPEC 5.2), so it touches
-    both all the while. On its way to a seed it is there already.
+    It pivots from its rest on the parent about the line through the edge's ends (SPEC 5.2), and touches
+    both throughout. For a seed it is always the final centre.
 
     Returns:
-        (3,), or (..., 3) for an array of triangles.
+        (3,) centre, or (..., 3) for an array of triangles.
     """
     middle_m, axis, _ = _edges(walk.vertices_m, walk.triangles[triangle])
     u_m = walk.start_m[triangle] - middle_m
@@ -114,10 +114,10 @@ def ball_on_arc(walk: Walk, triangle: int | IntArray, share: float) -> FloatArra
 
 
 def nearest_rows(points_m: FloatArray, center_m: FloatArray, count: int) -> IntArray:
-    """Indices, ascending, of the ``count`` points nearest to a place; all if there are fewer.
+    """Return the ascending indices of the ``count`` points nearest to a position; all if there are fewer.
 
     Raises:
-        InputError: the place is not finite.
+        InputError: the position is not finite.
     """
     if not np.isfinite(center_m).all():
         raise InputError(f"The place to look at is {center_m} m; try one inside the cloud")
@@ -128,13 +128,13 @@ def nearest_rows(points_m: FloatArray, center_m: FloatArray, count: int) -> IntA
 def hole_on_flat_ground(
     points_m: FloatArray, normals: FloatArray, triangles: IntArray, count: int
 ) -> FloatArray:
-    """(3,) a place where surface and hole meet and the points around lie as flat as possible.
+    """Find a point (3,) at the boundary of a hole where the surrounding points are as flat as possible.
 
     Args:
-        points_m: (N, 3).
-        normals: (N, 3).
-        triangles: (F, 3) of the surface.
-        count: points around it that are to be watched; flat is where their normals agree.
+        points_m: (N, 3) points.
+        normals: (N, 3) normals.
+        triangles: (F, 3) triangles of the surface.
+        count: number of surrounding points; flat means that their normals agree.
 
     Raises:
         InputError: there is no triangle.
@@ -177,7 +177,7 @@ def _walk_of(
 
 
 def _parents(twins: IntArray) -> IntArray:
-    """The triangle across each one's first edge, if it was there before."""
+    """Return the triangle across each triangle's first edge if it was made earlier, else -1."""
     across = twins[::3] // 3
     return np.where(across < np.arange(len(across)), across, -1).astype(np.int32)
 
@@ -198,7 +198,7 @@ def _glued_by(twins: IntArray) -> IntArray:
 def _left_front(
     triangles: IntArray, steps: Sequence[BallPivotStep], balls: ByteArray, radii: int
 ) -> IntArray:
-    """A half-edge is on one ball's front without a break, so its last step there is enough to know."""
+    """Compute ``left_front``: a half-edge is on a ball's front without interruption, so one step suffices."""
     left = np.zeros((radii, 3 * len(triangles)), np.int32)
     fronts = half_edges(triangles, np.concatenate([step.front_edges for step in steps]))
     ends = np.cumsum([len(step.front_edges) for step in steps])
@@ -210,7 +210,7 @@ def _left_front(
 def _arcs(
     vertices_m: FloatArray, triangles: IntArray, centers_m: FloatArray, radius_m: FloatArray, parent: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """(F, 3) where each ball set off, and (F,) how far it turned about its edge, right-handed."""
+    """Return (F, 3) start centre of each ball, and (F,) right-handed angle of its pivot about the edge."""
     start_m, turn_rad = centers_m.copy(), np.zeros(len(triangles))
     rolled = np.flatnonzero(parent >= 0)
     came = parent[rolled]
@@ -231,14 +231,14 @@ def _arcs(
 
 
 def _edges(vertices_m: FloatArray, triangles: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Middle, direction and half the length of the edges (second to first corner) about which a ball came."""
+    """Return middle, direction and half-length of the pivot edges (from second to first corner)."""
     a_m, b_m = vertices_m[triangles[..., 1]], vertices_m[triangles[..., 0]]
     length_m = np.linalg.norm(b_m - a_m, axis=-1)
     return 0.5 * (a_m + b_m), (b_m - a_m) / length_m[..., None], 0.5 * length_m
 
 
 def _resting_centers_m(corners_m: FloatArray, radius_m: FloatArray) -> FloatArray:
-    """(F, 3) centres of balls on (F, 3, 3) triangles, on the side they are anticlockwise from (SPEC 5.1)."""
+    """Return (F, 3) centres of balls on (F, 3, 3) triangles, on their anticlockwise side (SPEC 5.1)."""
     a_m, b_m, c_m = corners_m.swapaxes(0, 1)
     u, v = b_m - a_m, c_m - a_m
     normal = np.cross(u, v)

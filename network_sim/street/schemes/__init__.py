@@ -1,4 +1,4 @@
-"""Which images of passing vehicles are collected: our reconstruction (SPEC 6.2) of three schemes.
+"""Schemes that choose which images of passing vehicles are collected (our reconstruction, SPEC 6.2).
 
 They follow Bruno & Nurchis, "Efficient data collection in multimedia vehicular sensing platforms" (arXiv
 1311.6013), of which only the abstract and the first lines could be read.
@@ -16,7 +16,7 @@ from network_sim.types import to_ns
 
 
 def make_scheme(config: SchemeConfig, cells: int, rng: np.random.Generator) -> Scheme:
-    """The scheme of that name for cells numbered below ``cells``; ``rng`` draws the requests of PDC."""
+    """Create the scheme ``config.name`` for cell numbers below ``cells``; ``rng`` draws PDC's requests."""
     if config.name == "baseline":
         return Baseline()
     if config.name == "greedy":

@@ -1,9 +1,9 @@
 """GREEDY(k): the collector requests the images that add most coverage.
 
-Our reconstruction (SPEC 6.2) of the centralised scheme of Bruno & Nurchis (arXiv 1311.6013). A request has at
-least 1 - 1/e of the coverage of the best request with as many ids (Nemhauser, Wolsey & Fisher 1978); lazy
-evaluation is Minoux's (1978): gains only fall, so a gain that is still the largest after it was recomputed is
-the largest.
+This is our reconstruction (SPEC 6.2) of the centralised scheme of Bruno & Nurchis (arXiv 1311.6013). A
+request has at least 1 - 1/e of the coverage of the best request with as many ids (Nemhauser, Wolsey & Fisher
+1978). Gains are evaluated lazily (Minoux 1978): they never grow, so a gain that is the largest after its
+recomputation is the true maximum.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from network_sim.street.schemes.scheme import Scheme
 
 
 class Coverage:
-    """The images of a set by cell, and the gain of one more.
+    """Coverage of a set of images, and the gain of one more image.
 
     An image of cell c taken at tau covers c during [tau, tau + T_v). The utility of a set A is F(A) = sum
     over cells of the length of the union of its intervals: monotone and submodular.
@@ -29,7 +29,7 @@ class Coverage:
         self._taken_ns: defaultdict[int, list[int]] = defaultdict(list)
 
     def gain_ns(self, cell: int, captured_ns: int) -> int:
-        """F(A + a) - F(A). All intervals are equally long, so only the nearest on each side matter."""
+        """Return F(A + a) - F(A). All intervals have one length, so only the two nearest images matter."""
         taken = self._taken_ns[cell]
         after = bisect_right(taken, captured_ns)
         start_ns = captured_ns
@@ -41,11 +41,11 @@ class Coverage:
         return end_ns - start_ns if end_ns > start_ns else 0
 
     def add(self, cell: int, captured_ns: int) -> None:
-        """Add an image."""
+        """Add an image to the set."""
         insort(self._taken_ns[cell], captured_ns)
 
     def remove(self, cell: int, captured_ns: int) -> None:
-        """Remove an image that did not arrive."""
+        """Remove an image that did not arrive from the set."""
         taken = self._taken_ns[cell]
         del taken[bisect_left(taken, captured_ns)]
 
@@ -54,14 +54,14 @@ def select(coverage: Coverage, cells: list[int], captured_ns: list[int], k: int 
     """Choose the images with the largest gains, and count them as covered.
 
     Args:
-        coverage: What is covered already; the chosen images are added to it.
-        cells: (T,) cells of the images offered.
-        captured_ns: (T,) when they were taken.
-        k: Most images to choose; None does not limit it.
+        coverage: Coverage so far; the chosen images are added to it.
+        cells: (T,) cells of the offered images.
+        captured_ns: (T,) capture times of the offered images.
+        k: Most images to choose; None sets no limit.
 
     Returns:
-        Positions of the chosen images, by falling gain; the first offered of equal ones comes first. None
-        gains less than half a validity.
+        Indices of the chosen images, by falling gain; of equal gains the first offered comes first. Each
+        gain is at least half of the validity.
     """
     least_ns = coverage.validity_ns / 2
     gain_ns = coverage.gain_ns
@@ -81,16 +81,16 @@ def select(coverage: Coverage, cells: list[int], captured_ns: list[int], k: int 
 
 
 class Greedy(Scheme):
-    """Counts requested images as covered until they are reported missing."""
+    """The scheme GREEDY(k), which counts requested images as covered until they are reported missing."""
 
     def __init__(self, validity_ns: int, k: int | None) -> None:
         self.coverage = Coverage(validity_ns)
         self.k = k
 
     def wanted(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
-        """Positions of the images to ask for, best first."""
+        """Return the indices of the images to request, largest gain first."""
         return select(self.coverage, cells.tolist(), captured_ns.tolist(), self.k)
 
     def missed(self, cell: int, captured_ns: int) -> None:
-        """A requested image did not arrive."""
+        """Remove a requested image that did not arrive from the coverage."""
         self.coverage.remove(cell, captured_ns)

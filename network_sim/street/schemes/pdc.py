@@ -1,8 +1,8 @@
-"""PDC: each image is asked for with a probability that falls with how often its cell is seen.
+"""PDC: the collector requests each image with a probability that falls with the images of its cell.
 
-Our reconstruction (SPEC 6.2) of the scheme "on longer time scales" with "only localised decisions" of Bruno &
-Nurchis (arXiv 1311.6013). We read the thresholds as images of a cell in a control period, and count at the
-collector, to which all access points are wired.
+This is our reconstruction (SPEC 6.2) of the scheme "on longer time scales" with "only localised decisions" of
+Bruno & Nurchis (arXiv 1311.6013). We take the thresholds as images of a cell per control period, and count at
+the collector, to which all access points are wired.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ INCREASE = 0.1
 
 
 def probabilities(rates: np.ndarray, config: SchemeConfig) -> np.ndarray:
-    """Request probability p of each cell: 1 up to r_L, one cover from r_H on, linear between, and a floor.
+    """Compute request probabilities p: 1 up to r_L, then linear to r_H, then just enough to cover a cell.
 
     Args:
         rates: (C,) mean number of images offered in a control period.
@@ -36,16 +36,16 @@ def probabilities(rates: np.ndarray, config: SchemeConfig) -> np.ndarray:
 
 
 def adapted(previous: np.ndarray, rates: np.ndarray, config: SchemeConfig) -> np.ndarray:
-    """The next p of each cell: times DECREASE above r_H received images, plus INCREASE below r_L."""
+    """Compute each cell's next p: times DECREASE above r_H received images, plus INCREASE below r_L."""
     fewer = np.where(rates > config.r_high, previous * DECREASE, previous)
     return np.clip(np.where(rates < config.r_low, fewer + INCREASE, fewer), FLOOR, 1.0)
 
 
 class Pdc(Scheme):
-    """Counts images by cell and control period, over the observation period."""
+    """The scheme PDC, with counts of images by cell and control period over the observation period."""
 
     def __init__(self, config: SchemeConfig, cells: int, rng: np.random.Generator) -> None:
-        """``cells`` is one more than the largest number of a cell."""
+        """Start with probability 1 for all cells, which have numbers below ``cells``."""
         self.config = config
         self.probabilities = np.ones(cells)
         self._rng = rng
@@ -57,14 +57,14 @@ class Pdc(Scheme):
         self._by_received = config.name == "pdc-received"
 
     def wanted(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
-        """Positions of the images to ask for, oldest first."""
+        """Return the indices of the images to request, oldest first."""
         self._advance(now_ns)
         if not self._by_received:
             np.add.at(self._counts[self._period % len(self._counts)], cells, 1)
         return np.flatnonzero(self._rng.random(len(cells)) < self.probabilities[cells]).tolist()
 
     def received(self, cell: int, now_ns: int) -> None:
-        """An image arrived."""
+        """Count an image that arrived (pdc-received only)."""
         if self._by_received:
             self._advance(now_ns)
             self._counts[self._period % len(self._counts), cell] += 1

@@ -1,4 +1,4 @@
-"""What a scheme decides; and BASELINE, with which every image is uploaded, whatever it shows (SPEC 6.2)."""
+"""Interface of the schemes, and BASELINE, with which vehicles upload every image (SPEC 6.2)."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ class Scheme:
     """Decides which of the offered images the collector requests."""
 
     asks = True
-    """Images come only on request."""
+    """Vehicles upload images only on request."""
 
     def wanted(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
-        """Positions of the images to upload, in that order, of those that a summary offers (T,)."""
+        """Return the indices, in upload order, of the images to upload of those in a summary (T,)."""
         raise NotImplementedError
 
     def received(self, cell: int, now_ns: int) -> None:
-        """An image arrived."""
+        """Learn that an image arrived."""
 
     def missed(self, cell: int, captured_ns: int) -> None:
-        """A requested image did not arrive."""
+        """Learn that a requested image did not arrive."""
 
 
 class Baseline(Scheme):
-    """Sends summaries as the other schemes do, to be comparable, but images need no request."""
+    """Uploads every image without a request; summaries are sent too, to be comparable."""
 
     asks = False
 
     def wanted(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
-        """All offered images, oldest first."""
+        """Return the indices of all offered images, oldest first."""
         return list(range(len(cells)))

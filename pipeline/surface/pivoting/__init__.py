@@ -1,4 +1,4 @@
-"""Ball pivoting (Bernardini et al. 1999, SPEC 5): compiled, resumable, watchable, one batch at a time."""
+"""Ball pivoting (Bernardini et al. 1999, SPEC 5): compiled, resumable, in batches that can be displayed."""
 
 from pipeline.surface.pivoting.roller import (
     ALL_AT_ONCE,

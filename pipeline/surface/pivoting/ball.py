@@ -1,4 +1,4 @@
-"""The ball that rests on three points."""
+"""Geometry of a ball that rests on three points."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from pipeline.surface.pivoting.compiled import compiled
 from pipeline.surface.pivoting.grid import gather
 
 TIE = 1e-12
-"""Depths below this share of the radius are rounding: such a point lies on the ball, not inside."""
+"""Penetration depth, as a share of the radius, up to which a point is on the ball, not inside (rounding)."""
 _TOUCH = 1e-10
-"""Where rounding moves a ball's surface further from its three points than this share, none is made."""
+"""Largest distance of a ball's surface from its three points, as a share of the radius (rounding)."""
 
 
 @compiled
 def ball_center(points, a, b, c, radius):  # type: ignore[no-untyped-def]
-    """(x, y, z, exists): centre of the ball through three points, on the side they are anticlockwise from.
+    """Return (x, y, z, exists): centre of the ball through three points, on their anticlockwise side.
 
-    SPEC 5.1: the circumcentre plus sqrt(radius^2 - R^2) along the triangle's normal.
+    It is the circumcentre plus sqrt(radius^2 - R^2) along the triangle's normal (SPEC 5.1).
     """
     ux, uy, uz = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
     vx, vy, vz = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1], points[c, 2] - points[a, 2]
@@ -44,14 +44,14 @@ def ball_center(points, a, b, c, radius):  # type: ignore[no-untyped-def]
 
 @compiled
 def is_on(points, p, x, y, z, radius):  # type: ignore[no-untyped-def]
-    """Whether a point lies on a ball, but for rounding."""
+    """Return whether a point is on a ball, up to rounding."""
     dx, dy, dz = points[p, 0] - x, points[p, 1] - y, points[p, 2] - z
     return abs(np.sqrt(dx * dx + dy * dy + dz * dz) - radius) <= _TOUCH * radius
 
 
 @compiled
 def is_empty(grid, found, a, b, c, x, y, z, radius):  # type: ignore[no-untyped-def]
-    """Whether no point of the cloud but a, b and c lies inside a ball."""
+    """Return whether no point of the cloud other than a, b and c is inside a ball."""
     for n in range(gather(grid, x, y, z, radius * (1.0 - TIE), found)):
         p = grid.ids[found[n]]
         if p != a and p != b and p != c:
@@ -61,7 +61,7 @@ def is_empty(grid, found, a, b, c, x, y, z, radius):  # type: ignore[no-untyped-
 
 @compiled
 def agrees(points, normals, a, b, c):  # type: ignore[no-untyped-def]
-    """Whether the triangle's normal has a positive dot product with those of its three points."""
+    """Return whether the triangle's normal has a positive dot product with those of its three points."""
     ux, uy, uz = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
     vx, vy, vz = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1], points[c, 2] - points[a, 2]
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx

@@ -1,8 +1,8 @@
-"""Which empty balls can touch a point: its Voronoi cell, cut only as far as a ball reaches.
+"""Voronoi cell of a point, clipped within a ball's reach, to find the empty balls that touch the point.
 
-An empty ball of some radius touches point p where the cell has a point at that distance from p. The
-cell is convex, so there is one only if a corner is that far away or farther; and the ball rests on two
-more points where an edge of the cell is at that distance, so these two belong to such a corner.
+An empty ball of a given radius touches point p if its centre is a point of p's cell at that distance
+from p. The cell is convex, so there is such a centre only if a corner is at least that far away. The ball
+rests on two more points if its centre is on an edge of the cell; these two points belong to such a corner.
 """
 
 from __future__ import annotations
@@ -16,34 +16,34 @@ from pipeline.surface.pivoting.compiled import compiled
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 BOX = 6
-"""The first planes are the sides of a box, the others belong to points."""
+"""Number of planes of the initial box, which come first; the other planes belong to points."""
 _MOST_PLANES = 128
 _MOST_CORNERS = 512
 _BOX_REACH = 1.5
-"""Half the box's side over the ball's radius."""
+"""Ratio of half the box's side to the ball's radius."""
 
 
 class Cell(NamedTuple):
-    """Scratch for one half of a cell, with its point as origin; corners are where three planes meet."""
+    """Work arrays for one half of a cell, with its point as origin; three planes meet at each corner."""
 
     planes: FloatArray
-    """(P, 4): n and h of n . x <= h."""
+    """(P, 4) planes: n and h of n . x <= h."""
     rows: IntArray
-    """(P,) which neighbour made each plane."""
+    """(P,) neighbour of each plane."""
     corners: IntArray
-    """(C, 3) planes, anticlockwise from the outside."""
+    """(C, 3) planes of each corner, anticlockwise from the outside."""
     at: FloatArray
-    """(C, 4) place of each corner, and its squared distance from the origin."""
+    """(C, 4) position of each corner, and its squared distance from the origin."""
     final: BoolArray
     """(C,) True where no neighbour cuts the corner off."""
     cut: BoolArray
-    """(P, P) edges of the corners that are being cut off, all False in between."""
+    """(P, P) edges of the corners that are being cut off; all False between two cuts."""
     counts: IntArray
-    """(2,) planes and corners."""
+    """(2,) numbers of planes and corners."""
 
 
 def new_cell() -> Cell:
-    """Room for one cell at a time."""
+    """Allocate the arrays of a cell, which can be reused for many points."""
     return Cell(
         np.empty((_MOST_PLANES, 4)),
         np.empty(_MOST_PLANES, np.int32),
@@ -57,7 +57,7 @@ def new_cell() -> Cell:
 
 @compiled
 def begin(cell, nx, ny, nz, radius):  # type: ignore[no-untyped-def]
-    """A box that contains the ball's possible centres on one side of the origin, that of a unit vector n."""
+    """Start with a half box that contains the ball's possible centres on the side of a unit vector n."""
     sign = 1.0 if nz >= 0.0 else -1.0
     a = -1.0 / (sign + nz)  # orthonormal basis of Duff et al. 2017
     b = nx * ny * a
@@ -85,10 +85,10 @@ def _set_plane(cell, plane, x, y, z):  # type: ignore[no-untyped-def]
 
 @compiled
 def shrink(cell, near, count, radius, wanted):  # type: ignore[no-untyped-def]
-    """Cut by the (count, 4) neighbours x, y, z, |x|^2 / 2 until every far corner is final; how many are.
+    """Cut by the (count, 4) neighbours x, y, z, |x|^2 / 2 until every far corner is final; count these.
 
-    Far is ``radius`` or more. Each cut is by the neighbour nearest to the farthest corner. Stops when
-    ``wanted`` corners are final, or -1 where there is no room for more.
+    Far means at least ``radius``. Each cut is by the neighbour nearest to the farthest corner. It stops
+    when ``wanted`` corners are final, and returns -1 if the arrays are full.
     """
     far2 = radius * radius * (1.0 - 1e-9)
     while True:
@@ -115,7 +115,7 @@ def shrink(cell, near, count, radius, wanted):  # type: ignore[no-untyped-def]
 
 @compiled
 def _clip(cell, near, row):  # type: ignore[no-untyped-def]
-    """Cut off what is nearer to a neighbour than to the origin; False if there is no room."""
+    """Cut off the part that is nearer to a neighbour than to the origin; False if the arrays are full."""
     new = cell.counts[0]
     if new == _MOST_PLANES or 2 * cell.counts[1] + new > _MOST_CORNERS:
         return False
@@ -125,7 +125,7 @@ def _clip(cell, near, row):  # type: ignore[no-untyped-def]
         cell.planes[new, axis] = near[row, axis]
     x, y, z, h = near[row, 0], near[row, 1], near[row, 2], near[row, 3]
     kept, count = 0, cell.counts[1]
-    for n in range(count):  # those to be cut off go to the end
+    for n in range(count):  # move the corners to cut off to the end
         if cell.at[n, 0] * x + cell.at[n, 1] * y + cell.at[n, 2] * z <= h:
             _swap(cell, n, kept)
             kept += 1
@@ -157,7 +157,7 @@ def _swap(cell, m, n):  # type: ignore[no-untyped-def]
 
 @compiled
 def _add_corner(cell, a, b, c):  # type: ignore[no-untyped-def]
-    """The corner where three planes meet; at the origin if they do not."""
+    """Add the corner where three planes meet; it is at the origin if they do not meet in a point."""
     ax, ay, az, ah = cell.planes[a, 0], cell.planes[a, 1], cell.planes[a, 2], cell.planes[a, 3]
     bx, by, bz, bh = cell.planes[b, 0], cell.planes[b, 1], cell.planes[b, 2], cell.planes[b, 3]
     cx, cy, cz, ch = cell.planes[c, 0], cell.planes[c, 1], cell.planes[c, 2], cell.planes[c, 3]

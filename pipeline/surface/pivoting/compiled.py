@@ -1,12 +1,12 @@
-"""How the functions of this package are compiled."""
+"""The decorator with which the functions of this package are compiled."""
 
 from __future__ import annotations
 
 import numba
 
 compiled = numba.njit(cache=True, nogil=True, _nrt=False)  # type: ignore[call-overload]
-"""Compiled once, for use without the interpreter's lock, and without counting references.
+"""Compile once, with caching, without the interpreter's lock and without reference counts.
 
-numba counts the references to an array whenever a function takes one out of a record. As the counter is
-shared among threads that is slow beside a little geometry. What makes no array of its own may do without.
+numba counts the references to an array whenever a function takes one out of a record. The counter is shared
+by all threads, so this is slow compared with the geometry. Functions that create no array do not need it.
 """

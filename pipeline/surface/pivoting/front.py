@@ -1,8 +1,8 @@
-"""The growing mesh and its front, as half-edges in arrays.
+"""The growing mesh and its front, stored as half-edges in arrays.
 
-Half-edge 3 t + k leads from corner k of triangle t to its next corner. The front is the half-edges
-without a twin. Gluing two of them is setting their twins: whether that closes a loop of two, shortens
-a loop, splits one or merges two (the four cases of Bernardini et al. 1999) follows from the twins.
+Half-edge 3 t + k leads from corner k of triangle t to its next corner. The front consists of the
+half-edges without a twin. To glue two half-edges, their twins are set; the four cases of Bernardini et
+al. 1999 (a loop of two is closed, a loop is shortened or split, two are merged) need no extra code.
 """
 
 from __future__ import annotations
@@ -15,40 +15,40 @@ from pipeline.surface.pivoting.compiled import compiled
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 FACES, HEAD, TAIL, CURSOR, SETTLED = range(5)
-"""Places in ``Front.counts``: triangles; the queue from head to tail; next seed; points used or given up."""
+"""Indices in ``Front.counts``: triangles; head and tail of the queue; next seed; points used or given up."""
 
 
 class Front(NamedTuple):
-    """State of the algorithm between two balls; arrays of length F have room for more triangles."""
+    """State of the algorithm; arrays of length F have room for more triangles."""
 
     triangles: IntArray
     """(F, 3) int32, anticlockwise from the outside."""
     centers_m: FloatArray
     """(F, 3) centre of the ball that made each triangle."""
     pivots_m: FloatArray
-    """(F, 3) centre of the ball of the present radius on it."""
+    """(F, 3) centre of the ball of the current radius on each triangle."""
     radius_index: ByteArray
-    """(F,) which radius made it."""
+    """(F,) index of the radius that made each triangle."""
     twin: IntArray
     """(3 F,) opposite half-edge, -1 on the front."""
     end: IntArray
-    """(3 F,) point where each half-edge ends."""
+    """(3 F,) end point of each half-edge."""
     following: IntArray
     """(3 F,) next half-edge that starts at the same point, -1 for none."""
     outgoing: IntArray
     """(N,) first half-edge from each point, -1 for an unused point."""
     open_count: IntArray
-    """(N,) half-edges from each point that are on the front."""
+    """(N,) number of half-edges from each point that are on the front."""
     given_up: ByteArray
-    """(N,) 1 where no ball of the present radius makes a seed."""
+    """(N,) 1 where no ball of the current radius makes a seed."""
     queue: IntArray
     """(3 F,) half-edges to pivot about."""
     counts: IntArray
-    """(5,)."""
+    """(5,) counters, indexed by ``FACES`` to ``SETTLED``."""
 
 
 def new_front(n_points: int) -> Front:
-    """No triangle yet."""
+    """Create a front without triangles."""
     room = 2 * n_points + 64
     return Front(
         triangles=np.empty((room, 3), np.int32),
@@ -67,7 +67,7 @@ def new_front(n_points: int) -> Front:
 
 
 def grown(front: Front) -> Front:
-    """The same front with room for half as many triangles more."""
+    """Return the same front with 50 % more room for triangles."""
     per_point = ("outgoing", "open_count", "given_up", "counts")
     longer = {
         name: np.concatenate([array, np.empty_like(array[: len(array) // 2 + 1])])
@@ -81,7 +81,7 @@ def grown(front: Front) -> Front:
 
 @compiled
 def find(front, a, b):  # type: ignore[no-untyped-def]
-    """The half-edge from a to b, -1 for none."""
+    """Return the half-edge from a to b, -1 for none."""
     edge = front.outgoing[a]
     while edge >= 0 and front.end[edge] != b:
         edge = front.following[edge]
@@ -90,7 +90,7 @@ def find(front, a, b):  # type: ignore[no-untyped-def]
 
 @compiled
 def can_join(front, a, x, b):  # type: ignore[no-untyped-def]
-    """Whether half-edges a to x and x to b may be added: x is not interior, and the edges are free."""
+    """Return whether half-edges a to x and x to b may be added: x is not interior, both edges are free."""
     if front.outgoing[x] < 0:
         return True
     return front.open_count[x] > 0 and find(front, a, x) < 0 and find(front, x, b) < 0
@@ -98,7 +98,7 @@ def can_join(front, a, x, b):  # type: ignore[no-untyped-def]
 
 @compiled
 def add_triangle(front, a, b, c, x, y, z, radius_index):  # type: ignore[no-untyped-def]
-    """Add a triangle with its ball's centre, glue its edges to the front, queue those that are new on it."""
+    """Add a triangle with its ball's centre, glue its edges to the front, and queue its new front edges."""
     t = front.counts[FACES]
     front.counts[FACES] += 1
     front.triangles[t, 0], front.triangles[t, 1], front.triangles[t, 2] = a, b, c

@@ -1,4 +1,4 @@
-"""Points in cells: which of them lie near a place, in constant time and linear memory."""
+"""Grid of cells to find the points near a position in constant time and linear memory."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ _FARTHEST = 2.0**60
 
 
 class Grid(NamedTuple):
-    """Points sorted by the cell they lie in.
+    """Points sorted by their cells.
 
-    The number of cells along an axis is a power of two and bounded; what lies beyond the last cell
-    starts again at the first. So a few points far away cost neither memory nor time.
+    The number of cells along an axis is a bounded power of two; the grid repeats periodically beyond
+    the last cell. So a few points far away cost neither memory nor time.
     """
 
     points_m: FloatArray
-    """(n, 3), the points of one cell next to each other."""
+    """(n, 3) points, ordered by cell."""
     ids: IntArray
-    """(n,) index of each in the cloud."""
+    """(n,) index of each point in the cloud."""
     starts: IntArray
     """(cells + 1,) first row of every cell; x runs fastest, then y, then z."""
     first: IntArray
-    """(3,) first occupied cell on each axis, counted from the origin, before starting again."""
+    """(3,) first occupied cell on each axis, counted from the origin, without the periodic repetition."""
     last: IntArray
-    """(3,) last one."""
+    """(3,) last occupied cell on each axis."""
     sizes: IntArray
-    """(3,) cells on each axis."""
+    """(3,) number of cells on each axis."""
     cell_m: float
 
 
 def build_grid(points_m: FloatArray, ids: IntArray, cell_m: float) -> Grid:
-    """The grid of the points ``ids`` of a cloud, with cubic cells."""
+    """Build the grid of the points ``ids`` of a cloud, with cubic cells."""
     kept_m = points_m[ids]
     first = np.array([_cell(low_m, cell_m) for low_m in kept_m.min(axis=0)])
     last = np.array([_cell(high_m, cell_m) for high_m in kept_m.max(axis=0)])
@@ -53,13 +53,13 @@ def build_grid(points_m: FloatArray, ids: IntArray, cell_m: float) -> Grid:
 
 @compiled
 def _cell(place_m, cell_m):  # type: ignore[no-untyped-def]
-    """The cell of a coordinate, counted from the origin."""
+    """Return the cell of a coordinate, counted from the origin."""
     return np.int64(np.floor(min(max(place_m / cell_m, -_FARTHEST), _FARTHEST)))
 
 
 @numba.njit(cache=True, nogil=True)
 def _sort(points_m, sizes, cell_m):  # type: ignore[no-untyped-def]
-    """Counting sort: the order of the points by cell, and where each cell starts."""
+    """Sort the points by cell (counting sort); returns the order, and the first row of each cell."""
     keys = np.empty(len(points_m), np.int64)
     starts = np.zeros(sizes[0] * sizes[1] * sizes[2] + 1, np.int32)
     for n in range(len(points_m)):
@@ -80,14 +80,14 @@ def _sort(points_m, sizes, cell_m):  # type: ignore[no-untyped-def]
 
 @compiled
 def _cells(low_m, high_m, first, last, size, cell_m):  # type: ignore[no-untyped-def]
-    """First and last cell of an interval on one axis, each of the grid's cells at most once."""
+    """Return first and last cell of an interval on one axis, with each of the grid's cells at most once."""
     low, high = max(_cell(low_m, cell_m), first), min(_cell(high_m, cell_m), last)
     return low, min(high, low + size - 1)
 
 
 @compiled
 def gather(grid, x, y, z, reach_m, found):  # type: ignore[no-untyped-def]
-    """Fills ``found`` with the rows of the grid's points within a distance of a place; how many."""
+    """Fill ``found`` with the rows of the points within a distance of a position; returns their number."""
     points, starts, first, last, cell_m = grid.points_m, grid.starts, grid.first, grid.last, grid.cell_m
     size_x, size_y, size_z = grid.sizes[0], grid.sizes[1], grid.sizes[2]
     i0, i1 = _cells(x - reach_m, x + reach_m, first[0], last[0], size_x, cell_m)
@@ -111,7 +111,7 @@ def gather(grid, x, y, z, reach_m, found):  # type: ignore[no-untyped-def]
 
 @compiled
 def _select(points, begin, end, x, y, z, reach_m, found, count):  # type: ignore[no-untyped-def]
-    """Append those of a run of rows that lie within a distance; how many there are then."""
+    """Append those rows from ``begin`` to ``end`` that are within a distance; returns the new count."""
     for row in range(begin, end):
         dx, dy, dz = points[row, 0] - x, points[row, 1] - y, points[row, 2] - z
         found[count] = row

@@ -1,4 +1,4 @@
-"""The circle on which a ball's centre goes when the ball turns about an edge, and what it meets there."""
+"""Circular path of a ball's centre when it pivots about an edge, and the first point that it meets."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from pipeline.surface.pivoting.compiled import compiled
 
 @compiled
 def orbit(points, a, b, toward_x, toward_y, toward_z, radius):  # type: ignore[no-untyped-def]
-    """Frame of the circle about edge a to b: its middle, axis u, axis v, radius, and half the edge squared.
+    """Return the circle about edge a to b: middle, axis u, axis v, radius, and squared half of the edge.
 
-    Angle 0, along u, is in the direction given (from the edge's middle); angles grow towards v, which
-    is where a ball on a triangle to the left of the edge goes. Its radius is 0 if there is no circle.
+    Angle 0, along u, is in the given direction from the edge's middle; angles grow towards v, the way a
+    ball on a triangle to the left of the edge pivots. The radius is 0 if there is no circle.
     """
     tx, ty, tz = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
     length2 = tx * tx + ty * ty + tz * tz
@@ -34,7 +34,7 @@ def orbit(points, a, b, toward_x, toward_y, toward_z, radius):  # type: ignore[n
 
 @compiled
 def center_at(frame, cosine, sine):  # type: ignore[no-untyped-def]
-    """(x, y, z) of the ball's centre at an angle."""
+    """Return (x, y, z) of the ball's centre at an angle."""
     mx, my, mz, ux, uy, uz, vx, vy, vz, size, _ = frame
     s, t = size * cosine, size * sine
     return mx + s * ux + t * vx, my + s * uy + t * vy, mz + s * uz + t * vz
@@ -42,10 +42,10 @@ def center_at(frame, cosine, sine):  # type: ignore[no-untyped-def]
 
 @compiled
 def in_plane(frame, x, y, z):  # type: ignore[no-untyped-def]
-    """(px, py, level, flat2, rest2) of a point, which is on the ball where px cos + py sin = level.
+    """Return (px, py, level, flat2, rest2) of a point; it is on the ball where px cos + py sin = level.
 
-    (px, py) is the point in the plane of the circle, measured from its middle, with squared length
-    flat2; and rest2 = flat2 - level^2 is negative where the ball never gets onto the point.
+    (px, py) is the point projected into the circle's plane, relative to its middle, with squared length
+    flat2; rest2 = flat2 - level^2 is negative if the ball never touches the point.
     """
     mx, my, mz, ux, uy, uz, vx, vy, vz, size, half2 = frame
     dx, dy, dz = x - mx, y - my, z - mz
@@ -57,7 +57,7 @@ def in_plane(frame, x, y, z):  # type: ignore[no-untyped-def]
 
 @compiled
 def _is_before(cosine, sine, other_cosine, other_sine):  # type: ignore[no-untyped-def]
-    """Whether an angle from 0 to 2 pi is smaller than another, given multiples of their cosines and sines."""
+    """Return whether one angle in [0, 2 pi) is smaller than another, from scaled cosines and sines."""
     if (sine < 0.0) != (other_sine < 0.0):
         return other_sine < 0.0
     return sine * other_cosine < cosine * other_sine
@@ -65,9 +65,9 @@ def _is_before(cosine, sine, other_cosine, other_sine):  # type: ignore[no-untyp
 
 @compiled
 def first_met(grid, rows, count, a, b, frame):  # type: ignore[no-untyped-def]
-    """(row, cosine, sine) where an empty ball turning from angle 0 first comes onto a point; or row = -1.
+    """Return (row, cosine, sine) of the first point that an empty ball meets from angle 0; row -1 if none.
 
-    A point ahead that the ball touches already, or overlaps by rounding, is met at once.
+    A point ahead that the ball already touches, or overlaps by rounding, is met at once.
     """
     hit, first_cosine, first_sine, first_scale = -1, 1.0, 0.0, 1.0
     tie = TIE * np.sqrt(frame[9] * frame[9] + frame[10])

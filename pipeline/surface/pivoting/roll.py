@@ -1,4 +1,4 @@
-"""The compiled main loop: pivot about the front's edges, then put the ball down elsewhere."""
+"""The compiled main loop: pivot about the front's edges, then place the ball on a new seed."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from pipeline.surface.pivoting.orbit import center_at, first_met, orbit
 from pipeline.surface.pivoting.seed import find_seed
 
 _NEAR = 1.0
-"""The first search about an edge finds balls that moved by up to this many edge lengths."""
+"""The first search about an edge covers balls that move by up to this many edge lengths."""
 
 
 @compiled
 def advance(points, normals, grid, front, scratch, radius, radius_index, limit):  # type: ignore[no-untyped-def]
-    """Roll on until there are ``limit`` triangles; True when this ball can go nowhere any more."""
+    """Continue rolling until there are ``limit`` triangles; True if this ball can make no more."""
     counts = front.counts
     while counts[FACES] < limit:
         if counts[HEAD] < counts[TAIL]:
@@ -42,7 +42,7 @@ def advance(points, normals, grid, front, scratch, radius, radius_index, limit):
 
 @compiled
 def restart(points, grid, front, scratch, radius):  # type: ignore[no-untyped-def]
-    """Begin with a larger ball: queue the front's edges on whose triangle it finds an empty place."""
+    """Start with a larger ball: queue the front's edges on whose triangle it can rest empty."""
     counts = front.counts
     counts[HEAD], counts[TAIL], counts[CURSOR], counts[SETTLED] = 0, 0, 0, 0
     for p in range(len(front.outgoing)):
@@ -64,7 +64,7 @@ def restart(points, grid, front, scratch, radius):  # type: ignore[no-untyped-de
 
 @compiled
 def _roll_over(points, normals, grid, front, found, edge, radius, radius_index):  # type: ignore[no-untyped-def]
-    """Pivot about one edge and join what stops the ball; otherwise the edge stays as boundary."""
+    """Pivot about one edge and join the point that stops the ball; otherwise the edge stays boundary."""
     t = edge // 3
     a, b = front.triangles[t, edge - 3 * t], front.end[edge]
     hit, x, y, z = pivot(points, grid, found, a, b, front.pivots_m[t], radius)
@@ -79,13 +79,13 @@ def _roll_over(points, normals, grid, front, found, edge, radius, radius_index):
 
 @compiled
 def pivot(points, grid, found, a, b, center, radius):  # type: ignore[no-untyped-def]
-    """(hit, x, y, z): the point that stops a ball turning about the edge a to b, and its centre there.
+    """Return (hit, x, y, z): the point that stops a ball pivoting about edge a to b, and the ball's centre.
 
-    The ball rests on a triangle to the left of the edge and turns to the right. Only points near the
-    ball are looked at first: what they stop within that distance, nothing farther can stop before.
+    The ball rests on a triangle to the left of the edge and pivots to the right. Points near the ball are
+    tested first: if one stops it within that distance, no farther point can stop it earlier.
 
     Returns:
-        hit = -1 if nothing stops it.
+        hit is -1 if no point stops the ball.
     """
     toward_x = center[0] - 0.5 * (points[a, 0] + points[b, 0])
     toward_y = center[1] - 0.5 * (points[a, 1] + points[b, 1])

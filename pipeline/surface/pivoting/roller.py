@@ -1,4 +1,4 @@
-"""Ball pivoting of our own: arrays in, records out; runs in batches that can be shown and cancelled."""
+"""Our implementation of ball pivoting: arrays in, records out, in batches that can be shown and cancelled."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from pipeline.surface.pivoting.seed import new_scratch
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 ALL_AT_ONCE = 1 << 30
-"""A batch that no ball's triangles fill."""
+"""Batch size that is larger than any number of triangles."""
 _JITTER = 1e-10
-"""Points move by up to this share of the first radius, so that no four lie on one ball exactly."""
+"""Points are moved by up to this share of the first radius, so that no four are exactly on one ball."""
 _CELL = 2.0
-"""Edge of a grid cell over the ball's radius."""
+"""Ratio of a grid cell's edge to the ball's radius."""
 _MOST_RADII = 256
 
 
@@ -32,36 +32,36 @@ class Rolled:
     triangles: IntArray
     """(F, 3) int32 point indices, anticlockwise from the outside."""
     radius_index: ByteArray
-    """(F,) uint8, which of the radii made each."""
+    """(F,) uint8 index of the radius that made each triangle."""
     ball_centers_m: FloatArray
-    """(F, 3) where the ball lay that made it."""
+    """(F, 3) centre of the ball that made each triangle."""
 
 
 @dataclass(frozen=True, slots=True)
 class BallPivotStep:
-    """What some pivots added, and where the front is now."""
+    """New triangles of one batch, and the current front."""
 
     triangles: IntArray
-    """(k, 3) int32, new since the batch before."""
+    """(k, 3) int32 triangles that are new since the previous batch."""
     ball_centers_m: FloatArray
-    """(k, 3)."""
+    """(k, 3) centres of the balls that made them."""
     radius_m: float
     front_edges: IntArray
     """(e, 2) int32 point indices of the active edges, each with its triangle on the left."""
     progress: float
-    """0 to 1."""
+    """Progress from 0 to 1."""
 
 
 class Roller:
     """Rolls balls of growing radius over an oriented cloud (Bernardini et al. 1999, SPEC 5).
 
-    Memory is linear in the number of points. Points are moved by a fixed random 1e-10 of the first
-    radius at most, which decides consistently between the triangulations of points on one ball.
+    Memory is linear in the number of points. Points are moved by a fixed random amount, at most 1e-10 of
+    the first radius, which decides consistently between the triangulations of points on one ball.
     Repeated points count once.
 
     Args:
-        points_m: (N, 3).
-        normals: (N, 3) towards the outside; a zero normal keeps its point out.
+        points_m: (N, 3) points.
+        normals: (N, 3) normals towards the outside; points with a zero normal are not used.
 
     Raises:
         InputError: fewer than three points, no normals, or a point that is not finite.
@@ -75,7 +75,7 @@ class Roller:
         if not np.isfinite(points_m).all():
             raise InputError("A point of the cloud is not finite; remove such points first")
         points_m = np.asarray(points_m, dtype=np.float64)
-        self._middle_m = np.median(points_m, axis=0)  # near it, numbers are finest
+        self._middle_m = np.median(points_m, axis=0)  # as origin, for numerical precision
         self._points_m = points_m - self._middle_m
         self._normals = np.ascontiguousarray(normals, dtype=np.float64)
         self._ids = distinct_rows(points_m)
@@ -86,7 +86,7 @@ class Roller:
 
     @property
     def rolled(self) -> Rolled:
-        """The triangles so far (copies)."""
+        """Copies of all triangles so far."""
         front, count = self._front, self._front.counts[FACES]
         return Rolled(
             front.triangles[:count].copy(),
@@ -96,14 +96,14 @@ class Roller:
 
     @property
     def front_edges(self) -> IntArray:
-        """(e, 2) int32 edges that the present ball has yet to pivot about."""
+        """(e, 2) int32 edges about which the current ball has yet to pivot."""
         front = self._front
         waiting = front.queue[front.counts[HEAD] : front.counts[TAIL]]
         waiting = waiting[front.twin[waiting] < 0]
         return np.stack([front.triangles.reshape(-1)[waiting], front.end[waiting]], axis=1)
 
     def roll(self, radius_m: float) -> Rolled:
-        """Go on with a ball that is larger than those before, to its end; all triangles so far.
+        """Roll a ball that is larger than those before until it stops; returns all triangles so far.
 
         Raises:
             InputError: the radius is not positive, or not larger.
@@ -113,9 +113,9 @@ class Roller:
         return self.rolled
 
     def iterate(self, radius_m: float, batch: int) -> Generator[BallPivotStep]:
-        """The same in steps of ``batch`` triangles; progress is that of this radius.
+        """Roll like ``roll`` in steps of ``batch`` triangles; progress is that of this radius.
 
-        A generator closed early leaves its triangles; a larger ball can go on from there.
+        If the generator is closed early, its triangles stay; a larger ball can continue from there.
 
         Raises:
             InputError: the radius is not positive, or not larger, or the batch is not positive.
@@ -174,16 +174,16 @@ def iterate_roll(
     """Roll balls over an oriented cloud, the smallest first, in steps of ``batch`` triangles.
 
     Args:
-        points_m: (N, 3).
-        normals: (N, 3) towards the outside.
-        radii_m: ascending.
-        batch: new triangles in a step at most.
+        points_m: (N, 3) points.
+        normals: (N, 3) normals towards the outside.
+        radii_m: ball radii, ascending.
+        batch: most new triangles per step.
 
     Returns:
-        The whole result, at the generator's end; closing it earlier cancels.
+        The triangles of all balls; closing the generator earlier cancels.
 
     Raises:
-        InputError: see ``Roller``; or no radius, one that is not positive, or they do not ascend.
+        InputError: see ``Roller``; or there is no radius, one is not positive, or they do not ascend.
     """
     radii_m = tuple(radii_m)
     if not radii_m:
@@ -199,12 +199,12 @@ def iterate_roll(
 
 
 def roll(points_m: FloatArray, normals: FloatArray | None, radii_m: Sequence[float]) -> Rolled:
-    """The fold of ``iterate_roll``."""
+    """Roll balls over an oriented cloud; returns the result of ``iterate_roll``."""
     return drain(iterate_roll(points_m, normals, radii_m, ALL_AT_ONCE))
 
 
 def compile_all() -> None:
-    """Compile the ball, which takes ten seconds once; the result is kept on the disk."""
+    """Compile all functions, which takes ten seconds once; the result is cached on disk."""
     corner_m = np.eye(3)
     roll(corner_m, np.full((3, 3), 0.6), [1.0, 2.0])
 

@@ -1,4 +1,4 @@
-"""Where a ball can be put down on three unused points."""
+"""Search for seeds: three unused points on which a ball can rest."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from pipeline.surface.pivoting.grid import gather
 from pipeline.types import FloatArray, IntArray
 
 _CLOSE = 1.0
-"""Neighbours up to this many radii away mostly suffice to tell that no ball can touch a point."""
+"""Radius of a first search, in ball radii, which mostly suffices to show that no ball touches a point."""
 
 
 class Scratch(NamedTuple):
-    """Room for what is near one place."""
+    """Work arrays for the neighbourhood of one position."""
 
     found: IntArray
     """(N + 1,) rows of the grid."""
@@ -29,7 +29,7 @@ class Scratch(NamedTuple):
 
 
 def new_scratch(n_points: int) -> Scratch:
-    """Scratch for a cloud."""
+    """Allocate the work arrays for a cloud."""
     return Scratch(
         np.empty(n_points + 1, np.int32), np.empty((n_points, 4)), np.empty(n_points, np.int32), new_cell()
     )
@@ -37,11 +37,11 @@ def new_scratch(n_points: int) -> Scratch:
 
 @compiled
 def find_seed(points, normals, grid, front, scratch, p, radius):  # type: ignore[no-untyped-def]
-    """(b, c, x, y, z) of the seed triangle p, b, c and its ball's centre; b = -1 for none.
+    """Return (b, c, x, y, z): the seed triangle p, b, c and its ball's centre; b is -1 for none.
 
     SPEC 5.1 tries pairs of unused neighbours in order of distance until an empty ball rests on them and
-    p. Only corners of p's Voronoi cell make such pairs; of theirs, the same one is taken. The ball's
-    centre must lie on the outer side of p's tangent plane.
+    p. Only corners of p's Voronoi cell can give such pairs; among these the same pair is found. The
+    ball's centre must be on the outer side of p's tangent plane.
     """
     nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
     length = np.sqrt(nx * nx + ny * ny + nz * nz)
@@ -59,7 +59,7 @@ def find_seed(points, normals, grid, front, scratch, p, radius):  # type: ignore
 
 @compiled
 def _neighbours(points, grid, scratch, p, count, beyond_m, reach_m):  # type: ignore[no-untyped-def]
-    """Add the neighbours of a point between two distances to the ``count`` in ``near``; how many then."""
+    """Add the neighbours of a point between two distances to ``near``; returns the new count."""
     found, near = scratch.found, scratch.near
     x, y, z = points[p, 0], points[p, 1], points[p, 2]
     least = 0.5 * beyond_m * beyond_m if count else -1.0
@@ -77,7 +77,7 @@ def _neighbours(points, grid, scratch, p, count, beyond_m, reach_m):  # type: ig
 
 @compiled
 def _nearest_pair(points, normals, grid, front, scratch, count, p, radius):  # type: ignore[no-untyped-def]
-    """The pair of neighbours, of all those at far corners of the cell, whose farther one is nearest."""
+    """Return, of all pairs of neighbours at far corners of the cell, the one whose farther one is nearest."""
     near, rows, cell = scratch.near, scratch.rows, scratch.cell
     best, seed = np.inf, (np.int64(-1), np.int64(-1), 0.0, 0.0, 0.0)
     for corner in range(cell.counts[1]):
@@ -105,7 +105,7 @@ def _nearest_pair(points, normals, grid, front, scratch, count, p, radius):  # t
 
 @compiled
 def _is_free(near, count, i, j, x, y, z, radius):  # type: ignore[no-untyped-def]
-    """Whether no neighbour but i and j is inside the ball about (x, y, z) on whose surface the origin is."""
+    """Return whether no neighbour except i and j is inside the ball about (x, y, z) through the origin."""
     for n in range(count):
         outside = near[n, 3] - x * near[n, 0] - y * near[n, 1] - z * near[n, 2]
         if outside < -TIE * radius * radius and n != i and n != j:
