@@ -1,1 +1,1 @@
-"""The camera itself: boards to print, finding them in images, estimating the lens (SPEC 1)."""
+"""Camera calibration: boards to print, their detection in images, lenses, rigs and depth bias (SPEC 1)."""

@@ -1,4 +1,4 @@
-"""Everything that tells whether a camera can be trusted at a range, in one record (issue 14)."""
+"""Assessment of a calibrated camera at a working distance, in one record (issue 14)."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from pipeline.calibration.verdict import Verdict, verdict
 
 @dataclass(frozen=True, slots=True)
 class Trust:
-    """What a camera is worth at a range."""
+    """Accuracy of a camera at a working distance."""
 
     sd: ErrorMap
-    """What noise does."""
+    """Error due to noise."""
     halves: HalfDifference | None
-    """What two halves of the views say; None if there are too few views, or a half determines no lens."""
+    """Difference of two halves of the views; None with too few views, or if a half determines no lens."""
     coverage: Coverage
     outliers: tuple[OutlierView, ...]
     following: NextView | None
-    """The view to take next; None if the board fits nowhere into the image."""
+    """The best view to take next; None if the board fits nowhere into the image."""
     verdict: Verdict
 
     def metrics(self) -> dict[str, Any]:
-        """What ``--json`` prints of it."""
+        """Return the values that ``--json`` prints."""
         judged, sd, halves, following = self.verdict, self.sd, self.halves, self.following
         return {
             "range_m": judged.range_m,
@@ -72,17 +72,17 @@ class Trust:
 def assess(
     calibration: Calibration, views: Sequence[View], board: Board, range_m: float, accuracy_m: float
 ) -> Trust:
-    """Judge a camera where it will measure.
+    """Assess a camera at its working distance.
 
     Args:
         calibration: the camera.
-        views: those that it comes from.
-        board: the one that they show.
-        range_m: of what it will measure, from the camera.
-        accuracy_m: within which a point must be placed.
+        views: the views of its calibration.
+        board: the board in the views.
+        range_m: distance of what the camera will measure.
+        accuracy_m: error within which a point must be placed.
 
     Raises:
-        InputError: no range at which anything can be seen, or no accuracy that could be met.
+        InputError: the range or the accuracy is impossible.
     """
     sd = projected_sd_px(calibration, range_m)
     halves = following = None
@@ -106,6 +106,6 @@ def assess(
 
 
 def _summary(values: np.ndarray) -> dict[str, float]:
-    """Of the part of the image for which the lens has rays."""
+    """Summarise the part of the image for which the lens has rays."""
     known = values[np.isfinite(values)]
     return {"median": float(np.median(known)), "most": float(known.max())} if len(known) else {}

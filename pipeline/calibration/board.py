@@ -1,4 +1,4 @@
-"""Boards of known points: grids of circles, chessboards, ChArUco (SPEC 1.2)."""
+"""Calibration boards with known points: grids of circles, chessboards, ChArUco (SPEC 1.2)."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from pipeline.config import Pattern
 from pipeline.types import FloatArray
 
 CIRCLE_SHARE = 0.5
-"""Diameter of a circle over the distance to its nearest neighbour."""
+"""Ratio of a circle's diameter to the distance of its nearest neighbour."""
 RING = (0.45, 0.75)
-"""Radii of the white ring in the first circle, the mark that tells which way is up, over the circle's. Its
-middle stays dark: detectors of dark circles look there."""
+"""Radii, over the circle's, of the white ring in the first circle, which marks the orientation. The circle's
+centre stays dark, because detectors of dark circles look there."""
 MARKER_SHARE = 0.75
-"""Side of a ChArUco marker over that of its square."""
+"""Ratio of a ChArUco marker's side to that of its square."""
 MOST_POINTS = 50
-"""Along either side."""
+"""Most points in a row or column."""
 MARKERS = cv2.aruco.DICT_5X5_1000
 
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """A flat board; its points lie in the plane z = 0, x to the right, y down, z away from the eye."""
+    """A flat board; its points are in the plane z = 0, x to the right, y down, z away from the viewer."""
 
     pattern: Pattern = "circles"
     columns: int = 11
-    """Circles, or inner corners, in a row."""
+    """Circles, or inner corners, per row."""
     rows: int = 9
     spacing_m: float = 0.035
-    """Pitch of the circles, or side of a square. Asymmetric circles: half the distance of two in a row."""
+    """Pitch of circles, or side of a square. For asymmetric circles: half the distance of two in a row."""
 
     def __post_init__(self) -> None:
         if self.pattern not in get_args(Pattern):
@@ -47,12 +47,12 @@ class Board:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Columns and rows, as OpenCV has it."""
+        """Columns and rows, as OpenCV uses them."""
         return self.columns, self.rows
 
     @property
     def points_m(self) -> FloatArray:
-        """(rows * columns, 3) row by row from the upper left, about the middle of the board."""
+        """(rows * columns, 3) points row by row from the upper left; the board's centre is the origin."""
         row, column = np.divmod(np.arange(self.rows * self.columns), self.columns)
         x, y = column.astype(float), row.astype(float)
         if self.pattern == "circles-asymmetric":
@@ -62,24 +62,24 @@ class Board:
 
     @property
     def nearest_m(self) -> float:
-        """From a point to its nearest neighbour."""
+        """Distance from a point to its nearest neighbour."""
         return self.spacing_m * (2.0**0.5 if self.pattern == "circles-asymmetric" else 1.0)
 
     @property
     def radius_m(self) -> float:
-        """Of a circle."""
+        """Radius of a circle."""
         return 0.5 * CIRCLE_SHARE * self.nearest_m
 
     @property
     def ambiguous(self) -> bool:
-        """Whether the points alone look the same upside down, so that only a mark tells which way is up."""
+        """Whether the points look the same upside down, so that only a mark shows the orientation."""
         if self.pattern == "circles":
             return True
         return self.pattern == "chessboard" and (self.columns - self.rows) % 2 == 0
 
     @property
     def title(self) -> str:
-        """What it is, in a line."""
+        """Description of the board in one line."""
         kinds = {
             "circles": f"{self.columns} x {self.rows} circles, pitch",
             "circles-asymmetric": f"{self.columns} x {self.rows} circles in shifted rows, half pitch",
@@ -89,7 +89,7 @@ class Board:
         return f"{kinds[self.pattern]} {1000.0 * self.spacing_m:g} mm"
 
     def charuco(self) -> Any:
-        """OpenCV's board of the same squares and markers."""
+        """Return OpenCV's board with the same squares and markers."""
         squares = (self.columns + 1, self.rows + 1)
         dictionary = cv2.aruco.getPredefinedDictionary(MARKERS)
         return cv2.aruco.CharucoBoard(squares, self.spacing_m, MARKER_SHARE * self.spacing_m, dictionary)

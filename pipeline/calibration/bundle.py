@@ -1,5 +1,5 @@
-"""Lenses and poses that best explain all sightings together: a bundle adjustment (Triggs et al., "Bundle
-adjustment: a modern synthesis", 2000), small enough for dense normal equations.
+"""Bundle adjustment of lenses and poses to all sightings of a board (Triggs et al., "Bundle adjustment: a
+modern synthesis", 2000), with dense normal equations.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from pipeline.types import FloatArray, IntArray
 
 STEPS = 60
 LITTLE = 1e-10
-"""Share by which the squares must fall for another step."""
+"""Least relative decrease of the squared error for another step."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sighting:
-    """The board as one camera saw it at one moment."""
+    """Image points of the board in one camera at one moment."""
 
     camera: int
     moment: int
@@ -35,32 +35,32 @@ class Bundle:
     """Cameras and boards in the frame of the first camera."""
 
     optics: tuple[Optics, ...]
-    """Of every camera."""
+    """Lens of every camera."""
     T_camera_first: tuple[FloatArray, ...]
-    """(4, 4) of every camera; the first is the identity."""
+    """(4, 4) pose of every camera; the first is the identity."""
     T_first_board: tuple[FloatArray, ...]
-    """(4, 4) of every moment."""
+    """(4, 4) pose of the board at every moment."""
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """How many numbers move the cameras but the first, the boards, and each lens."""
+        """Number of parameters of the cameras except the first, of the boards, and of each lens."""
         lenses = (len(FREE[one.lens]) for one in self.optics)
         return 6 * (len(self.optics) - 1), 6 * len(self.T_first_board), *lenses
 
     def T_camera_board(self, sighting: Sighting) -> FloatArray:
-        """(4, 4) where the camera of a sighting has its board."""
+        """Return the (4, 4) pose of a sighting's board in its camera."""
         return self.T_camera_first[sighting.camera] @ self.T_first_board[sighting.moment]
 
     def residuals_px(self, sightings: Sequence[Sighting]) -> tuple[FloatArray, ...]:
-        """(N, 2) of each, seen less predicted."""
+        """Return (N, 2) residuals of each sighting, observed minus predicted."""
         return tuple(
             one.points_px - self.optics[one.camera].project(one.board_m, self.T_camera_board(one))
             for one in sightings
         )
 
     def moved(self, step: FloatArray) -> Bundle:
-        """After small changes in the order of ``sizes``: turns (radians) and moves (metres) of cameras, then
-        of boards, then what is added to the free parameters of the lenses.
+        """Return the bundle after small changes, in the order of ``sizes``: rotations (radians), translations
+        (metres) of cameras, then of boards, then increments of the lenses' free parameters.
         """
         cameras, boards, *lenses = np.split(step, np.cumsum(self.sizes)[:-1])
         return Bundle(
@@ -72,26 +72,26 @@ class Bundle:
 
 @dataclass(frozen=True, slots=True)
 class Adjusted:
-    """The best bundle and how sure it is."""
+    """The optimal bundle and its uncertainty."""
 
     bundle: Bundle
     residuals_px: tuple[FloatArray, ...]
-    """(N, 2) of each sighting, seen less predicted."""
+    """(N, 2) residuals of each sighting, observed minus predicted."""
     camera_covariance: FloatArray
-    """(6 (C - 1), 6 (C - 1)) of turns and moves of all cameras but the first."""
+    """(6 (C - 1), 6 (C - 1)) covariance of rotation and translation of all cameras except the first."""
     lens_covariances: tuple[FloatArray, ...]
-    """(P, P) of the free parameters of every lens."""
+    """(P, P) covariance of the free parameters of every lens."""
 
 
 def adjust(sightings: Sequence[Sighting], start: Bundle) -> Adjusted:
-    """The bundle near ``start`` with the least squared distances in the images (Levenberg, Marquardt).
+    """Find the bundle near ``start`` with the least squared image distances (Levenberg, Marquardt).
 
-    The lenses are free as well. Held at what each camera alone says of its lens, they would leave more than
-    twice the error in the cameras' poses (tests/pipeline/calibration/test_rig.py).
+    The lenses are free too. Fixed at the calibration of each camera alone, they would leave more than twice
+    the error in the cameras' poses (tests/pipeline/calibration/test_rig.py).
 
     Args:
-        sightings: of all cameras; shared moments must link them.
-        start: near the truth.
+        sightings: sightings of all cameras, which shared moments must link.
+        start: bundle near the solution.
     """
     bundle, system = _nearest(sightings, start, slice(None))
     scale = 1.0 / np.sqrt(np.diag(system.normal))
@@ -106,13 +106,13 @@ def adjust(sightings: Sequence[Sighting], start: Bundle) -> Adjusted:
 
 
 def place_boards(sightings: Sequence[Sighting], start: Bundle) -> Bundle:
-    """The boards adjusted to all sightings while cameras and lenses stay as they are."""
+    """Adjust the boards' poses to all sightings, with cameras and lenses fixed."""
     cameras, boards, *_ = start.sizes
     return _nearest(sightings, start, slice(cameras, cameras + boards))[0]
 
 
 def _nearest(sightings: Sequence[Sighting], start: Bundle, free: slice) -> tuple[Bundle, _System]:
-    """The best bundle that the free changes lead to, with its normal equations."""
+    """Return the optimal bundle over the free parameters, with its normal equations."""
     bundle, system = start, _System(sightings, start)
     damping = 1e-3
     for _ in range(STEPS):
@@ -131,7 +131,7 @@ def _nearest(sightings: Sequence[Sighting], start: Bundle, free: slice) -> tuple
 
 
 class _System:
-    """The normal equations of a bundle."""
+    """Normal equations of a bundle."""
 
     def __init__(self, sightings: Sequence[Sighting], bundle: Bundle) -> None:
         size = sum(bundle.sizes)
@@ -147,12 +147,12 @@ class _System:
             self.coordinates += len(off_px)
 
     def damped(self, damping: float) -> FloatArray:
-        """With the diagonal that much larger."""
+        """Return the normal matrix with its diagonal increased by the share ``damping``."""
         return self.normal + damping * np.diag(np.diag(self.normal))
 
 
 def _columns(sighting: Sighting, bundle: Bundle) -> IntArray:
-    """Of the numbers on which it depends: its camera's (none of the first), its board's, and its lens's."""
+    """Return the parameters on which a sighting depends: of camera (none for the first), board and lens."""
     ends = np.cumsum(bundle.sizes)
     camera = 6 * (sighting.camera - 1) + np.arange(6 if sighting.camera else 0)
     board = ends[0] + 6 * sighting.moment + np.arange(6)
@@ -161,7 +161,7 @@ def _columns(sighting: Sighting, bundle: Bundle) -> IntArray:
 
 
 def _linearised(sighting: Sighting, bundle: Bundle) -> tuple[FloatArray, FloatArray]:
-    """(2 N, 12 + P) by changes of camera, board and lens, and (2 N,) seen less predicted."""
+    """Return (2 N, 12 + P) derivatives by camera, board and lens, and (2 N,) observed minus predicted."""
     T_camera_first = bundle.T_camera_first[sighting.camera]
     first_m = apply(bundle.T_first_board[sighting.moment], sighting.board_m)
     told = bundle.optics[sighting.camera].linearised(first_m, T_camera_first)

@@ -1,4 +1,4 @@
-"""Calibration in one call: of one camera, and of several."""
+"""Public calls for the calibration of one camera, and of several."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ def calibrate(
     """Estimate one camera from images of a board.
 
     Args:
-        images: three or more, the board tilted to all sides: files, folders, or patterns such as "left*.jpg".
-        board: what they show; None is that of a board.json beside them, or else the thesis's.
-        lens: which distortions the camera may have.
-        held_out: in how many turns images are left out and predicted; 0 leaves out none.
+        images: three or more, with different tilts: files, folders, or patterns such as "left*.jpg".
+        board: the board in them; None uses a board.json next to them, or else the thesis's.
+        lens: distortion model of the camera.
+        held_out: number of folds of images that are left out and predicted; 0 leaves out none.
 
     Raises:
-        InputError: unreadable images, several sizes, or the board in too few of them.
+        InputError: images are unreadable or differ in size, or too few show the board.
         ReconstructionError: the images do not determine the lens.
 
     >>> import packetmesh as pm
@@ -41,17 +41,17 @@ def calibrate(
 def calibrate_cameras(
     folders: Sequence[AnyPath], board: Board | None = None, lens: Lens = "thesis", held_out: int = 2
 ) -> RigReport:
-    """Estimate several cameras, and where they stand, from images of a board at shared moments.
+    """Estimate several cameras and their poses from images of a board at shared moments.
 
     Args:
-        folders: one with node_00, node_01 and so on, or one for each camera; images of the same number are of
-            the same moment.
-        board: what they show; None is that of a board.json beside them, or else the thesis's.
-        lens: which distortions the cameras may have.
-        held_out: in how many turns moments are left out and predicted; 0 leaves out none.
+        folders: one with node_00, node_01 and so on, or one per camera; images with the same number belong
+            to the same moment.
+        board: the board in them; None uses a board.json next to them, or else the thesis's.
+        lens: distortion model of the cameras.
+        held_out: number of folds of moments that are left out and predicted; 0 leaves out none.
 
     Raises:
-        InputError: as ``calibrate``, too many cameras, or some that never see the board together.
+        InputError: as for ``calibrate``, too many cameras, or some that never see the board together.
         ReconstructionError: the images do not determine the lenses or the poses.
 
     >>> import packetmesh as pm

@@ -1,4 +1,4 @@
-"""Which numbers of a camera go together, so that the views hardly tell one from the other (SPEC 1.3 d)."""
+"""Correlations of a camera's parameters, which the views hardly separate if they are strong (SPEC 1.3 d)."""
 
 from __future__ import annotations
 
@@ -11,42 +11,42 @@ from pipeline.calibration.lens import Optics
 from pipeline.types import FloatArray
 
 DISTANCE = "distance"
-"""Of the board from the camera, the mean over the views: no parameter of the lens, but what a focal length
-is mistaken for first."""
+"""Mean distance of the board from the camera: not a lens parameter, but the quantity with which a focal
+length is confused first."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Two numbers and how they go together."""
+    """Two parameters and their correlation."""
 
     first: str
     second: str
     correlation: float
-    """From -1 to 1."""
+    """Correlation, -1 to 1."""
 
 
 @dataclass(frozen=True, slots=True)
 class Correlations:
-    """How the errors of all numbers go together."""
+    """Correlations of all parameters' errors."""
 
     names: tuple[str, ...]
-    """Of the lens's parameters, then the board's distance."""
+    """Names of the lens's parameters, then the board's distance."""
     matrix: FloatArray
-    """(P, P) from -1 to 1."""
+    """(P, P) correlations, -1 to 1."""
 
     @property
     def strongest(self) -> Pair:
-        """The two that the views tell apart least."""
+        """The pair that the views separate least."""
         size = np.abs(np.tril(self.matrix, -1))
         row, column = np.unravel_index(int(size.argmax()), size.shape)
         return Pair(self.names[column], self.names[row], float(self.matrix[row, column]))
 
 
 def correlations(lens: Calibration) -> Correlations:
-    """How the errors of a camera's parameters and of the board's distance go together.
+    """Compute the correlations of the errors of a camera's parameters and of the board's distance.
 
-    A pose's error has a part of its own and one that comes from the lens's; the lens's covariance already
-    has the poses in it, so both parts of the mean distance follow view by view.
+    A pose's error has a part of its own and one that follows from the lens; the lens's covariance already
+    includes the poses, so both parts of the mean distance are computed view by view.
     """
     noise = coordinate_sd_px(lens.views, lens.lens) ** 2
     count = len(lens.views)
@@ -64,8 +64,8 @@ def correlations(lens: Calibration) -> Correlations:
 
 
 def _distance(view: FittedView, optics: Optics) -> tuple[FloatArray, float]:
-    """(P,) by how much a view's distance changes with the lens, as its pose follows; and its own variance
-    for noise of 1 px.
+    """Return the (P,) derivative of a view's distance by the lens, with its pose adapted, and the distance's
+    own variance for noise of 1 px.
     """
     told = optics.linearised(view.board_m, view.T_camera_board)
     away = view.T_camera_board[:3, 3]

@@ -1,5 +1,5 @@
-"""A depth sensor's own bias, from the boards that calibrate its camera: offset, scale, curvature, a map over
-the image, and the noise, with as many terms as held-out views justify (SPEC 1.5).
+"""Bias of a depth sensor from the boards that calibrate its camera: offset, scale, curvature, a map over the
+image, and the noise, with as many terms as held-out views justify (SPEC 1.5).
 """
 
 from __future__ import annotations
@@ -28,51 +28,51 @@ from pipeline.types import DepthNoise, FloatArray
 
 LEAST_VIEWS = 4
 ROUNDS = 3
-"""Of noise after bias after noise."""
+"""Number of alternations between estimates of noise and bias."""
 WIDTH = sum(len(columns) for columns in GROUPS.values())
-"""Of the design."""
+"""Number of columns of the design matrix."""
 
 
 @dataclass(frozen=True, slots=True)
 class BiasPoints:
-    """What each of V views says of the bias, on paper."""
+    """Bias in each of V views, on white paper."""
 
     z_m: FloatArray
     """(V,) mean measured depth."""
     before_m: FloatArray
-    """(V,) mean of measured less true depth."""
+    """(V,) mean of measured minus true depth."""
     after_m: FloatArray
-    """(V,) the same when corrected."""
+    """(V,) mean of corrected minus true depth."""
 
 
 @dataclass(frozen=True, slots=True)
 class DepthFit:
-    """A correction and what speaks for it."""
+    """A depth correction and the evidence for it."""
 
     correction: DepthCorrection
     terms: tuple[str, ...]
-    """Those that held-out views justify."""
+    """Terms that held-out views justify."""
     covariance: FloatArray
-    """(p, p) of the terms' parameters: of those of offset, scale and curvature that are there, and of the
-    map's eleven, which are the coefficients' along ``depth_terms.map_directions``."""
+    """(p, p) covariance of the terms' parameters: of those of offset, scale and curvature in use, then
+    the map's eleven coefficients along ``depth_terms.map_directions``."""
     held_out_m: Mapping[str, float]
-    """RMS depth error in views that had no part in the fit, by the terms of each model that was tried."""
+    """RMS depth error in held-out views, by the terms of each model that was tried."""
     rms_before_m: float
-    """Of the measured depth: root of the mean over views of the mean square."""
+    """Error of the measured depth: root of the mean over views of the mean square."""
     rms_after_m: float
     scale_focal_correlation: float | None
-    """Of the scale's error with the focal length's; None without a scale."""
+    """Correlation of the errors of scale and focal length; None without a scale."""
     points: BiasPoints
-    """What the terms go through."""
+    """Data to which the bias terms are fitted."""
     noise_points: NoisePoints
-    """What the noise law goes through."""
+    """Data to which the noise law is fitted."""
     ink_offset_m: tuple[float, float] | None
-    """Mean of measured less true depth on black less that on white, corrected, and its standard error."""
+    """Depth error on black minus that on white, after correction, and its standard error."""
     note: str
-    """Which terms the views cannot tell apart, and what to take; empty if they can."""
+    """Sentence on terms that the views cannot separate, and on views to take; empty if there are none."""
 
     def bias_m(self, z_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(N,) measured less true depth at (N,) measured ones, the map aside, and its standard error."""
+        """Return (N,) measured minus true depth at (N,) depths, without the map, and its standard error."""
         powers = {"offset": np.ones_like(z_m), "scale": z_m, "curvature": z_m**2}
         used = [powers[term] for term in self.terms if term in powers]
         columns = np.array(used).reshape(len(used), len(z_m))
@@ -82,7 +82,7 @@ class DepthFit:
         return -off_m, np.sqrt(variance_m2)
 
     def metrics(self) -> dict[str, Any]:
-        """The block ``depth`` of ``packetmesh calibrate --json``."""
+        """Return the block ``depth`` of ``packetmesh calibrate --json``."""
         correction = self.correction
         values: dict[str, Any] = {
             "offset_m": correction.offset_m,
@@ -108,16 +108,16 @@ class DepthFit:
 def fit_depth(samples: DepthSamples) -> DepthFit:
     """Estimate a sensor's bias and noise.
 
-    Weights are 1/sd^2 of the noise law, Huber's at 3 sd, and every view counts once: within a view errors go
-    together, since the board's pose is off by something. A term is kept only while the error in views that
-    are left out, one after another, falls by more than its standard error. Standard errors are those of the
-    jackknife over views, and what the lens's own uncertainty moves beside.
+    Weights are 1/sd^2 of the noise law, with Huber's at 3 sd, and every view has the same weight, because the
+    error of the board's pose affects all its pixels alike. A term is kept only if the error in views held
+    out in turn falls by more than its standard error. Standard errors combine the jackknife over views with
+    the lens's uncertainty.
 
     Args:
-        samples: of at least four views; pixels on ink are left out.
+        samples: pixels of at least four views; those on ink are not used.
 
     Raises:
-        InputError: fewer views.
+        InputError: there are fewer views.
     """
     paper = samples.select(~samples.ink)
     count = len(rows_of_views(paper))
@@ -162,7 +162,7 @@ def _points(samples: DepthSamples, problem: Problem, correction: DepthCorrection
 
 
 def _with_focal(problem: Problem, terms: tuple[str, ...], lens_focal: FloatArray) -> float | None:
-    """Correlation of the scale's error with the focal length's."""
+    """Return the correlation of the errors of scale and focal length."""
     if "scale" not in terms:
         return None
     columns = columns_of(terms)
@@ -178,7 +178,7 @@ def _correction(
     noise: DepthNoise,
     intervals: Mapping[str, FloatArray],
 ) -> DepthCorrection:
-    """The terms as a record, with intervals."""
+    """Build the correction from the terms, with intervals."""
     columns = columns_of(terms)
     values, spread = np.zeros(WIDTH), np.zeros((WIDTH, WIDTH))
     values[columns], spread[np.ix_(columns, columns)] = problem.solve(columns), problem.covariance(columns)
@@ -211,7 +211,7 @@ def _correction(
 
 
 def _ink_offset_m(samples: DepthSamples, correction: DepthCorrection) -> tuple[float, float] | None:
-    """Mean over views, and its standard error; None where fewer than two views show both."""
+    """Return the mean over views and its standard error; None if fewer than two views have ink and paper."""
     off_m = correction.corrected_m(samples.measured_m, samples.pixels) - samples.true_m
     apart = [
         float(np.median(off_m[rows[ink]]) - np.median(off_m[rows[~ink]]))

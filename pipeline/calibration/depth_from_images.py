@@ -1,4 +1,4 @@
-"""The bias of a depth sensor from depth images beside the photographs of a board (SPEC 1.5)."""
+"""Bias of a depth sensor from depth images taken together with photographs of a board (SPEC 1.5)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pipeline.io.images import ReadDepth, read_depth_noted
 
 
 def depth_beside(images: Iterable[Path]) -> dict[str, Path]:
-    """depth_00.png beside color_00.png or color_00.jpg and so on, where it is, by the image's name."""
+    """Find depth_00.png next to color_00.png or color_00.jpg and so on; returns paths by the image's name."""
     beside = {path.name: path.with_name(f"depth_{path.stem.partition('_')[2]}.png") for path in images}
     return {name: path for name, path in beside.items() if path.is_file()}
 
@@ -27,13 +27,13 @@ def with_depth(
     depth_camera: CameraReport | None = None,
     depth_scale: float | None = None,
 ) -> CameraReport:
-    """A report to which the depth sensor's bias is added, or why it is not known.
+    """Add the depth sensor's bias to a report, or the reason why it is unknown.
 
     Args:
-        report: of the camera to which the depth belongs.
-        depths: images of depth, by the name of the photograph of the same moment.
-        depth_camera: the camera on whose pixels the depth is, if another; ``depths`` has its images' names.
-        depth_scale: depth units in a metre; without it whole numbers are millimetres.
+        report: report of the camera to which the depth belongs.
+        depths: depth images, by the name of the photograph of the same moment.
+        depth_camera: the camera with the depth's pixel grid, if another; its images' names are in ``depths``.
+        depth_scale: depth units per metre; by default whole numbers are millimetres.
     """
     if not depths:
         return report
@@ -48,15 +48,15 @@ def with_depth(
 
 
 def depth_fit(calibration: Calibration, depths: Mapping[str, Path], board: Board) -> DepthFit:
-    """The bias of depth images on a camera's pixels.
+    """Estimate the bias of depth images on a camera's pixel grid.
 
     Args:
-        calibration: of the camera, with its views.
-        depths: 16-bit images in millimetres, by the name of their view.
-        board: what the views show.
+        calibration: calibration of the camera, with its views.
+        depths: 16-bit images in millimetres, by the names of their views.
+        board: the board in the views.
 
     Raises:
-        InputError: images that cannot be read, are not on the camera's pixels or show no board, or too few.
+        InputError: images are unreadable, too few, on another pixel grid, or show no board.
     """
     return _fit(calibration, _read(calibration, depths, None), board)
 
@@ -64,7 +64,7 @@ def depth_fit(calibration: Calibration, depths: Mapping[str, Path], board: Board
 def _read(
     calibration: Calibration, depths: Mapping[str, Path], depth_scale: float | None
 ) -> dict[str, ReadDepth]:
-    """The depth images of a camera's views, by the view's name."""
+    """Read the depth images of a camera's views, by the view's name."""
     names = [view.name for view in calibration.views if view.name in depths]
     return {name: read_depth_noted(depths[name], depth_scale) for name in names}
 
@@ -75,7 +75,7 @@ def _fit(calibration: Calibration, images: Mapping[str, ReadDepth], board: Board
 
 
 def _doubts(images: Mapping[str, ReadDepth]) -> tuple[str, ...]:
-    """What is doubtful about the scale of depth, of the first image with which anything is."""
+    """Return doubts about the depth scale, of the first image that has any."""
     doubtful = ((name, read.notes) for name, read in images.items() if read.notes)
     name, notes = next(doubtful, ("", ()))
     return tuple(f"Depth beside {name}: {note}" for note in notes)

@@ -1,4 +1,4 @@
-"""How the noise of a depth sensor grows with distance and angle, from what a fit leaves (SPEC 1.5)."""
+"""Noise of a depth sensor as a function of distance and angle, from residuals of a fit (SPEC 1.5)."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pipeline.calibration.depth_samples import DepthSamples
 from pipeline.types import DepthNoise, FloatArray
 
 PARTS, FEWEST = 4, 60
-"""Each view gives so many points to the law, nearest to farthest, of at least so many pixels."""
+"""Parts of each view, by distance, that give one point each, and least pixels per part."""
 BENDS = 24
-"""Places along the measured distances where the law may bend."""
+"""Number of distances that are tried for the bend of the law."""
 STEEPEST = 4.0
-"""Exponent of the distance: where few distances were measured, a steep law fits noise."""
+"""Largest exponent of the distance: with few distances, a steeper law would fit noise."""
 CLIP_SDS = 4.0
 RESAMPLES = 100
 LEAST_M = 1e-5
@@ -23,26 +23,26 @@ LEAST_M = 1e-5
 
 @dataclass(frozen=True, slots=True)
 class NoisePoints:
-    """Measured noise: K patches of boards."""
+    """Measured noise on K patches of boards."""
 
     z_m: FloatArray
     """(K,) mean distance."""
     cosine: FloatArray
     """(K,) mean cosine of incidence."""
     sd_m: FloatArray
-    """(K,) standard deviation of the depth about the board's plane, wherever that is."""
+    """(K,) standard deviation of the depth about the board's fitted plane."""
     view: FloatArray
-    """(K,) of which view."""
+    """(K,) index of the view."""
 
 
 def noise_points(samples: DepthSamples, residuals_m: FloatArray) -> NoisePoints:
-    """The noise of each view's parts, nearest to farthest.
+    """Compute the noise of each view's parts, from nearest to farthest.
 
-    Each view's own plane is taken out of its residuals: what the board's pose is off by is no noise.
+    A plane is subtracted from each view's residuals, because an error of the board's pose is not noise.
 
     Args:
-        samples: the pixels.
-        residuals_m: (N,) true less corrected depth.
+        samples: the pixels on the board.
+        residuals_m: (N,) true minus corrected depth.
     """
     rows = []
     for view in np.unique(samples.view):
@@ -60,7 +60,7 @@ def noise_points(samples: DepthSamples, residuals_m: FloatArray) -> NoisePoints:
 
 
 def _clipped_sd_m(values_m: FloatArray) -> float:
-    """Standard deviation without what lies more than four of them off; never quite 0."""
+    """Return the standard deviation without values more than four of it off; never quite 0."""
     kept = values_m
     for _ in range(5):
         kept = kept[np.abs(kept - kept.mean()) <= CLIP_SDS * max(kept.std(), LEAST_M)]
@@ -68,10 +68,10 @@ def _clipped_sd_m(values_m: FloatArray) -> float:
 
 
 def noise_law(points: NoisePoints) -> DepthNoise:
-    """The law max(s0, s1 z^p) / cos(angle)^q by least squares on its logarithm: near and far count alike.
+    """Fit max(s0, s1 z^p) / cos(angle)^q by least squares on its logarithm: near and far count equally.
 
-    It has a bend where s1 z^p reaches s0. For each place that the bend may have it is linear; the one
-    with the smallest squares is taken.
+    The law bends where s1 z^p reaches s0 and is linear for a given bend; the bend with the least squares
+    is chosen.
     """
     log_z, log_cos, log_sd = np.log(points.z_m), np.log(points.cosine), np.log(points.sd_m)
     best, least = DepthNoise(LEAST_M, LEAST_M, 0.0, 0.0), np.inf
@@ -84,7 +84,7 @@ def noise_law(points: NoisePoints) -> DepthNoise:
 
 
 def _not_negative(columns: FloatArray, values: FloatArray) -> tuple[list[float], float]:
-    """Parameters of (K, 3) columns with the last two not below 0, and what they leave squared."""
+    """Fit (K, 3) columns with the last two parameters >= 0; returns parameters and squared residuals."""
     used = [0, 1, 2]
     while True:
         found = np.linalg.lstsq(columns[:, used], values, rcond=None)[0]
@@ -96,7 +96,7 @@ def _not_negative(columns: FloatArray, values: FloatArray) -> tuple[list[float],
 
 
 def noise_ci95(points: NoisePoints) -> dict[str, FloatArray]:
-    """(2,) 95 % intervals of the law's parameters by name: views are drawn anew with repetition."""
+    """Return (2,) 95 % intervals of the law's parameters by name, from bootstrapping the views."""
     of_views = [np.flatnonzero(points.view == one) for one in np.unique(points.view)]
     rng = np.random.default_rng(0)
     drawn = []

@@ -1,4 +1,4 @@
-"""What a depth sensor says of a board beside where the board is (SPEC 1.5)."""
+"""Measured and true depth at pixels on a calibration board (SPEC 1.5)."""
 
 from __future__ import annotations
 
@@ -16,48 +16,48 @@ from pipeline.kernels.geometry import apply, inverse
 from pipeline.types import BoolArray, DepthMap, FloatArray, IntArray
 
 RIM_PX = 3
-"""So near to the rim of the board's points no pixel is taken: there a sensor mixes board and background."""
+"""Pixels closer than this to the rim of the board's points are not used: sensors mix board and background."""
 INK_PX = 1.0
-"""Black is taken to be wider by so much: at its border a pixel has some of both."""
+"""Black areas are enlarged by this much, because pixels at their border are partly black."""
 MOST_PER_VIEW, FEWEST = 600, 100
-"""Pixels of one view that are used, evenly spread, and those without which a view is none."""
+"""Most pixels of a view that are used, evenly spread, and fewest with which a view counts."""
 GATE_SDS, LEAST_GATE_M = 6.0, 0.02
-"""Beyond so many robust standard deviations from its view's median a pixel shows a hand or the background."""
+"""Pixels beyond this many robust standard deviations from their view's median show a hand or background."""
 MOST_SHARE = 0.25
-"""Depth that is off by more than this share has another unit, or shows another place."""
+"""Depth with a larger relative error has another unit, or shows another place."""
 MAD_TO_SD = 1.4826
 
 
 @dataclass(frozen=True, slots=True)
 class DepthSamples:
-    """Pixels on the board: N of them, over all views."""
+    """N pixels on the board, over all views."""
 
     size_px: tuple[int, int]
     """Width and height of the images."""
     pixels: IntArray
     """(N, 2) u, v."""
     measured_m: FloatArray
-    """(N,) depth of the sensor."""
+    """(N,) depth measured by the sensor."""
     true_m: FloatArray
     """(N,) depth of the board's plane along the pixel's ray."""
     cosine: FloatArray
-    """(N,) of the angle between the ray and the board's normal."""
+    """(N,) cosine of the angle between the ray and the board's normal."""
     view: IntArray
     """(N,) index into ``names``."""
     ink: BoolArray
-    """(N,) on or beside what is printed black, where infrared comes back otherwise."""
+    """(N,) True on or near black print, where the reflection of infrared differs."""
     names: tuple[str, ...]
-    """Of the views."""
+    """Names of the views."""
     lens_m: FloatArray
-    """(P, N) what ``true_m`` gains by one standard deviation of each of P independent errors of the lens."""
+    """(P, N) change of ``true_m`` by one standard deviation of each of P independent errors of the lens."""
     lens_focal: FloatArray
-    """(P,) what the focal length gains by the same, as a share of it."""
+    """(P,) relative change of the focal length by the same errors."""
 
     def __len__(self) -> int:
         return len(self.measured_m)
 
     def select(self, rows: BoolArray | IntArray) -> DepthSamples:
-        """The pixels at ``rows``; the views keep their numbers."""
+        """Return the pixels at ``rows``; indices of views are unchanged."""
         return replace(
             self,
             pixels=self.pixels[rows],
@@ -73,20 +73,20 @@ class DepthSamples:
 def board_depth_samples(
     calibration: Calibration, depths: Sequence[DepthMap | None], board: Board
 ) -> DepthSamples:
-    """Measured and true depth of a board.
+    """Collect measured and true depth of a board.
 
-    The board's plane n . X = d of a view has the depth d / (n . K^-1 [u v 1]) at every pixel: a whole plane,
-    since the middle of a tilted board alone would turn an error of the pose into a bias. Pixels lie between
-    the outermost points, at least ``RIM_PX`` inside, so that none mixes the board with what is behind it.
-    Those on black are marked: their infrared comes back weaker, and the fit leaves them out.
+    The board's plane n . X = d of a view has the depth d / (n . K^-1 [u v 1]) at every pixel. The whole plane
+    is used, because at a tilted board's centre alone an error of the pose would become a bias. Pixels are at
+    least ``RIM_PX`` inside the outermost points, so that none mixes the board with the background. Pixels on
+    black are marked: they reflect less infrared, and the fit does not use them.
 
     Args:
-        calibration: the lens, how sure it is, and its views.
-        depths: (H, W) metric depth of each view on the image's pixel grid; None where there is none.
-        board: what the views show.
+        calibration: the lens with its uncertainty, and its views.
+        depths: (H, W) metric depth of each view on the image's pixel grid; None without depth.
+        board: the board in the views.
 
     Raises:
-        InputError: no depth where the board is, depth images of another size or in another unit.
+        InputError: there is no depth on the board, or depth images of another size or unit.
     """
     parts: list[DepthSamples] = []
     lenses, errors = _lenses(calibration), _errors(calibration)
@@ -116,13 +116,13 @@ def board_depth_samples(
 
 
 def _errors(calibration: Calibration) -> FloatArray:
-    """(P, P) one standard deviation of each independent error of the lens, by the row of its parameters."""
+    """Return (P, P) standard deviations of the lens's independent errors, by parameter and error."""
     variances, directions = np.linalg.eigh(calibration.covariance)
     return directions * np.sqrt(np.maximum(variances, 0.0))
 
 
 def _lenses(calibration: Calibration) -> list[Optics]:
-    """The lens, then the same with one standard deviation of each independent error."""
+    """Return the lens, then the lens changed by one standard deviation of each independent error."""
     names, known = list(calibration.parameters), calibration.distortion.ravel()
     rows = [names.index(name) for name in calibration.names]
     lenses = []
@@ -144,7 +144,7 @@ def _samples_of(
     board: Board,
     index: int,
 ) -> DepthSamples:
-    """Of one view."""
+    """Collect the pixels of one view."""
     if depth.z_m.shape != size_px[::-1]:
         raise InputError(
             f"The depth image of {view.name} has {depth.z_m.shape[1]} x {depth.z_m.shape[0]} pixels and its "
@@ -177,7 +177,7 @@ def _samples_of(
 
 
 def _moved_boards(view: FittedView, lens: Optics, errors: FloatArray) -> list[FloatArray]:
-    """(4, 4) where the board seems to be by each error of the lens, to first order."""
+    """Return (4, 4) apparent poses of the board under each error of the lens, to first order."""
     told = lens.linearised(view.board_m, view.T_camera_board)
     steps = -np.linalg.lstsq(told.by_pose, told.by_lens @ errors, rcond=None)[0]
     turn, move = cv2.Rodrigues(view.T_camera_board[:3, :3])[0].ravel(), view.T_camera_board[:3, 3]
@@ -185,13 +185,13 @@ def _moved_boards(view: FittedView, lens: Optics, errors: FloatArray) -> list[Fl
 
 
 def _rays(lens: Optics, pixels: IntArray) -> FloatArray:
-    """(N, 3) through pixels, scaled to z = 1."""
+    """Return (N, 3) rays through pixels, scaled to z = 1."""
     rays = lens.rays(pixels.astype(np.float64))
     return rays / rays[:, 2:]
 
 
 def _pixels_on_board(board: Board, T: FloatArray, lens: Optics, depth: DepthMap) -> IntArray:
-    """(N, 2) pixels with depth inside the board's points and off their rim, evenly thinned."""
+    """Return (N, 2) pixels with depth inside the board's points and off their rim, evenly thinned."""
     low_m, high_m = board.points_m[:, :2].min(axis=0), board.points_m[:, :2].max(axis=0)
     corners_m = np.array([low_m, (high_m[0], low_m[1]), high_m, (low_m[0], high_m[1])])
     along = np.linspace(0.0, 1.0, 16, endpoint=False)[:, None]
@@ -207,12 +207,12 @@ def _pixels_on_board(board: Board, T: FloatArray, lens: Optics, depth: DepthMap)
 
 
 def _evenly(count: int, most: int) -> IntArray:
-    """At most so many of so many rows."""
+    """Return at most ``most`` indices, evenly spread over ``count``."""
     return np.linspace(0, count - 1, min(count, most)).round().astype(int)
 
 
 def _gate(name: str, measured_m: FloatArray, true_m: FloatArray) -> IntArray:
-    """Rows of one view without what lies before or behind the board, evenly thinned."""
+    """Return rows of one view without pixels in front of or behind the board, evenly thinned."""
     if len(measured_m) < FEWEST:
         return np.zeros(0, np.int64)
     ratio = float(np.median(measured_m / true_m))
@@ -229,13 +229,13 @@ def _gate(name: str, measured_m: FloatArray, true_m: FloatArray) -> IntArray:
 
 
 def _plane_m(T_camera_board: FloatArray, rays: FloatArray) -> FloatArray:
-    """(N,) depth at which (N, 3) rays of z = 1 meet the board."""
+    """Return (N,) depths at which (N, 3) rays with z = 1 meet the board."""
     normal = T_camera_board[:3, 2]
     return (normal @ T_camera_board[:3, 3]) / (rays @ normal)
 
 
 def _on_ink(board: Board, T_camera_board: FloatArray, points_m: FloatArray, px: float) -> BoolArray:
-    """(N,) whether points on the board are black or beside it."""
+    """Return (N,) True for points on the board that are black or next to black."""
     flat = apply(inverse(T_camera_board), points_m)
     rim_m = px * points_m[:, 2]
     if board.pattern.startswith("circles"):

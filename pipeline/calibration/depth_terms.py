@@ -1,4 +1,4 @@
-"""The terms of a depth sensor's bias as a linear problem, view by view (SPEC 1.5)."""
+"""Terms of a depth sensor's bias as a linear least-squares problem, view by view (SPEC 1.5)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pipeline.io.depth_correction import MAP_SHAPE, map_basis, map_means
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 GROUPS = {"offset": (0,), "scale": (1,), "curvature": (2,), "map": tuple(range(3, 14))}
-"""Columns of the design by the name of the term."""
+"""Columns of the design matrix by the name of the term."""
 LADDER: tuple[tuple[str, ...], ...] = (
     (),
     ("offset",),
@@ -22,31 +22,31 @@ LADDER: tuple[tuple[str, ...], ...] = (
     ("offset", "scale"),
     ("offset", "scale", "curvature"),
 )
-"""Models in the order of their complexity; the map comes on top of the one that is chosen."""
+"""Models in the order of complexity; the map is added to the one that is chosen."""
 APART, FAR_APART = 1.3, 2.0
-"""The farthest view over the nearest from which on an offset is told from a scale, and both from a curve."""
+"""Least ratio of farthest to nearest view that separates offset from scale, and both from curvature."""
 VIEWS_OF_A_PART = 2
-"""Each of the map's 3 x 4 parts of the image must be seen in so many views."""
+"""Least number of views in which each of the map's 3 x 4 image parts must have the board."""
 HUBER_SDS, HUBER_ROUNDS = 3.0, 8
 
 
 def title_of(terms: Iterable[str]) -> str:
-    """Of a model."""
+    """Return the title of a model."""
     return " + ".join(terms) or "none"
 
 
 def columns_of(terms: Iterable[str]) -> IntArray:
-    """(p,) of the design."""
+    """Return the (p,) columns of the design matrix."""
     return np.array([column for term in terms for column in GROUPS[term]], np.int64)
 
 
 def map_directions() -> FloatArray:
-    """(12, 11) orthonormal changes of the map's coefficients that leave its mean at 0."""
+    """Return (12, 11) orthonormal changes of the map's coefficients that keep its mean at 0."""
     return null_space(map_means().reshape(1, -1))
 
 
 def design(samples: DepthSamples, z_m: FloatArray) -> FloatArray:
-    """(N, 14) what the true depth gains by each parameter at (N,) depth z: 1, z, z^2 and z s."""
+    """Return (N, 14) derivatives of the true depth by each parameter at (N,) depths z: 1, z, z^2, z s."""
     rows, columns = map_basis(samples.size_px, samples.pixels)
     both = np.einsum("nr,nc->nrc", rows, columns).reshape(len(z_m), -1)
     return np.column_stack([np.ones(len(z_m)), z_m, z_m**2, z_m[:, None] * (both @ map_directions())])
@@ -54,14 +54,14 @@ def design(samples: DepthSamples, z_m: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """Models that the views can tell apart."""
+    """Models that the views can separate."""
 
     ladder: tuple[tuple[str, ...], ...]
-    """From simple to rich."""
+    """Models from simple to complex."""
     may_map: bool
-    """Whether a map may come on top."""
+    """Whether a map may be added."""
     note: str
-    """What stands against the others and what to take; empty where there are none."""
+    """Sentence on why other models are excluded and which views to take; empty if there are none."""
 
     @property
     def richest(self) -> tuple[str, ...]:
@@ -70,7 +70,7 @@ class Choice:
 
 
 def separable(samples: DepthSamples) -> Choice:
-    """Which models the views can tell apart, by where their boards are."""
+    """Determine which models the views can separate, from the positions of their boards."""
     away_m = [float(np.median(samples.true_m[rows])) for rows in rows_of_views(samples)]
     near_m, far_m = min(away_m), max(away_m)
     said, models = [], len(LADDER)
@@ -96,7 +96,7 @@ def separable(samples: DepthSamples) -> Choice:
 
 
 def _seen_parts(samples: DepthSamples) -> BoolArray:
-    """(3, 4) whether each part of the image has the board in enough views."""
+    """Return (3, 4) True for image parts with the board in enough views."""
     share = (samples.pixels + 0.5) / np.array(samples.size_px)
     column, row = np.minimum((share * MAP_SHAPE[::-1]).astype(int), np.array(MAP_SHAPE[::-1]) - 1).T
     seen = np.zeros((*MAP_SHAPE, len(samples.names)), bool)
@@ -105,43 +105,43 @@ def _seen_parts(samples: DepthSamples) -> BoolArray:
 
 
 def rows_of_views(samples: DepthSamples) -> list[IntArray]:
-    """The pixels of each view that has any."""
+    """Return the rows of each view that has pixels."""
     return [np.flatnonzero(samples.view == view) for view in np.unique(samples.view)]
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """y = X x + L e with weights, where e are the errors of the lens, of mean 0 and variance 1.
+    """The weighted problem y = X x + L e, where e are the lens's errors with mean 0 and variance 1.
 
-    Each view is one witness, however large its board appears: the pose of its board is off by something, so
-    that the errors of its pixels go together.
+    Each view counts as one observation, however large its board appears, because the error of the board's
+    pose correlates the errors of its pixels.
     """
 
     X: FloatArray
-    """(N, 14)"""
+    """(N, 14) design matrix."""
     y_m: FloatArray
-    """(N,) true less measured depth."""
+    """(N,) true minus measured depth."""
     L_m: FloatArray
-    """(N, P) what ``y_m`` gains by each independent error of the lens."""
+    """(N, P) derivatives of ``y_m`` by the independent errors of the lens."""
     sd_m: FloatArray
-    """(N,) of the noise."""
+    """(N,) standard deviation of the noise."""
     trust: FloatArray
-    """(N,) Huber's weight, 1 for what is no outlier."""
+    """(N,) Huber weights, 1 for inliers."""
     views: list[IntArray]
     """Rows of each view."""
     witness: float = 1.0
-    """Standard deviation of a view's mean error, over that of a pixel's."""
+    """Ratio of the standard deviation of a view's mean error to that of a pixel's."""
 
     @property
     def weights(self) -> FloatArray:
-        """(N,) Huber's over the variance, over the number of the view's pixels."""
+        """(N,) Huber weights over the variance and the number of the view's pixels."""
         weights = self.trust / self.sd_m**2
         for rows in self.views:
             weights[rows] /= len(rows)
         return weights
 
     def _normal(self, columns: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(V, p + P, p + P) and (V, p + P) of each view, and (p + P, p + P) of what is known of the lens."""
+        """Return normal equations of each view, (V, p + P, p + P) and (V, p + P), and the lens's prior."""
         Z = np.column_stack([self.X[:, columns], self.L_m])
         weighted = self.weights[:, None] * Z
         left = np.array([Z[rows].T @ weighted[rows] for rows in self.views])
@@ -150,44 +150,44 @@ class Problem:
         return left, right, np.diag([*[0.0] * len(columns), *lens])
 
     def solve(self, columns: IntArray) -> FloatArray:
-        """(p,) parameters."""
+        """Return the (p,) optimal parameters."""
         left, right, lens = self._normal(columns)
         return solved(left.sum(axis=0) + lens, right.sum(axis=0))[: len(columns)]
 
     def _without_each(self, columns: IntArray) -> FloatArray:
-        """(V, p + P) parameters and errors of the lens without each view in turn."""
+        """Return (V, p + P) parameters and lens errors with each view left out in turn."""
         left, right, lens = self._normal(columns)
         whole, total = left.sum(axis=0) + lens, right.sum(axis=0)
         return np.array([solved(whole - A, total - b) for A, b in zip(left, right, strict=True)])
 
     def lens_cost(self, columns: IntArray) -> float:
-        """How unlikely the lens is by which the parameters explain the views, as squared errors of a view."""
+        """Return how improbable the fitted lens errors are, as squared errors per view."""
         left, right, lens = self._normal(columns)
         x = solved(left.sum(axis=0) + lens, right.sum(axis=0))
         return float(x @ lens @ x) / len(self.views)
 
     def lens_shifts(self, columns: IntArray) -> FloatArray:
-        """(p, P) what the parameters gain by each independent error of the lens."""
+        """Return (p, P) derivatives of the parameters by the independent errors of the lens."""
         left, _, lens = self._normal(columns)
         whole = left.sum(axis=0)
         return solved(whole + lens, whole[:, len(columns) :])[: len(columns)]
 
     def covariance(self, columns: IntArray) -> FloatArray:
-        """(p, p) of the parameters: the jackknife's over views, and the lens's."""
+        """Return the (p, p) covariance of the parameters: the jackknife's over views plus the lens's."""
         each = self._without_each(columns)[:, : len(columns)]
         off, shifts = each - each.mean(axis=0), self.lens_shifts(columns)
         return (len(each) - 1) / len(each) * off.T @ off + shifts @ shifts.T
 
     def wide(self, together: int = 1) -> float:
-        """Standard errors of a 95 % interval of so many parameters together, by Student."""
+        """Return the half-width of a 95 % interval, in standard errors, for ``together`` parameters."""
         return float(stdtrit(len(self.views) - 1, 1.0 - 0.025 / together))
 
     def residuals_m(self, columns: IntArray) -> FloatArray:
-        """(N,) true less corrected depth."""
+        """Return (N,) true minus corrected depth."""
         return self.y_m - self.X[:, columns] @ self.solve(columns)
 
     def unseen_m(self, columns: IntArray) -> FloatArray:
-        """(N,) residuals of each view by parameters, and a lens, without it."""
+        """Return (N,) residuals of each view, with parameters and lens fitted without it."""
         Z = np.column_stack([self.X[:, columns], self.L_m])
         residuals_m = np.empty_like(self.y_m)
         for rows, x in zip(self.views, self._without_each(columns), strict=True):
@@ -195,30 +195,30 @@ class Problem:
         return residuals_m
 
     def mean_by_view(self, values: FloatArray) -> FloatArray:
-        """(V,) of (N,) values, outliers counting less."""
+        """Return the (V,) mean per view of (N,) values, with outliers down-weighted."""
         return np.array([np.average(values[rows], weights=self.trust[rows]) for rows in self.views])
 
     def rms_m(self, residuals_m: FloatArray) -> float:
-        """Root of the mean over views of the mean square."""
+        """Return the root of the mean over views of the mean square."""
         return float(np.sqrt(self.mean_by_view(residuals_m**2).mean()))
 
 
 def solved(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Of normal equations, the smallest solution where they leave something open."""
+    """Solve normal equations; returns the smallest solution if they are singular."""
     return np.linalg.lstsq(left, right, rcond=1e-12)[0]
 
 
 def robust_problem(
     samples: DepthSamples, expected_m: FloatArray, sd_m: FloatArray, choice: Choice
 ) -> Problem:
-    """With Huber's weights at 3 sd about the richest model that the views allow.
+    """Set up the problem with Huber weights at 3 sd around the most complex model that the views allow.
 
     Args:
-        samples: the pixels.
-        expected_m: (N,) what the sensor measures but for its noise. The terms are taken there: at the
-            measured depth itself noise would be on both sides and pull the scale towards 0.
-        sd_m: (N,) of the noise.
-        choice: the models.
+        samples: the pixels on the board.
+        expected_m: (N,) noise-free measured depth, where the terms are evaluated: at the measured depth the
+            noise would be on both sides and bias the scale towards 0.
+        sd_m: (N,) standard deviation of the noise.
+        choice: the models that are allowed.
     """
     y_m = samples.true_m - samples.measured_m
     views, plain = rows_of_views(samples), columns_of(choice.ladder[-1])
@@ -232,12 +232,12 @@ def robust_problem(
 
 
 def chosen_terms(problem: Problem, choice: Choice) -> tuple[tuple[str, ...], dict[str, float]]:
-    """The terms that views held out justify, and the RMS error there by the terms of every model tried.
+    """Return the terms that held-out views justify, and the RMS error there of every model tried.
 
-    A richer model takes the place of a simpler one if its error in sd, squared, is lower by more than the
-    standard error of that difference over the views, and if the interval of what it adds leaves out 0. Every
-    model may explain what it sees by an error of the lens, and pays for an unlikely one: all views share the
-    lens, so that no view that is held out can tell a wrong focal length from a scale of the sensor.
+    A more complex model replaces a simpler one if its squared error in sd is lower by more than the standard
+    error of that difference over the views, and if the interval of the added term excludes 0. Every model may
+    explain the data by an error of the lens, at a cost: all views share the lens, so held-out views cannot
+    distinguish a wrong focal length from a scale of the sensor.
     """
     tried: dict[str, float] = {}
 
@@ -259,14 +259,14 @@ def chosen_terms(problem: Problem, choice: Choice) -> tuple[tuple[str, ...], dic
 
 
 def _falls(before: FloatArray, after: FloatArray) -> bool:
-    """Whether the mean of (V,) paired errors falls by more than its standard error."""
+    """Return whether the mean of (V,) paired errors falls by more than its standard error."""
     gain = before - after
     return bool(gain.mean() > gain.std(ddof=1) / np.sqrt(len(gain)))
 
 
 def _certain(problem: Problem, model: tuple[str, ...], added: Iterable[str]) -> bool:
-    """Whether every term that a model adds has a parameter whose interval leaves out 0, of 95 % for all the
-    term's parameters and all models that are tried together.
+    """Return whether every added term has a parameter whose interval excludes 0; intervals are of 95 % for
+    all the term's parameters and all models together.
     """
     columns = columns_of(model)
     sds = np.abs(problem.solve(columns)) / np.sqrt(np.diag(problem.covariance(columns)))

@@ -1,5 +1,5 @@
-"""Finding a board's points in an image: a ladder of detectors, never mirrored, and where none succeeds, why
-(SPEC 1.2).
+"""Detection of a board's points in an image by several detectors in turn, with the reason if all fail
+(SPEC 1.2). The points are never mirrored.
 """
 
 from __future__ import annotations
@@ -16,41 +16,41 @@ from pipeline.calibration.board import RING, Board
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 SMALLEST_PX, LARGEST_SHARE = 20.0, 0.02
-"""Area of a circle: at least so many pixels, at most so much of the image. OpenCV's own limit of 5,000 pixels
-misses the circles of a board held near the camera."""
+"""Least area of a circle in pixels, and its largest area as a share of the image. OpenCV's own limit of 5,000
+pixels would miss the circles of a board near the camera."""
 SIZES = 4.0
-"""The largest circle over the smallest as a tilted board shows them, and over the core of the marked one."""
+"""Ratio of the largest to the smallest circle of a tilted board, and to the marked circle's core."""
 CORNER_WINDOW_PX = 5
 MARK_STEP = 0.25
-"""Least brightness, over that of the paper around, by which the white ring tells its circle from others."""
+"""Least brightness, over that of the surrounding paper, by which the white ring is recognised."""
 LINK = 2.0
-"""Blobs farther from the others than so many times the usual distance of neighbours are not the board's."""
+"""Blobs farther from the others than this many usual distances of neighbours are not on the board."""
 MOST_BEND = 0.5
-"""Of the step between neighbours: by so much it may change from one to the next along a row or column."""
+"""Largest change of the step between neighbours along a row or column, as a share of the step."""
 NEAR, MOST_OF_A_SIDE = 0.3, 0.8
-"""A grid goes on where so much of a further row or column has a blob so near its place, in pitches."""
+"""A grid continues if this share of another row or column has blobs this close to it, in pitches."""
 ALTERNATES = 0.75
-"""Of how strongly dark and light squares alternate along the row inside; on the board's rim it is a half."""
+"""Least contrast of alternating squares over that of the row inside it; at the board's rim it is a half."""
 INTO_A_SQUARE = 0.3
-"""Of a square's side, from the corner: there brightness is read; the outermost may be narrow."""
+"""Distance from a corner, in squares, at which brightness is read; the outermost squares may be narrow."""
 FEW_CHARUCO = 6
-"""Corners of a ChArUco board from which on a view counts."""
+"""Least number of corners with which a view of a ChArUco board counts."""
 
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """What was found in one image."""
+    """Points found in one image."""
 
     points_px: FloatArray
-    """(N, 2) of the board's points, sub-pixel; empty if the board was not found."""
+    """(N, 2) subpixel positions of the board's points; empty if the board was not found."""
     indices: IntArray
-    """(N,) which of ``Board.points_m`` each of them is."""
+    """(N,) index of each in ``Board.points_m``."""
     reason: str = ""
-    """Why it was not found, in a sentence with what to try."""
+    """Why the board was not found, in a sentence with what to try."""
     blobs_px: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
-    """(B, 2) what looked like a circle, where the board was not found."""
+    """(B, 2) circle-like blobs, if the board was not found."""
     oriented: bool = True
-    """Whether a mark or the pattern itself told which way is up; if not, all may be turned by 180°."""
+    """Whether a mark or the pattern showed the orientation; if not, all points may be rotated by 180°."""
 
     @property
     def found(self) -> bool:
@@ -59,14 +59,14 @@ class Detection:
 
 
 def detect(image: ByteArray, board: Board) -> Detection:
-    """Find a board's points.
+    """Find a board's points in an image.
 
     Args:
         image: (H, W) or (H, W, 3) uint8.
-        board: what to look for.
+        board: the board to find.
 
     Raises:
-        InputError: no 8-bit image.
+        InputError: the image does not have 8 bits per channel.
     """
     if image.dtype != np.uint8 or image.ndim not in (2, 3):
         raise InputError(f"An image of {image.dtype} {image.shape} cannot be searched; try 8 bits a channel")
@@ -116,7 +116,7 @@ def _circles(gray: ByteArray, board: Board) -> Detection:
 
 
 def _blob_detectors(gray: ByteArray) -> Iterator[tuple[ByteArray, cv2.SimpleBlobDetector]]:
-    """Dark circles on light, then light ones on dark; strict about their shape, then lenient."""
+    """Yield detectors for dark circles on light, then light on dark; strict about shape, then lenient."""
     for picture in (gray, 255 - gray):
         for circularity, convexity, inertia in ((0.5, 0.9, 0.1), (0.2, 0.7, 0.02)):
             given = cv2.SimpleBlobDetector.Params()
@@ -132,7 +132,7 @@ def _blob_detectors(gray: ByteArray) -> Iterator[tuple[ByteArray, cv2.SimpleBlob
 
 
 def _alike(blobs: Sequence[cv2.KeyPoint]) -> tuple[FloatArray, FloatArray]:
-    """(B, 2) centres and (B,) diameters of the largest group of blobs of like sizes, without letters."""
+    """Return (B, 2) centres and (B,) diameters of the largest group of blobs of similar size."""
     sizes_px = np.array([blob.size for blob in blobs])
     if not len(sizes_px):
         return np.zeros((0, 2)), sizes_px
@@ -141,7 +141,7 @@ def _alike(blobs: Sequence[cv2.KeyPoint]) -> tuple[FloatArray, FloatArray]:
 
 
 def _together(blobs_px: FloatArray, sizes_px: FloatArray, board: Board) -> tuple[FloatArray, FloatArray]:
-    """The blobs of the largest group that goes on from neighbour to neighbour; the room's own stand apart."""
+    """Return the largest group of blobs connected from neighbour to neighbour, without other objects."""
     if len(blobs_px) <= board.columns * board.rows:
         return blobs_px, sizes_px
     apart_px = np.linalg.norm(blobs_px[:, None] - blobs_px, axis=2)
@@ -152,9 +152,9 @@ def _together(blobs_px: FloatArray, sizes_px: FloatArray, board: Board) -> tuple
 
 
 def _even(points_px: FloatArray, board: Board) -> bool:
-    """Whether every point lies where the two beside it in its row and in its column lead to."""
+    """Return whether every point is where its two neighbours in row and column predict it."""
     grid = points_px.reshape(board.rows, board.columns, 2)
-    alike = 2 if board.pattern == "circles-asymmetric" else 1  # whose every second row is shifted
+    alike = 2 if board.pattern == "circles-asymmetric" else 1  # every second row is shifted
     for lines in (grid, *(grid[first::alike].swapaxes(0, 1) for first in range(alike))):
         steps = np.diff(lines, axis=1)
         pitch_px = np.linalg.norm(steps, axis=2)
@@ -165,7 +165,7 @@ def _even(points_px: FloatArray, board: Board) -> bool:
 
 
 def _only(blobs_px: FloatArray, sizes_px: FloatArray, shape: tuple[int, ...]) -> ByteArray:
-    """A picture of nothing but these blobs, in which no shadow or letter keeps a grid from being found."""
+    """Draw an image of only these blobs, in which shadows and letters cannot disturb the grid detection."""
     picture = np.full(shape, 255, np.uint8)
     for center_px, size_px in zip(blobs_px.round().astype(int).tolist(), sizes_px.tolist(), strict=True):
         cv2.circle(picture, center_px, max(4, round(0.4 * size_px)), 0, -1, cv2.LINE_AA)
@@ -185,8 +185,8 @@ def _why_no_circles(board: Board, blobs_px: FloatArray) -> str:
 
 
 def _goes_on(board: Board, points_px: FloatArray, blobs_px: FloatArray) -> bool:
-    """Whether the grid has a further row or column on the board, so that only a part of it was taken."""
-    if board.pattern == "circles-asymmetric":  # whose rows do not fit if there are more
+    """Return whether the grid has another row or column, so that only a part of the board was found."""
+    if board.pattern == "circles-asymmetric":  # with more rows, its grid would not have fitted
         return False
     columns, rows = board.size
     grid = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2).astype(float)
@@ -208,7 +208,7 @@ def _more_circles(board: Board) -> str:
 
 
 def _upright(gray: ByteArray, board: Board, points_px: FloatArray) -> Detection:
-    """In the board's own order: right-handed always, and begun at the mark where there is one."""
+    """Return the points in the board's order: right-handed, starting at the mark if there is one."""
     orders = [order for order in _orders(board) if _right_handed(points_px[order], board)]
     if board.pattern == "circles-asymmetric":
         return _all(board, points_px[orders[0]], oriented=True)
@@ -219,7 +219,7 @@ def _upright(gray: ByteArray, board: Board, points_px: FloatArray) -> Detection:
 
 
 def _orders(board: Board) -> list[IntArray]:
-    """Ways to read a grid: as it is, turned by 180°, mirrored, and transposed where it is square."""
+    """Return orders of a grid: unchanged, rotated by 180°, mirrored, and transposed if it is square."""
     grid = np.arange(board.columns * board.rows).reshape(board.rows, board.columns)
     if board.pattern == "circles-asymmetric":
         return [grid.ravel(), grid[::-1, ::-1].ravel(), grid[:, ::-1].ravel(), grid[::-1].ravel()]
@@ -230,7 +230,7 @@ def _orders(board: Board) -> list[IntArray]:
 
 
 def _right_handed(points_px: FloatArray, board: Board) -> bool:
-    """Whether columns run clockwise into rows, as x into y does in an image."""
+    """Return whether columns turn clockwise into rows, as x into y in an image."""
     first, last = points_px[0], points_px[-1]
     right, down = points_px[board.columns - 1] - first, points_px[-board.columns] - first
     turned = (right[0] * down[1] - right[1] * down[0]) > 0.0
@@ -239,7 +239,7 @@ def _right_handed(points_px: FloatArray, board: Board) -> bool:
 
 
 def _ring(gray: ByteArray, points_px: FloatArray, board: Board) -> float:
-    """How much brighter the first circle is where its ring would be than its neighbours, over the paper."""
+    """Return the first circle's brightness at its ring: 0 as its neighbours there, 1 as the paper."""
     reach = 0.5 * sum(RING) * board.radius_m / board.spacing_m
     near = [0, 1, board.columns, board.columns + 1]
     right, down = points_px[1] - points_px[0], points_px[board.columns] - points_px[0]
@@ -251,7 +251,7 @@ def _ring(gray: ByteArray, points_px: FloatArray, board: Board) -> float:
 
 
 def _brightness(gray: ByteArray, points_px: FloatArray) -> FloatArray:
-    """(N,) between pixels."""
+    """Return (N,) interpolated brightness."""
     x, y = points_px.T.astype(np.float32)
     return cv2.remap(gray.astype(np.float32), x[None], y[None], cv2.INTER_LINEAR)[0]
 
@@ -291,11 +291,11 @@ def _chessboard(gray: ByteArray, board: Board) -> Detection:
 
 
 def _alternation(gray: ByteArray, board: Board, points_px: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(4,) how strongly squares alternate along the four outermost rows and columns of corners, and where one
-    more of each would be, each over the one inside it: 1 where there are corners, and 0.5 on the board's rim.
+    """Return (4,) how strongly squares alternate at the outermost rows and columns of corners, and one row or
+    column further out, each over the one inside it: 1 at corners, 0.5 at the board's rim.
     """
     grid = points_px.reshape(board.rows, board.columns, 2)
-    for _ in range(2):  # a row more on either side, straight on; then, turned, a column
+    for _ in range(2):  # extrapolate a row on either side; then, transposed, a column
         grid = np.concatenate([2 * grid[:1] - grid[1:2], grid, 2 * grid[-1:] - grid[-2:-1]]).swapaxes(0, 1)
     down, right = np.gradient(INTO_A_SQUARE * grid, axis=(0, 1))
     ways = (right + down, -right - down, right - down, down - right)
@@ -307,7 +307,7 @@ def _alternation(gray: ByteArray, board: Board, points_px: FloatArray) -> tuple[
     crossing *= np.sign(crossing[1:-1, 1:-1].mean())
     rows, columns = crossing[:, 1:-1].mean(axis=1), crossing[1:-1].mean(axis=0)
     sides = np.array([side[:3] for line in (rows, columns) for side in (line, line[::-1])])
-    outside, last, inner = np.maximum(sides, 1.0).T  # of 510 for black and white
+    outside, last, inner = np.maximum(sides, 1.0).T  # 510 for black and white
     return last / inner, outside / last
 
 
@@ -321,7 +321,7 @@ def _refined(gray: ByteArray, board: Board) -> tuple[bool, FloatArray | None]:
 
 
 def _dark_first(gray: ByteArray, board: Board, points_px: FloatArray) -> Detection:
-    """Begun where the square between the first four corners is black; some boards have it at both ends."""
+    """Order corners to start at a black square between the first four; some boards have one at both ends."""
     square = [0, 1, board.columns, board.columns + 1]
     here, there = (
         float(_brightness(gray, order[square].mean(axis=0)[None])[0])

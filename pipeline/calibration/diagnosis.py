@@ -1,4 +1,4 @@
-"""What the views show of a camera: where in the image they have points, what is left there, how it bends
+"""Diagnosis of a camera's views: distribution of points in the image, residuals, and distortion curve
 (SPEC 1.3 g, h).
 """
 
@@ -13,64 +13,64 @@ from pipeline.calibration.estimate import Calibration, FittedView
 from pipeline.types import FloatArray, IntArray
 
 CELLS = 10
-"""Along the longer side of the image, of the coverage."""
+"""Number of coverage cells along the longer side of the image."""
 CURVE_POINTS = 64
 BANDS = 8
-"""Of radii, in which residuals are averaged."""
+"""Number of radius bands over which residuals are averaged."""
 
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """Points of all views in each cell of the image."""
+    """Number of points of all views in each cell of the image."""
 
     columns_px: FloatArray
-    """(C + 1,) edges."""
+    """(C + 1,) edges of the columns."""
     rows_px: FloatArray
-    """(R + 1,)"""
+    """(R + 1,) edges of the rows."""
     counts: IntArray
-    """(R, C)"""
+    """(R, C) number of points."""
 
     @property
     def share(self) -> float:
-        """Of the cells in which a point was seen, 0 to 1."""
+        """Share of the cells with points, 0 to 1."""
         return float((self.counts > 0).mean())
 
 
 @dataclass(frozen=True, slots=True)
 class RadialResiduals:
-    """Residuals by how far from the principal point they are."""
+    """Residuals as a function of the distance from the principal point."""
 
     radius_px: FloatArray
-    """(N,)"""
+    """(N,) distance from the principal point."""
     outward_px: FloatArray
-    """(N,) part of the residual that points away from the principal point: a lens of the wrong kind shows in
-    it as a wave."""
+    """(N,) component of the residual away from the principal point: a wrong lens model shows in it as
+    a wave."""
     edges_px: FloatArray
-    """(B + 1,) of bands of radii."""
+    """(B + 1,) edges of the radius bands."""
     mean_px: FloatArray
-    """(B,) of ``outward_px`` in each band; NaN in an empty one."""
+    """(B,) mean of ``outward_px`` in each band; NaN in an empty one."""
     sd_of_mean_px: FloatArray
-    """(B,)"""
+    """(B,) standard deviation of the mean."""
 
 
 @dataclass(frozen=True, slots=True)
 class RadialCurve:
-    """How far the lens moves a point away from where a pinhole camera has it."""
+    """Displacement of points by the lens, relative to a pinhole camera."""
 
     angle_deg: FloatArray
-    """(K,) of the ray from the optical axis."""
+    """(K,) angle of the ray from the optical axis."""
     radius_px: FloatArray
-    """(K,) from the principal point, as the lens has it."""
+    """(K,) distance from the principal point with this lens."""
     moved_px: FloatArray
-    """(K,) less f tan(angle) of a pinhole camera, or f angle of a fisheye without distortion."""
+    """(K,) ``radius_px`` minus f tan(angle) of a pinhole, or minus f angle of an undistorted fisheye."""
     sd_px: FloatArray
-    """(K,) of it."""
+    """(K,) standard deviation of ``moved_px``."""
     seen_to_px: float
-    """Radius of the outermost point in the views; beyond it the curve is a guess."""
+    """Radius of the outermost point in the views; beyond it the curve is extrapolated."""
 
 
 def coverage(views: Sequence[FittedView], size_px: tuple[int, int]) -> Coverage:
-    """In which cells of the image points were seen."""
+    """Count the points in the cells of the image."""
     cell_px = max(size_px) / CELLS
     columns_px, rows_px = (np.linspace(-0.5, size - 0.5, round(size / cell_px) + 1) for size in size_px)
     points_px = np.concatenate([view.points_px for view in views])
@@ -79,7 +79,7 @@ def coverage(views: Sequence[FittedView], size_px: tuple[int, int]) -> Coverage:
 
 
 def radial_residuals(calibration: Calibration) -> RadialResiduals:
-    """Residuals of all views along the radius."""
+    """Compute the radial component of all views' residuals."""
     points_px = np.concatenate([view.points_px for view in calibration.views])
     residuals_px = np.concatenate([view.residuals_px for view in calibration.views])
     from_middle_px = points_px - calibration.matrix[:2, 2]
@@ -97,7 +97,7 @@ def radial_residuals(calibration: Calibration) -> RadialResiduals:
 
 
 def radial_curve(calibration: Calibration) -> RadialCurve:
-    """The distortion from the principal point to the farthest corner, along the image's rows."""
+    """Compute the distortion from the principal point to the farthest corner, along the image's rows."""
     optics, (width, height) = calibration.optics, calibration.size_px
     middle_px = calibration.matrix[:2, 2]
     corners_px = np.array([(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)]) - 0.5
@@ -109,7 +109,7 @@ def radial_curve(calibration: Calibration) -> RadialCurve:
     told = optics.linearised(rays)
     radius_px = told.points_px[:, 0] - middle_px[0]
     plain = angle if calibration.lens == "fisheye" else np.tan(angle)
-    # The middle and the focal length are what the curve is drawn against, and no part of its uncertainty.
+    # Principal point and focal length are the reference of the curve, so their errors are not included.
     bends = told.by_lens[::2, 4:]
     variance_px2 = np.einsum("ki,ij,kj->k", bends, calibration.covariance[4:, 4:], bends)
     seen_px = np.concatenate([view.points_px for view in calibration.views])

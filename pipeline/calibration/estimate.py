@@ -1,4 +1,4 @@
-"""A camera from views of a board: the lens, how sure it is, and how well it predicts views it has not seen
+"""Estimation of a camera from views of a board: the lens, its uncertainty, and the error in held-out views
 (SPEC 1.1, 1.3).
 """
 
@@ -21,20 +21,20 @@ from pipeline.types import FloatArray
 
 LEAST_VIEWS = 3
 LEAST_POINTS = 4
-"""Of a view that is placed."""
+"""Least number of points in a view to find its pose."""
 SETTLE_STEPS = 30
 MOST_RMS_SHARE = 0.1
-"""RMS over the image's longer side, from which on the numbers say nothing of the camera."""
+"""RMS as a share of the image's longer side above which the estimate is meaningless."""
 LEAST_INFORMATION = 1e-14
-"""Of a combination of parameters, over that of each alone: below it there is but rounding."""
+"""Least information on a combination of parameters, over that on each alone: less is rounding."""
 LEAST_TILT_DEG = 5.0
-"""Between the two views that differ most: views of a board held ever alike fit many lenses."""
+"""Least angle between the two views that differ most: equal tilts fit many lenses."""
 Z95 = 1.959964
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """The board as one image shows it."""
+    """Image points of the board in one image."""
 
     name: str
     points_px: FloatArray
@@ -45,21 +45,21 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class FittedView:
-    """A view, where its board is, and how far the lens is from explaining it."""
+    """A view with the pose of its board and its residuals."""
 
     name: str
     T_camera_board: FloatArray
     """(4, 4)"""
     residuals_px: FloatArray
-    """(N, 2) seen less predicted."""
+    """(N, 2) residuals, observed minus predicted."""
     points_px: FloatArray
-    """(N, 2) seen."""
+    """(N, 2) observed points."""
     board_m: FloatArray
     """(N, 3) the same points on the board."""
 
     @property
     def rms_px(self) -> float:
-        """Root mean square distance of a point, as OpenCV has it."""
+        """Root mean square distance of a point, as OpenCV defines it."""
         return rms_px(self.residuals_px)
 
 
@@ -73,50 +73,50 @@ class Calibration:
     matrix: FloatArray
     """(3, 3) K."""
     distortion: FloatArray
-    """OpenCV's vector: k1, k2, p1, p2, k3 and, of a rational lens, k4, k5, k6; of a fisheye k1 to k4."""
+    """OpenCV's vector: k1, k2, p1, p2, k3, with a rational lens also k4, k5, k6; for a fisheye k1 to k4."""
     names: tuple[str, ...]
-    """Of the parameters that were estimated."""
+    """Names of the parameters that were estimated."""
     covariance: FloatArray
-    """(P, P) of them."""
+    """(P, P) covariance of these parameters."""
     views: tuple[FittedView, ...]
 
     @property
     def optics(self) -> Optics:
-        """The lens alone."""
+        """The lens without uncertainty."""
         return Optics(self.lens, self.matrix, self.distortion)
 
     @property
     def rms_px(self) -> float:
-        """Over all points of all views."""
+        """Root mean square residual of all points of all views."""
         return rms_px(np.concatenate([view.residuals_px for view in self.views]))
 
     @property
     def parameters(self) -> dict[str, float]:
-        """All by name."""
+        """All parameters by name."""
         k, lens = self.matrix, self.distortion.ravel().tolist()
         names = FREE["fisheye"] if self.lens == "fisheye" else NAMES
         return dict(zip(names, (k[0, 0], k[1, 1], k[0, 2], k[1, 2], *lens), strict=False))
 
     @property
     def standard_errors(self) -> dict[str, float]:
-        """Of those that were estimated."""
+        """Standard errors of the estimated parameters."""
         return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     @property
     def intervals(self) -> dict[str, tuple[float, float]]:
-        """95 % intervals."""
+        """95 % intervals of the estimated parameters."""
         values = self.parameters
         errors = self.standard_errors.items()
         return {name: (values[name] - Z95 * error, values[name] + Z95 * error) for name, error in errors}
 
 
 def rms_px(residuals_px: FloatArray) -> float:
-    """Root mean square length of (N, 2) residuals."""
+    """Return the root mean square length of (N, 2) residuals."""
     return float(np.sqrt((residuals_px**2).sum(axis=1).mean()))
 
 
 def coordinate_sd_px(views: Sequence[FittedView], lens: Lens) -> float:
-    """Standard deviation of a coordinate of a point, from what is left after lens and poses are fitted."""
+    """Return the standard deviation of a point's coordinate, from the residuals after the fit."""
     every = np.concatenate([view.residuals_px for view in views])
     freedom = max(every.size - 6 * len(views) - len(FREE[lens]), 1)
     return float(np.sqrt((every**2).sum() / freedom))
@@ -128,10 +128,10 @@ def calibrate(views: Sequence[View], size_px: tuple[int, int], lens: Lens = "the
     Args:
         views: at least three, tilted differently.
         size_px: width and height of all images.
-        lens: which distortions it may have.
+        lens: distortion model.
 
     Raises:
-        InputError: too few views, or another lens.
+        InputError: there are too few views, or the lens model is unknown.
         ReconstructionError: the views do not determine the lens.
     """
     if lens not in get_args(Lens):
@@ -158,7 +158,7 @@ def calibrate(views: Sequence[View], size_px: tuple[int, int], lens: Lens = "the
 def calibration_of(
     views: Sequence[View], poses: Sequence[FloatArray], optics: Optics, size_px: tuple[int, int]
 ) -> Calibration:
-    """The record of a lens and of (4, 4) poses that were estimated together."""
+    """Build the record of a lens and (4, 4) poses that were estimated together."""
     fitted = tuple(_fitted(view, pose, optics) for view, pose in zip(views, poses, strict=True))
     covariance = coordinate_sd_px(fitted, optics.lens) ** 2 * inverted(information(fitted, optics))
     return Calibration(
@@ -168,8 +168,8 @@ def calibration_of(
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """OpenCV calibrates in one thread: of several it adds up the views as they end, and the last bits differ
-    from one time to the next. One is as fast.
+    """Let OpenCV calibrate in one thread: with several, it sums the views in varying order, and the last bits
+    differ between runs. One thread is as fast.
     """
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
@@ -180,7 +180,7 @@ def one_thread() -> Iterator[None]:
 
 
 def _brown(views: Sequence[View], size_px: tuple[int, int], lens: Lens) -> tuple[Optics, list[FloatArray]]:
-    """OpenCV's lens, and the boards' poses."""
+    """Estimate lens and board poses with OpenCV."""
     with one_thread():
         _, matrix, distortion, turns, moves, *_ = cv2.calibrateCameraExtended(
             [view.board_m.astype(np.float32) for view in views],
@@ -195,7 +195,7 @@ def _brown(views: Sequence[View], size_px: tuple[int, int], lens: Lens) -> tuple
 
 
 def _fisheye(views: Sequence[View], size_px: tuple[int, int]) -> tuple[Optics, list[FloatArray]]:
-    """A fisheye lens, and the boards' poses."""
+    """Estimate a fisheye lens and the board poses."""
 
     def placed(row: int, optics: Optics) -> FloatArray | None:
         try:
@@ -220,7 +220,7 @@ _UNEXPLAINED = (
 
 
 def pose_of(turn: FloatArray, move: FloatArray) -> FloatArray:
-    """(4, 4) of OpenCV's rotation vector and translation."""
+    """Return the (4, 4) transform of OpenCV's rotation vector and translation."""
     return rigid(cv2.Rodrigues(np.asarray(turn))[0], np.ravel(move))
 
 
@@ -231,15 +231,15 @@ def residuals(
     distortion: FloatArray,
     lens: Lens = "thesis",
 ) -> FloatArray:
-    """(N, 2) seen less predicted."""
+    """Return (N, 2) residuals, observed minus predicted."""
     return view.points_px - Optics(lens, matrix, distortion).project(view.board_m, T_camera_board)
 
 
 def place(view: View, matrix: FloatArray, distortion: FloatArray, lens: Lens = "thesis") -> FittedView:
-    """Where the board of a view is that had no part in the lens.
+    """Find the pose of the board in a view that was not used for the lens.
 
     Raises:
-        ReconstructionError: no pose explains it.
+        ReconstructionError: no pose explains the view.
     """
     optics = Optics(lens, matrix, distortion)
     rays = optics.rays(view.points_px)
@@ -257,9 +257,9 @@ def place(view: View, matrix: FloatArray, distortion: FloatArray, lens: Lens = "
 def settle(
     points_m: FloatArray, points_px: FloatArray, T_camera_points: FloatArray, optics: Optics
 ) -> FloatArray:
-    """(4, 4) pose near a given one, from which (N, 3) points are seen nearest to (N, 2) pixels.
+    """Refine a (4, 4) pose so that (N, 3) points project closest to (N, 2) pixels.
 
-    Levenberg and Marquardt's method on the distances in the image.
+    It minimises the image distances by the Levenberg-Marquardt method.
     """
     pose = np.concatenate([cv2.Rodrigues(T_camera_points[:3, :3])[0].ravel(), T_camera_points[:3, 3]])
     damping, told = 1e-3, optics.linearised(points_m, T_camera_points)
@@ -281,10 +281,10 @@ def settle(
 def held_out(
     views: Sequence[View], size_px: tuple[int, int], folds: int, lens: Lens = "thesis"
 ) -> tuple[FittedView, ...]:
-    """Every view by a lens from the others: each fold in turn is left out (SPEC 1.3 c).
+    """Fit every view by a lens estimated from the other folds: each fold is left out in turn (SPEC 1.3 c).
 
     Raises:
-        InputError: fewer than two folds, or too few views for them.
+        InputError: there are fewer than two folds, or too few views for them.
         ReconstructionError: the views of a fold do not determine the lens.
     """
     if not 2 <= folds <= len(views):
@@ -315,8 +315,8 @@ def _fitted(view: View, T_camera_board: FloatArray, optics: Optics) -> FittedVie
 
 
 def information(fitted: Sequence[FittedView], optics: Optics) -> FloatArray:
-    """(P, P) what views tell of the lens if a coordinate is known to 1 px: its part of J^T J, in which the
-    poses are parameters, too (SPEC 1.3 d).
+    """Return (P, P) information of views on the lens, for coordinates known to 1 px: its part of J^T J with
+    the poses as parameters too (SPEC 1.3 d).
     """
     return sum(
         (informed(view.board_m, view.T_camera_board, optics) for view in fitted),
@@ -325,7 +325,7 @@ def information(fitted: Sequence[FittedView], optics: Optics) -> FloatArray:
 
 
 def inverted(told: FloatArray) -> FloatArray:
-    """(P, P) covariance of (P, P) information; what the views hardly tell is very unsure, never sure."""
+    """Invert (P, P) information to a covariance; poorly determined parameters get a large variance."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(told), LEAST_INFORMATION))
     values, turns = np.linalg.eigh(told * np.outer(scale, scale))
     root = scale[:, None] * turns / np.sqrt(np.maximum(values, LEAST_INFORMATION))
@@ -333,7 +333,7 @@ def inverted(told: FloatArray) -> FloatArray:
 
 
 def informed(board_m: FloatArray, T_camera_board: FloatArray, optics: Optics) -> FloatArray:
-    """(P, P) what one view tells."""
+    """Return the (P, P) information of one view."""
     told = optics.linearised(board_m, T_camera_board)
     base = np.linalg.qr(told.by_pose)[0]
     left = told.by_lens - base @ (base.T @ told.by_lens)

@@ -1,7 +1,7 @@
-"""A fisheye and the boards before it, estimated together.
+"""Joint estimation of a fisheye lens and board poses.
 
-OpenCV's own estimation begins with a pinhole camera, and with boards far from the optical axis it ends
-anywhere. This one begins with equidistant lenses of several focal lengths.
+OpenCV's own estimation starts from a pinhole camera, and fails unpredictably for boards far from the
+optical axis. This one starts from equidistant lenses of several focal lengths.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ from pipeline.calibration.lens import FREE, Optics, Projection
 from pipeline.types import FloatArray
 
 FOCAL_SHARES = (0.2, 0.3, 0.45, 0.7, 1.1)
-"""Focal lengths to begin with, over the image's longer side: from half a sphere to a narrow view."""
+"""Starting focal lengths over the image's longer side: from a half sphere to a narrow view."""
 TRIED = 2
-"""Of them, those that place the boards best."""
+"""Number of starts that are optimised: those that place the boards best."""
 STEPS, STILL = 100, 1e-10
-"""Of Levenberg and Marquardt's method, and the relative gain at which it ends."""
+"""Most Levenberg-Marquardt steps, and the relative gain below which they stop."""
 LARGEST_DAMPING = 1e12
 
 Boards = Sequence[tuple[FloatArray, FloatArray]]
-"""(N, 3) points of a board and (N, 2) pixels where they are seen, of each view."""
+"""(N, 3) points of a board and (N, 2) pixels where they are seen, for each view."""
 
 
 def estimate_fisheye(
     boards: Boards, size_px: tuple[int, int], place: Callable[[int, Optics], FloatArray | None]
 ) -> tuple[Optics, list[FloatArray]] | None:
-    """The lens and the (4, 4) poses of the boards; None if no beginning places all of them.
+    """Estimate the lens and the (4, 4) poses of the boards; returns None if no start places all of them.
 
     Args:
-        boards: of three views or more.
+        boards: boards of three views or more.
         size_px: width and height of the images.
-        place: the pose of a view for a given lens, or None.
+        place: returns the pose of a view for a given lens, or None.
     """
     beginnings: list[tuple[float, Optics, list[FloatArray]]] = []
     for share in FOCAL_SHARES:
@@ -54,7 +54,7 @@ def estimate_fisheye(
 def adjust(
     boards: Boards, optics: Optics, poses: Sequence[FloatArray]
 ) -> tuple[float, Optics, list[FloatArray]]:
-    """Lens and poses that make the sum of squared distances in the images least, and that sum."""
+    """Minimise the sum of squared image distances; returns this sum, the lens and the poses."""
     lens = _numbers(optics)
     turns = [np.concatenate([cv2.Rodrigues(T[:3, :3])[0].ravel(), T[:3, 3]]) for T in poses]
     seen = [pixels for _, pixels in boards]
@@ -83,7 +83,7 @@ def adjust(
 def _step(
     told: Sequence[Projection], seen: Sequence[FloatArray], damping: float
 ) -> tuple[FloatArray, list[FloatArray]]:
-    """Changes of the lens and of each pose, the poses eliminated first."""
+    """Return the changes of the lens and of each pose, with the poses eliminated first."""
     count = told[0].by_lens.shape[1]
     normal, right = np.zeros((count, count)), np.zeros(count)
     reduced, parts = np.zeros((count, count)), []

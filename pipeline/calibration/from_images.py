@@ -1,4 +1,4 @@
-"""A camera from image files of a board, image by image (SPEC 1.3)."""
+"""Calibration of a camera from image files of a board (SPEC 1.3)."""
 
 from __future__ import annotations
 
@@ -34,46 +34,46 @@ from pipeline.types import CameraIntrinsics
 
 @dataclass(frozen=True, slots=True)
 class CameraReport:
-    """A calibration and the images that it comes from."""
+    """A calibration and its images."""
 
     board: Board
     detections: dict[str, Detection]
-    """By the image's name."""
+    """Detections by the image's name."""
     views: tuple[View, ...]
-    """Those that the camera comes from."""
+    """Views from which the camera was estimated."""
     calibration: Calibration
     held_out: tuple[FittedView, ...]
-    """The same views, each by a lens of others; empty if none was held out."""
+    """The same views, each fitted by a lens of other views; empty if none was held out."""
     left_out: tuple[str, ...] = ()
-    """Images that somebody wanted left out."""
+    """Images that the user excluded."""
     warp: BoardWarp | None = None
-    """Of the board, where it was asked for."""
+    """Warp of the board, if it was requested."""
     depth: DepthFit | None = None
-    """The bias of the depth sensor, where there are depth images."""
+    """Bias of the depth sensor, if there are depth images."""
     depth_reason: str = ""
-    """Why that is not known, though there are depth images."""
+    """Why the bias is unknown although there are depth images."""
     depth_notes: tuple[str, ...] = ()
-    """What is doubtful about the scale of those, a sentence each."""
+    """Doubts about the depth scale, one sentence each."""
 
     @property
     def held_out_rms_px(self) -> float | None:
-        """Over all points of views that the lens has not seen; None if none was held out."""
+        """RMS over all points of held-out views; None if none was held out."""
         if not self.held_out:
             return None
         return rms_px(np.concatenate([view.residuals_px for view in self.held_out]))
 
     @property
     def distances_m(self) -> tuple[float, float]:
-        """Of the board's middle from the camera: the least and the most."""
+        """Least and largest distance of the board's centre from the camera."""
         away_m = [float(np.linalg.norm(view.T_camera_board[:3, 3])) for view in self.calibration.views]
         return min(away_m), max(away_m)
 
     @property
     def intrinsics(self) -> CameraIntrinsics:
-        """The camera as the chain takes it.
+        """Return the camera for the reconstruction.
 
         Raises:
-            InputError: a rational or fisheye lens, which it does not know.
+            InputError: the lens is rational or fisheye, which the reconstruction does not support.
         """
         found = self.calibration
         if found.lens in ("rational", "fisheye"):
@@ -83,7 +83,7 @@ class CameraReport:
         return CameraIntrinsics(found.matrix, found.distortion[:5].copy(), *found.size_px)
 
     def metrics(self) -> dict[str, Any]:
-        """What ``--json`` prints."""
+        """Return the values that ``--json`` prints."""
         found = self.calibration
         fitted = {view.name: view.rms_px for view in found.views}
         unseen = {view.name: view.rms_px for view in self.held_out}
@@ -126,10 +126,10 @@ class CameraReport:
 
 
 def image_files(given: Sequence[str]) -> list[Path]:
-    """The images that files, folders and patterns such as ``left*.jpg`` name, in order.
+    """Return the images named by files, folders and patterns such as ``left*.jpg``, in order.
 
     Raises:
-        InputError: one of them names no image.
+        InputError: an argument names no image.
     """
     files: list[Path] = []
     for word in given:
@@ -158,23 +158,23 @@ def iterate_calibration(
 ) -> Generator[Progress, None, CameraReport]:
     """Find the board in every image and estimate the camera.
 
-    Circles are found once more where perspective does not move their centres, with the first estimate.
+    Circle centres are then refined without perspective bias, using the first estimate.
 
     Args:
         files: images of one size.
-        board: what they show.
-        lens: which distortions the camera may have.
-        folds: in how many turns views are held out; 0 holds none out, 2 half of them as the thesis does. With
-            few views there are as many turns as it takes to leave three of them.
+        board: the board in them.
+        lens: distortion model of the camera.
+        folds: number of folds of held-out views; 0 holds none out, 2 half of them like the thesis. With few
+            views the number is increased so that three remain for the lens.
         without: names of images to leave out.
-        warp: whether to estimate the board's points, too, and to use them if held-out views then fit better.
+        warp: whether to also estimate the board's points, and use them if held-out views then fit better.
 
     Yields:
-        Progress, before each image.
+        Progress before each image.
 
     Raises:
-        InputError: unreadable images, several sizes, the board in too few of them, or an image to leave out
-            that is not there.
+        InputError: images are unreadable or differ in size, too few show the board, or an image to leave out
+            does not exist.
         ReconstructionError: the views do not determine the lens.
     """
     detections, paths, size_px = yield from _detections(files, board)
@@ -214,7 +214,7 @@ def iterate_calibration(
 def _detections(
     files: Sequence[Path], board: Board
 ) -> Generator[Progress, None, tuple[dict[str, Detection], dict[str, Path], tuple[int, int]]]:
-    """What is found in each image and where it lies, by its name, and the size of all."""
+    """Detect the board in each image; returns detections and paths by name, and the size of all images."""
     detections: dict[str, Detection] = {}
     paths: dict[str, Path] = {}
     sizes: dict[tuple[int, int], str] = {}
@@ -231,7 +231,7 @@ def _detections(
 
 
 def _folds(wanted: int, views: int) -> int:
-    """At least as many as leave enough views for the lens; 0 if none are wanted or there are too few."""
+    """Return how many folds leave enough views for the lens; 0 if none are requested or possible."""
     if not wanted or views <= LEAST_VIEWS:
         return 0
     return next(folds for folds in range(min(wanted, views), views + 1) if _left(views, folds) >= LEAST_VIEWS)

@@ -1,4 +1,4 @@
-"""What a lens does: points to pixels, pixels to rays, and how both change with its parameters (SPEC 1.1)."""
+"""Lens models: projection of points, rays of pixels, and their derivatives by the parameters (SPEC 1.1)."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ FLAGS: dict[Lens, int] = {
     "brown": 0,
     "rational": cv2.CALIB_RATIONAL_MODEL,
 }
-"""k1 and k2 (SPEC 1.1); with tangential p1, p2 and k3; with the denominator's k4, k5, k6."""
+"""k1 and k2 (SPEC 1.1); additionally tangential p1, p2 and k3; additionally k4, k5, k6 of the denominator."""
 NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
-"""Of the parameters, in OpenCV's order."""
+"""Names of the parameters, in OpenCV's order."""
 FREE: dict[Lens, tuple[str, ...]] = {
     "thesis": NAMES[:6],
     "brown": NAMES[:9],
@@ -26,43 +26,43 @@ FREE: dict[Lens, tuple[str, ...]] = {
 }
 """Parameters that a calibration estimates."""
 WIDEST_DEG = 89.0
-"""From the optical axis: beyond it no point lies in front of the camera."""
+"""Largest angle from the optical axis: points beyond it are not in front of the camera."""
 _MISSED_PX = 0.01
-"""A ray that comes back farther from its pixel than this does not belong to it: there the lens folds."""
+"""A ray that projects farther than this from its pixel is invalid: the lens model folds there."""
 _PATH = 9
-"""Places from the axis to a ray where the lens is tried for a fold."""
+"""Points between axis and ray at which the lens model is tested for folding."""
 _NEWTON_STEPS, _LONGEST_STEP = 20, 0.3
 
 
 @dataclass(frozen=True, slots=True)
 class Projection:
-    """Points as a camera sees them, and how that changes."""
+    """Projected points and their derivatives."""
 
     points_px: FloatArray
     """(N, 2)"""
     by_pose: FloatArray
-    """(2 N, 6) derivatives by OpenCV's rotation vector and the translation of the points' pose."""
+    """(2 N, 6) derivatives by OpenCV's rotation vector and translation of the points' pose."""
     by_lens: FloatArray
-    """(2 N, P) by the lens's free parameters."""
+    """(2 N, P) derivatives by the lens's free parameters."""
 
 
 @dataclass(frozen=True, slots=True)
 class Optics:
-    """A lens with its numbers."""
+    """A lens model with its parameters."""
 
     lens: Lens
     matrix: FloatArray
     """(3, 3) K."""
     distortion: FloatArray
-    """k1, k2, p1, p2, k3 and, of a rational lens, k4, k5, k6; of a fisheye k1 to k4 (Kannala and Brandt,
+    """k1, k2, p1, p2, k3, with a rational lens also k4, k5, k6; for a fisheye k1 to k4 (Kannala and Brandt,
     "A generic camera model", PAMI 2006)."""
 
     def project(self, points_m: FloatArray, T_camera_points: FloatArray | None = None) -> FloatArray:
-        """(N, 2) pixels of (N, 3) points, which are moved into the camera's frame first."""
+        """Project (N, 3) points, first transformed to the camera's frame, to (N, 2) pixels."""
         return self.linearised(points_m, T_camera_points).points_px
 
     def linearised(self, points_m: FloatArray, T_camera_points: FloatArray | None = None) -> Projection:
-        """The same with its derivatives."""
+        """Project points as ``project`` does, with derivatives."""
         if not len(points_m):
             return Projection(np.empty((0, 2)), np.empty((0, 6)), np.empty((0, len(FREE[self.lens]))))
         T = np.eye(4) if T_camera_points is None else T_camera_points
@@ -76,7 +76,7 @@ class Optics:
         return Projection(seen.reshape(-1, 2), J[:, :6], J[:, columns])
 
     def rays(self, points_px: FloatArray) -> FloatArray:
-        """(N, 3) unit directions that (N, 2) pixels look into; NaN where the lens has none for a pixel."""
+        """Return (N, 3) unit directions of (N, 2) pixels; NaN where the lens model has none."""
         flat = self._flat_fisheye(points_px) if self.lens == "fisheye" else self._flat(points_px)
         rays = np.column_stack([flat, np.ones(len(flat))])
         known = np.flatnonzero(np.isfinite(flat).all(axis=1))
@@ -86,19 +86,19 @@ class Optics:
         return rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
     def _unfolded(self, rays: FloatArray) -> BoolArray:
-        """(N,) whether the image grows all the way from the axis to each of (N, 3) rays with z = 1."""
+        """Return (N,) True if the image grows all the way from the axis to each of (N, 3) rays with z = 1."""
         grows = np.ones(len(rays), bool)
         for share in np.linspace(0.0, 1.0, _PATH):
             grows &= np.linalg.det(self._slopes(rays * (share, share, 1.0))[1]) > 0.0
         return grows
 
     def _slopes(self, rays: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(N, 2) pixels of (N, 3) rays with z = 1, and (N, 2, 2) their derivatives by x and y."""
+        """Return (N, 2) pixels of (N, 3) rays with z = 1, and their (N, 2, 2) derivatives by x and y."""
         told = self.linearised(rays)
         return told.points_px, told.by_pose.reshape(-1, 2, 6)[:, :, 3:5]
 
     def _flat(self, points_px: FloatArray) -> FloatArray:
-        """(N, 2) on the plane z = 1, by Newton's method."""
+        """Return (N, 2) points of pixels on the plane z = 1, by Newton's method."""
         flat = (points_px - self.matrix[:2, 2]) / self.matrix[[0, 1], [0, 1]]
         for _ in range(_NEWTON_STEPS):
             seen_px, slopes = self._slopes(np.column_stack([flat, np.ones(len(flat))]))
@@ -108,7 +108,7 @@ class Optics:
         return flat
 
     def _flat_fisheye(self, points_px: FloatArray) -> FloatArray:
-        """(N, 2) on the plane z = 1, by Newton's method for the angle from the axis."""
+        """Return (N, 2) points of pixels on the plane z = 1, by Newton's method for the angle to the axis."""
         bent = (points_px - self.matrix[:2, 2]) / self.matrix[[0, 1], [0, 1]]
         reach = np.linalg.norm(bent, axis=1)
         odd = np.array([1.0, *self.distortion.ravel()])

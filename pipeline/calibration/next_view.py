@@ -1,5 +1,5 @@
-"""The view to take next: of many poses of the board, the one that would tell most about the lens where it
-is used (SPEC 1.3 e, read backwards).
+"""Choice of the next view: of many board poses, the one that adds most information on the lens at the
+working distance (SPEC 1.3 e).
 """
 
 from __future__ import annotations
@@ -18,58 +18,58 @@ from pipeline.kernels.geometry import apply, rigid, rotation_exp
 from pipeline.types import FloatArray
 
 TILTS_DEG = (0.0, 25.0, 45.0)
-"""Of the board against the camera's view of it; farther tilts blur and are hard to find."""
+"""Tilts of the board relative to the camera; larger ones blur and are hard to detect."""
 SIDES = 8
-"""Directions to tilt to."""
+"""Number of directions of the tilt."""
 PLACES = (0.15, 0.32, 0.5, 0.68, 0.85)
-"""Of the board's middle, as shares of the image's width and height."""
+"""Positions of the board's centre, as shares of the image's width and height."""
 WIDTHS = (0.3, 0.45, 0.65)
-"""Of the board, as shares of the image's: how near it is."""
+"""Widths of the board, as shares of the image's, which determine its distance."""
 WIDEST = 1.0
-"""The board's width over its distance: nearer it is not sharp."""
+"""Largest ratio of the board's width to its distance: closer boards are out of focus."""
 RIM = 0.02
 """Share of the image that stays free around the board's points."""
 NEAREST = 0.02
-"""Of a board's points in front of the camera, as a share of the board's distance."""
+"""Least depth of a board's points, as a share of the board's distance."""
 
 
 @dataclass(frozen=True, slots=True)
 class NextView:
-    """A view worth taking."""
+    """A view to take next."""
 
     T_camera_board: FloatArray
-    """(4, 4)"""
+    """(4, 4) pose of the board."""
     points_px: FloatArray
-    """(N, 2) where the board's points are then."""
+    """(N, 2) pixels of the board's points."""
     outline_px: FloatArray
-    """(4, 2) the corners of the area of its points, in order around it."""
+    """(4, 2) corners of the board's area of points, in order around it."""
     error_before_m: float
-    """Predicted of a point at the range, root mean square over the image."""
+    """Predicted error of a point at the working distance, root mean square over the image."""
     error_after_m: float
-    """The same once this view is taken."""
+    """Predicted error after this view is added."""
 
     @property
     def distance_m(self) -> float:
-        """From the camera to the middle of the board."""
+        """Distance from the camera to the centre of the board."""
         return float(np.linalg.norm(self.T_camera_board[:3, 3]))
 
     @property
     def tilt_deg(self) -> float:
-        """Of the board against the line of sight."""
+        """Angle of the board's normal to the line of sight."""
         sight_line = self.T_camera_board[:3, 3] / self.distance_m
         return float(np.degrees(np.arccos(np.clip(abs(self.T_camera_board[:3, 2] @ sight_line), 0.0, 1.0))))
 
 
 def next_view(calibration: Calibration, board: Board, range_m: float) -> NextView:
-    """Of many views the one that lowers the predicted error at a range most.
+    """Find the view that reduces the predicted error at a distance most.
 
     Args:
-        calibration: what is known so far.
+        calibration: the calibration so far.
         board: the one that is shown.
-        range_m: where the camera will measure.
+        range_m: distance at which the camera will measure.
 
     Raises:
-        InputError: no range at which anything can be seen.
+        InputError: the distance is impossible.
         ReconstructionError: the board fits nowhere into the image.
     """
     optics, size_px = calibration.optics, calibration.size_px
@@ -96,9 +96,9 @@ def next_view(calibration: Calibration, board: Board, range_m: float) -> NextVie
 
 
 def candidates(board: Board, optics: Optics, size_px: tuple[int, int]) -> Iterator[FloatArray]:
-    """(4, 4) poses of the board, the same ones every time, that are wholly in the image.
+    """Yield a fixed set of (4, 4) poses of the board that are completely in the image.
 
-    Every place in the image, tilt, side to tilt to, and distance; the upper edge of the board is up.
+    They combine all positions, tilts, tilt directions and distances; the upper edge of the board is up.
     """
     size, points_m = np.array(size_px, float), board.points_m
     low_px, high_px = RIM * size - 0.5, (1.0 - RIM) * size - 0.5
@@ -123,26 +123,26 @@ def candidates(board: Board, optics: Optics, size_px: tuple[int, int]) -> Iterat
 
 
 def _angle(optics: Optics, size: FloatArray, share: float) -> float:
-    """Twice the tangent of half the angle that a share of the image's width spans in its middle."""
+    """Return twice the tangent of half the angle that a share of the image's width spans at its centre."""
     ends_px = 0.5 * size + np.array([[-0.5 * share * size[0], 0.0], [0.5 * share * size[0], 0.0]])
     left, right = optics.rays(ends_px)
     return float(2.0 * np.tan(0.5 * np.arccos(np.clip(left @ right, -1.0, 1.0))))
 
 
 def _facing(ray: FloatArray) -> FloatArray:
-    """(3, 3) of a board that looks along a ray, its rows level."""
+    """Return the (3, 3) rotation of a board perpendicular to a ray, with level rows."""
     right = np.cross((0.0, 1.0, 0.0), ray)
     right /= np.linalg.norm(right)
     return np.column_stack([right, np.cross(ray, right), ray])
 
 
 def _cost_m2(seen: Sight, place: FloatArray) -> FloatArray:
-    """(P, P) whose product with a lens's covariance has the mean squared error over the image as trace."""
+    """Return the (P, P) matrix whose product with a lens's covariance has the mean squared error as trace."""
     change = seen.metres @ (seen.by_lens + seen.by_pose @ place)
     change = change[np.isfinite(change).all(axis=(1, 2))]
     return np.einsum("gij,gik->jk", change, change) / len(change)
 
 
 def _error_m(covariance: FloatArray, cost_m2: FloatArray) -> float:
-    """Root mean square over the image."""
+    """Return the root mean square error over the image."""
     return float(np.sqrt(np.sum(covariance * cost_m2)))

@@ -1,4 +1,4 @@
-"""Views that do not fit the others: proposed with a reason, and never left out by themselves (issue 14)."""
+"""Views that do not fit the others: proposed with a reason, but never excluded automatically (issue 14)."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from packetmesh.errors import ReconstructionError
 from pipeline.calibration.estimate import LEAST_VIEWS, Calibration, View, calibrate
 
 MOST_SDS = 3.5
-"""Robust standard deviations of the logarithm of a view's RMS above the median: then it stands out."""
+"""A view stands out if log RMS is this many robust standard deviations above the median."""
 LEAST_SD = 0.2
-"""Of that logarithm, so that no view stands out whose error is less than twice the others'."""
+"""Least standard deviation of log RMS, so that no view with less than twice the others' error stands out."""
 
 
 @dataclass(frozen=True, slots=True)
 class OutlierView:
-    """A view that one may leave out."""
+    """A view that the user may exclude."""
 
     name: str
     rms_px: float
-    """Its own."""
+    """RMS of the view."""
     others_px: float
-    """The median of the others."""
+    """Median RMS of the others."""
     rms_without_px: float
-    """Of the others, if the lens does without it."""
+    """RMS of the others if the lens is estimated without the view."""
     lens_moves_sd: float
-    """The most that a parameter of the lens then changes, in its standard errors."""
+    """Largest change of a lens parameter then, in its standard errors."""
 
     @property
     def reason(self) -> str:
-        """In a sentence."""
+        """Sentence with the reason."""
         return (
             f"{self.name} has {self.rms_px:.2f} px where the others have {self.others_px:.2f}; without it "
             f"the camera changes by {self.lens_moves_sd:.1f} standard errors and the others come to "
@@ -41,14 +41,14 @@ class OutlierView:
 
 
 def outlier_views(calibration: Calibration, views: Sequence[View]) -> tuple[OutlierView, ...]:
-    """Views whose error stands out, the worst first.
+    """Find the views whose error stands out, the worst first.
 
-    One wrong view spoils the fit of all, so they are found one after the other, each in a lens without those
-    found before.
+    Because one wrong view affects the fit of all, they are found one after the other, each with a lens
+    without those found before.
 
     Args:
-        calibration: of all views.
-        views: those that it comes from.
+        calibration: calibration from all views.
+        views: the views of the calibration.
     """
     found: list[OutlierView] = []
     now, left = calibration, list(views)
@@ -77,7 +77,7 @@ def outlier_views(calibration: Calibration, views: Sequence[View]) -> tuple[Outl
 
 
 def _stands_out(errors_px: np.ndarray, row: int) -> bool:
-    """Whether a view's error is far above those of the others."""
+    """Return whether a view's error is far above those of the others."""
     others = np.log(np.maximum(np.delete(errors_px, row), 1e-6))
     middle = np.median(others)
     sd = max(1.4826 * float(np.median(np.abs(others - middle))), LEAST_SD)

@@ -1,5 +1,5 @@
-"""Circle centres without the bias of perspective: a tilted circle's image is an ellipse, whose middle is not
-where the circle's is (SPEC 1.2).
+"""Refinement of circle centres without the bias of perspective: a tilted circle's image is an ellipse, whose
+centre is not the image of the circle's centre (SPEC 1.2).
 """
 
 from __future__ import annotations
@@ -13,31 +13,31 @@ from pipeline.calibration.lens import Optics
 from pipeline.types import ByteArray, FloatArray
 
 REACH = 0.5
-"""Half the side of what is looked at around a circle, over the distance to its nearest neighbour."""
+"""Half the side of a circle's neighbourhood, over the distance to its nearest neighbour."""
 SAMPLES = (41, 121)
-"""Along that side: least and most."""
+"""Least and most samples along that side."""
 PAPER = 0.86
-"""Share of the reach beyond which there is nothing but paper."""
+"""Share of the neighbourhood's radius beyond which there is only paper."""
 MIDDLE = 0.3
-"""Share of the reach that lies within a circle whatever its size."""
+"""Share of the neighbourhood's radius that is inside a circle of any allowed size."""
 RIM = 1.3
-"""Of what belongs to a circle, over its radius: letters lie beyond it, blur within."""
+"""Radius up to which darkness belongs to a circle, over its radius: blur is within it, letters beyond."""
 LEAST_CONTRAST = 10.0
-"""Grey levels between circle and paper."""
+"""Least difference in grey levels between circle and paper."""
 MOST_SHIFT_PX = 1.0
-"""A centre that moves farther was disturbed, by glare or a shadow's edge, and stays where it was."""
+"""Centres that move farther were disturbed, by glare or a shadow's edge, and keep their old position."""
 
 
 def refined_px(gray: ByteArray, board: Board, view: FittedView, optics: Optics) -> FloatArray:
-    """(N, 2) centres of a view's circles, seen as if the camera looked straight at the board.
+    """Return (N, 2) refined centres of a view's circles, as seen perpendicular to the board.
 
-    Each circle's neighbourhood is rectified by the lens and the pose, its centre is the centre of darkness
-    (or of light, on dark paper) there, and is taken back to the image.
+    Each circle's neighbourhood is rectified by lens and pose; the centre of darkness there (of light, on dark
+    paper) is projected back to the image.
 
     Args:
         gray: (H, W) uint8.
-        board: circles.
-        view: where they were found, and how the board lies.
+        board: a board of circles.
+        view: detected circles and the board's pose.
         optics: the lens.
     """
     reach_m = REACH * board.nearest_m
@@ -58,7 +58,7 @@ def refined_px(gray: ByteArray, board: Board, view: FittedView, optics: Optics) 
 
 
 def _samples(view: FittedView, board: Board) -> int:
-    """Along the side of a neighbourhood, about one a pixel."""
+    """Return the samples along the side of a neighbourhood, about one per pixel."""
     area_px2 = cv2.contourArea(cv2.convexHull(view.points_px.astype(np.float32)))
     area_m2 = cv2.contourArea(cv2.convexHull(view.board_m[:, :2].astype(np.float32)))
     side_px = 2.0 * REACH * board.nearest_m * (area_px2 / area_m2) ** 0.5
@@ -66,7 +66,7 @@ def _samples(view: FittedView, board: Board) -> int:
 
 
 def _centres_m(patches: FloatArray, around_m: FloatArray, away: FloatArray) -> FloatArray:
-    """(N, 3) centres of what differs from the paper, whose brightness may slope; NaN where nothing does."""
+    """Return (N, 3) centres of darkness relative to paper that may be unevenly lit; NaN without any."""
     base = np.column_stack([around_m[:, :2], np.ones(len(around_m))])
     paper = away >= PAPER
     slopes = np.linalg.lstsq(base[paper], patches[:, paper].T, rcond=None)[0]

@@ -1,4 +1,4 @@
-"""The folder that a calibration leaves."""
+"""Output folder of a camera's calibration."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from pipeline.io.intrinsics import write_intrinsics
 
 
 def metrics(report: CameraReport, trust: Trust | None = None) -> dict[str, Any]:
-    """What ``--json`` prints: the camera, and under ``trust`` what it is worth."""
+    """Return the values that ``--json`` prints: the camera, and under ``trust`` its assessment."""
     return report.metrics() | ({} if trust is None else {"trust": trust.metrics()})
 
 
 def write_camera_folder(report: CameraReport, folder: Path, trust: Trust | None = None) -> list[str]:
-    """Write intrinsics.json, depth_correction.json if there is one, other programs' files, and metrics.json
-    last: where it is, everything is.
+    """Write intrinsics.json, depth_correction.json if there is one, other programs' files, and last
+    metrics.json: if it exists, all files do.
 
     Returns:
-        A sentence for each file that cannot hold the lens.
+        A sentence for each file whose format cannot store the lens.
 
     Raises:
         InputError: the folder cannot be written.

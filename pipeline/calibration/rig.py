@@ -1,4 +1,4 @@
-"""Several cameras at once: where they stand, from a board that they see at shared moments (SPEC 1.2, 1.3)."""
+"""Calibration of several cameras and their poses, from a board seen at shared moments (SPEC 1.2, 1.3)."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from pipeline.kernels.geometry import inverse, rigid, rotation_angle_rad, rotati
 from pipeline.types import FloatArray
 
 LEAST_CAMERAS, MOST_CAMERAS = 2, 12
-"""Six nodes, of which each may have a separate depth camera."""
+"""Six nodes, each of which may have a separate depth camera."""
 
 MISFIT, MISFIT_PX = 5.0, 2.0
-"""Error of all cameras together over that of the worst alone, and in pixels, that no rigid rig has."""
+"""Largest error of the rig over that of the worst camera alone, and in pixels, that is accepted."""
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """The board as one image shows it, and whether a mark tells which way up."""
+    """Points of the board in one image, and whether a mark shows its orientation."""
 
     view: View
     oriented: bool = True
@@ -34,16 +34,16 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class RelativePose:
-    """Where one camera stands to another, and how sure that is."""
+    """Pose of one camera relative to another, with its uncertainty."""
 
     camera: str
     reference: str
     T_reference_camera: FloatArray
     """(4, 4), metres."""
     covariance: FloatArray
-    """(6, 6) of a small turn (radians) and of the camera's position (metres), along the reference's axes."""
+    """(6, 6) covariance of a small rotation (radians) and the position (metres), in the reference's frame."""
     moments: int
-    """At which both see the board."""
+    """Number of moments at which both see the board."""
 
     @property
     def rotation_deg(self) -> float:
@@ -57,34 +57,34 @@ class RelativePose:
 
     @property
     def rotation_sd_deg(self) -> float:
-        """Root mean square angle by which the rotation is off."""
+        """Root mean square angle of the rotation's error."""
         return float(np.degrees(np.sqrt(np.trace(self.covariance[:3, :3]))))
 
     @property
     def position_sd_m(self) -> float:
-        """Root mean square distance by which the position is off."""
+        """Root mean square distance of the position's error."""
         return float(np.sqrt(np.trace(self.covariance[3:, 3:])))
 
     @property
     def baseline_sd_m(self) -> float:
-        """Standard error of the distance."""
+        """Standard error of the distance between the cameras."""
         along = self.T_reference_camera[:3, 3] / max(self.baseline_m, 1e-12)
         return float(np.sqrt(along @ self.covariance[3:, 3:] @ along))
 
 
 @dataclass(frozen=True, slots=True)
 class HeldOutRig:
-    """Moments that had no part in the poses by which they are predicted."""
+    """Held-out moments, predicted by poses that were estimated without them."""
 
     views: Mapping[str, tuple[FittedView, ...]]
-    """By camera; the board's pose alone is fitted, to all cameras that see it."""
+    """Views by camera; only the board's pose is fitted, to all cameras that see it."""
     rotation_deg: Mapping[str, float]
-    """By camera, the largest difference of its pose without a fold of the moments from that with all."""
+    """By camera, the largest rotation between its poses without a fold and with all moments."""
     position_m: Mapping[str, float]
 
     @property
     def rms_px(self) -> float:
-        """Over all points."""
+        """RMS over all points."""
         return rms_px(np.concatenate([one.residuals_px for views in self.views.values() for one in views]))
 
 
@@ -93,21 +93,21 @@ class RigCalibration:
     """Cameras and boards in one frame."""
 
     cameras: Mapping[str, Calibration]
-    """The lenses as all cameras together have them."""
+    """Lenses estimated from all cameras together."""
     moments: tuple[str, ...]
     adjusted: Adjusted
     sightings: tuple[Sighting, ...]
     held_out: HeldOutRig | None
-    """None if none was held out, or too few moments link the cameras for that."""
+    """None if none was held out, or too few moments link the cameras for it."""
 
     @property
     def rms_px(self) -> float:
-        """Over all points that any camera sees."""
+        """RMS over all points that any camera sees."""
         return rms_px(np.concatenate(self.adjusted.residuals_px))
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the cameras, the first of which is the others' reference."""
+        """Names of the cameras; the first is the reference of the others."""
         return tuple(self.cameras)
 
     @property
@@ -117,12 +117,12 @@ class RigCalibration:
         return {name: inverse(T) for name, T in zip(self.names, placed, strict=True)}
 
     def moments_of(self, name: str) -> set[str]:
-        """At which a camera sees the board."""
+        """Return the moments at which a camera sees the board."""
         camera = self.names.index(name)
         return {self.moments[one.moment] for one in self.sightings if one.camera == camera}
 
     def relative(self, camera: str, reference: str | None = None) -> RelativePose:
-        """Where one camera stands to another, by default to the first."""
+        """Return the pose of one camera relative to another, by default the first."""
         reference = self.names[0] if reference is None else reference
         a, b = self.names.index(reference), self.names.index(camera)
         placed = self.adjusted.bundle.T_camera_first
@@ -139,7 +139,7 @@ class RigCalibration:
         return RelativePose(camera, reference, T_a_b, covariance, len(both))
 
     def pairs(self) -> list[RelativePose]:
-        """Of every two cameras, the later to the earlier."""
+        """Return the relative poses of all pairs, the later camera in the frame of the earlier."""
         return [self.relative(b, a) for a, b in combinations(self.names, 2)]
 
 
@@ -149,24 +149,24 @@ def calibrate_rig(
     board: Board,
     folds: int = 0,
 ) -> RigCalibration:
-    """Place cameras, and refine their lenses, which a rig sees better than each camera alone.
+    """Estimate the cameras' poses, and refine their lenses, which a rig determines better than one camera.
 
     Lenses and all poses of cameras and boards are adjusted together to the points in all images; two cameras
-    need not see the board together if a third links them. A board without a mark is turned as the other
-    cameras have it (SPEC 1.2).
+    need not see the board together if a third links them. A board without a mark gets the orientation that
+    agrees with the other cameras (SPEC 1.2).
 
-    OpenCV's ``calibrateMultiviewExtended`` finds the same poses for the same lenses, but it leaves each lens
-    as its camera alone has it, which more than doubles the error of the poses; it takes every board as held
-    the right way up, and tells nothing of how sure it is (tests/pipeline/calibration/test_rig.py).
+    OpenCV's ``calibrateMultiviewExtended`` finds the same poses for the same lenses, but keeps each lens as
+    estimated by its camera alone, which more than doubles the error of the poses; it assumes every board
+    upright, and returns no uncertainty (tests/pipeline/calibration/test_rig.py).
 
     Args:
-        cameras: every camera by its name, as its own views have it, the reference first.
-        seen: by camera and moment, also moments of one camera alone.
-        board: which is seen.
-        folds: in how many turns moments are held out; 0 holds none out.
+        cameras: every camera by name, calibrated by its own views, the reference first.
+        seen: by camera and moment, including moments seen by one camera only.
+        board: the board in the images.
+        folds: number of folds of held-out moments; 0 holds none out.
 
     Raises:
-        InputError: too few cameras or too many, or some that never see the board together.
+        InputError: there are too few cameras or too many, or some that never see the board together.
         ReconstructionError: the moments do not determine the poses, or no rigid rig explains them.
     """
     names = tuple(cameras)
@@ -207,7 +207,7 @@ def calibrate_rig(
 
 
 def _check_fit(together_px: float, alone_px: float) -> None:
-    """Raise ReconstructionError where no rigid rig explains what each camera explains."""
+    """Raise a ReconstructionError if the cameras fit much worse together than alone."""
     if together_px > max(MISFIT * alone_px, MISFIT_PX):
         raise ReconstructionError(
             f"The cameras do not fit together: points are off by {together_px:.1f} px, but by "
@@ -219,7 +219,7 @@ def _check_fit(together_px: float, alone_px: float) -> None:
 def _views(
     names: Sequence[str], titles: Sequence[str], sightings: Sequence[Sighting], bundle: Bundle
 ) -> dict[str, tuple[FittedView, ...]]:
-    """By camera, in the order of the sightings."""
+    """Return the fitted views by camera, in the order of the sightings."""
     views: dict[str, list[FittedView]] = {name: [] for name in names}
     for title, one, off_px in zip(titles, sightings, bundle.residuals_px(sightings), strict=True):
         fitted = FittedView(title, bundle.T_camera_board(one), off_px, one.points_px, one.board_m)
@@ -228,7 +228,7 @@ def _views(
 
 
 def _turns(board: Board) -> list[FloatArray]:
-    """(4, 4) motions in its plane after which the points of a board lie where they lay."""
+    """Return (4, 4) rotations in its plane that map the points of a board onto each other."""
     quarters = [0]
     if board.ambiguous:
         quarters = [0, 1, 2, 3] if board.columns == board.rows else [0, 2]
@@ -238,7 +238,7 @@ def _turns(board: Board) -> list[FloatArray]:
 def _held_out(
     names: Sequence[str], titles: Sequence[str], sightings: Sequence[Sighting], whole: Bundle, folds: int
 ) -> HeldOutRig | None:
-    """Every moment by cameras from the others; None where these do not link the cameras."""
+    """Predict every moment by cameras from the other folds; None if these do not link the cameras."""
     views: dict[str, tuple[FittedView, ...]] = dict.fromkeys(names, ())
     turned_deg, moved_m = dict.fromkeys(names[1:], 0.0), dict.fromkeys(names[1:], 0.0)
     for fold in range(folds):
@@ -262,14 +262,14 @@ def _held_out(
 
 
 def _alone(some: Sequence[Sighting], whole: Bundle) -> tuple[list[Sighting], Bundle]:
-    """Sightings with their moments numbered anew, and the bundle with only these boards."""
+    """Renumber the moments of some sightings, and return them with the bundle of only their boards."""
     kept = sorted({one.moment for one in some})
     numbered = [replace(one, moment=kept.index(one.moment)) for one in some]
     return numbered, replace(whole, T_first_board=tuple(whole.T_first_board[moment] for moment in kept))
 
 
 def _determined(sightings: Sequence[Sighting], cameras: int) -> bool:
-    """Whether shared moments link all cameras, and each has enough views for its lens."""
+    """Return whether shared moments link all cameras, and each has enough views for its lens."""
     counts = Counter(one.camera for one in sightings)
     together = [
         {one.camera for one in sightings if one.moment == moment} for moment in {s.moment for s in sightings}

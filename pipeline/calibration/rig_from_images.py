@@ -1,4 +1,4 @@
-"""Several cameras from a session's image files (SPEC 1.3): each by itself first, then all together."""
+"""Calibration of several cameras from a session's image files (SPEC 1.3): first each alone, then together."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.types import CameraIntrinsics, FloatArray
 
 ALONE, DEPTH = 0.7, 0.85
-"""Shares of the work before which boards and each camera's own lens are found, and after which depth is."""
+"""Progress at the end of the cameras' own calibrations, and at the start of that of depth."""
 
 
 @dataclass(frozen=True, slots=True)
 class RigReport:
-    """Calibrated cameras and the images that they come from."""
+    """Calibrated cameras and their images."""
 
     board: Board
     cameras: Mapping[str, CameraReport]
-    """By name, node_00 and so on, with the lenses as all cameras together have them; the separate depth
-    camera of a node is node_00/infrared."""
+    """Reports by name, node_00 and so on, with lenses estimated from all cameras together; a node's separate
+    depth camera is node_00/infrared."""
     rig: RigCalibration
 
     def nodes(self, T_world_first: FloatArray = LEVEL_POSE) -> dict[str, CalibratedNode]:
-        """What a calibration's folder says of every node.
+        """Return the calibration of every node, for its folder.
 
         Args:
-            T_world_first: (4, 4) where the first camera stands; by default where a node without a pose does.
+            T_world_first: (4, 4) pose of the first camera; by default that of a node without a pose.
         """
         poses = self.rig.T_first_camera
         made = {}
@@ -56,7 +56,7 @@ class RigReport:
         return made
 
     def metrics(self) -> dict[str, Any]:
-        """What ``--json`` prints."""
+        """Return the values that ``--json`` prints."""
         held_out = self.rig.held_out
         return {
             "board": self.board.title,
@@ -97,19 +97,19 @@ def iterate_rig_calibration(
     """Find the board in every image, estimate each camera, then all lenses and poses together.
 
     Args:
-        nodes: their images, by moment.
-        board: what they show.
-        lens: which distortions the cameras may have.
-        folds: in how many turns moments are held out; 0 holds none out.
-        without: images to leave out, as node_01/color_03.png.
-        depth_scale: depth units in a metre; without it whole numbers are millimetres.
+        nodes: images of the nodes, by moment.
+        board: the board in them.
+        lens: distortion model of the cameras.
+        folds: number of folds of held-out moments; 0 holds none out.
+        without: images to leave out, such as node_01/color_03.png.
+        depth_scale: depth units per metre; by default whole numbers are millimetres.
 
     Yields:
-        Progress, before each image.
+        Progress before each image.
 
     Raises:
-        InputError: unreadable images, several sizes in one camera, the board in too few of them, an image to
-            leave out that is not there, or cameras that never see the board together.
+        InputError: images are unreadable, differ in size within a camera, too few show the board, an image to
+            leave out does not exist, or cameras never see the board together.
         ReconstructionError: the views do not determine a lens or the poses.
     """
     images = camera_images(nodes)
@@ -137,16 +137,16 @@ def iterate_rig_calibration(
 def cameras_together(
     nodes: Sequence[NodeShots], reports: Mapping[str, CameraReport], board: Board, folds: int = 0
 ) -> RigReport:
-    """All lenses and poses together, from cameras that are calibrated each by itself.
+    """Estimate all lenses and poses together, from cameras that were calibrated alone.
 
     Args:
-        nodes: their images, by moment.
-        reports: by camera; one without a report has no part.
-        board: what the images show.
-        folds: in how many turns moments are held out; 0 holds none out.
+        nodes: images of the nodes, by moment.
+        reports: reports by camera; cameras without a report are ignored.
+        board: the board in the images.
+        folds: number of folds of held-out moments; 0 holds none out.
 
     Raises:
-        InputError: fewer than two cameras, or some that never see the board together.
+        InputError: there are fewer than two cameras, or some never see the board together.
         ReconstructionError: the views do not determine the poses.
     """
     images = camera_images(nodes)
@@ -166,12 +166,12 @@ def cameras_together(
 def node_with_depth(
     node: NodeShots, reports: Mapping[str, CameraReport], depth_scale: float | None = None
 ) -> CameraReport:
-    """A node's own report with the bias of its depth sensor, or why that is not known.
+    """Return a node's report with the bias of its depth sensor, or the reason why it is unknown.
 
     Args:
-        node: its images.
-        reports: by camera, the node's and, if its depth has a camera of its own, that one's.
-        depth_scale: depth units in a metre; without it whole numbers are millimetres.
+        node: images of the node.
+        reports: reports by camera: the node's, and that of its separate depth camera if it has one.
+        depth_scale: depth units per metre; by default whole numbers are millimetres.
     """
     report, own = reports[node.name], reports.get(node.name + INFRARED)
     if own is None and any(shot.infrared is not None for shot in node.shots):
@@ -183,13 +183,13 @@ def node_with_depth(
 
 
 def _seen(report: CameraReport, files: Mapping[Path, str]) -> dict[str, Seen]:
-    """By moment."""
+    """Return the sightings of a camera by moment."""
     moments = {path.name: moment for path, moment in files.items()}
     return {moments[view.name]: Seen(view, report.detections[view.name].oriented) for view in report.views}
 
 
 def _intrinsics(report: CameraReport) -> CameraIntrinsics | None:
-    """None of a lens that the chain does not know."""
+    """Return the intrinsics; None for a lens that the reconstruction does not support."""
     try:
         return report.intrinsics
     except InputError:

@@ -1,4 +1,4 @@
-"""The folder that a calibration of several cameras leaves."""
+"""Output folder of a calibration of several cameras."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ NO_TRUST: Mapping[str, Trust] = {}
 
 
 def rig_metrics(report: RigReport, trust: Mapping[str, Trust] = NO_TRUST) -> dict[str, Any]:
-    """What ``--json`` prints: every camera as one alone has it, and how they stand to each other.
+    """Return the values that ``--json`` prints: every camera as for a single one, and their relative poses.
 
     Args:
-        report: of all cameras.
-        trust: by camera, what it is worth.
+        report: report of all cameras.
+        trust: assessments by camera.
     """
     cameras = {name: metrics(one, trust.get(name)) for name, one in report.cameras.items()}
     return report.metrics() | {"cameras": cameras}
@@ -38,14 +38,14 @@ def write_rig_folder(
     T_world_first: FloatArray = LEVEL_POSE,
     trust: Mapping[str, Trust] = NO_TRUST,
 ) -> list[str]:
-    """Write of every node what ``load_rig(..., calibration=folder)`` reads and its camera in the files of
-    other programs, and metrics.json last.
+    """Write every node's files for ``load_rig(..., calibration=folder)``, its camera for other programs,
+    and metrics.json last.
 
     Args:
-        report: of all cameras.
-        folder: where.
-        T_world_first: (4, 4) where the first camera stands.
-        trust: by camera, what it is worth.
+        report: report of all cameras.
+        folder: output folder.
+        T_world_first: (4, 4) pose of the first camera.
+        trust: assessments by camera.
 
     Returns:
         A sentence for each file that is not written.
@@ -65,10 +65,10 @@ def write_rig_folder(
 
 
 def pose_like(rig: AnyPath | None, node: str) -> FloatArray:
-    """(4, 4) pose of a rig's node, in whose world others are placed; without a rig, of a node without pose.
+    """Return the (4, 4) pose of a rig's node, for placing cameras in its world; else of a node without pose.
 
     Raises:
-        InputError: the rig has no such node, or that one no pose.
+        InputError: the rig has no such node, or the node has no pose.
     """
     if rig is None:
         return LEVEL_POSE

@@ -1,5 +1,5 @@
-"""A first guess of where cameras stand: those that see the board together are linked to each other, and a
-board without a mark is turned as they agree (SPEC 1.2).
+"""Initial poses of cameras: cameras that see the board together are linked, and boards without a mark are
+oriented consistently (SPEC 1.2).
 """
 
 from __future__ import annotations
@@ -17,30 +17,30 @@ from pipeline.kernels.geometry import apply, inverse, rotation_angle_rad
 from pipeline.types import FloatArray
 
 MOST_TRIED = 12
-"""Moments whose pose of one camera to another is tried on all that both see."""
+"""Most moments whose relative pose of two cameras is tried on all their common moments."""
 APART_RAD = np.radians(20.0)
 LOST_PX = 20.0
-"""An error that no turn of the board explains."""
+"""An error that no orientation of the board explains."""
 TELLING = 1.5
-"""By this factor the error of a board turned the other way must be larger, or nothing tells them apart."""
+"""Least ratio of the errors of the other orientation and this one, for a decision."""
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """A sighting by itself."""
+    """A sighting with the pose from its image alone."""
 
     sighting: Sighting
     T_camera_board: FloatArray
-    """(4, 4) as this one image has it."""
+    """(4, 4) pose from this image."""
     oriented: bool
-    """Whether a mark tells which way up the board is."""
+    """Whether a mark shows the orientation of the board."""
 
 
 def look(sighting: Sighting, optics: Optics, oriented: bool) -> Look:
-    """Where one image has the board.
+    """Estimate the pose of the board from one image.
 
     Raises:
-        ReconstructionError: no pose explains it.
+        ReconstructionError: no pose explains the image.
     """
     view = View(f"moment {sighting.moment}", sighting.points_px, sighting.board_m)
     placed = place(view, optics.matrix, optics.distortion, optics.lens)
@@ -50,19 +50,19 @@ def look(sighting: Sighting, optics: Optics, oriented: bool) -> Look:
 def start(
     looks: Sequence[Look], optics: Sequence[Optics], names: Sequence[str], turns: Sequence[FloatArray]
 ) -> tuple[Bundle, tuple[Sighting, ...]]:
-    """Where cameras and boards are, roughly, and the sightings with the board of a moment the same way up.
+    """Estimate approximate poses of cameras and boards; orients the board alike in all sightings of a moment.
 
-    Cameras are linked in the order of how many moments they share with those that are linked already.
+    Cameras are linked in the order of the number of moments that they share with linked ones.
 
     Args:
-        looks: of all cameras; every moment from 0 on is in one at least.
-        optics: of every camera.
-        names: of every camera, for what is said about them.
+        looks: sightings of all cameras, with every moment from 0 on in at least one.
+        optics: lens of every camera.
+        names: names of the cameras, for error messages.
         turns: (4, 4) motions after which the board looks the same, the identity first.
 
     Raises:
-        InputError: cameras that no shared moments link.
-        ReconstructionError: nothing tells which way up boards were held.
+        InputError: no shared moments link some cameras.
+        ReconstructionError: the orientation of the boards is undetermined.
     """
     count = len(optics)
     of: list[dict[int, Look]] = [
@@ -101,7 +101,7 @@ def _unlinked(linked: Sequence[int], names: Sequence[str]) -> str:
 def _linked(
     pairs: Sequence[tuple[Look, Look]], optics_b: Optics, turns: Sequence[FloatArray], who: str
 ) -> FloatArray:
-    """(4, 4) T_a_b of the moment and turn that explain all moments best."""
+    """Return the (4, 4) T_a_b of one moment and orientation that explains all moments best."""
     every = -(-len(pairs) // MOST_TRIED)
     tried = [
         a.T_camera_board @ turn @ inverse(b.T_camera_board)
@@ -121,14 +121,14 @@ def _linked(
 
 
 def _possible(seen: Sequence[Look], turns: Sequence[FloatArray]) -> Sequence[FloatArray]:
-    """Turns of the board between these looks."""
+    """Return the possible rotations of the board between these looks."""
     return turns[:1] if all(one.oriented for one in seen) else turns
 
 
 def _error_px(
     T_a_b: FloatArray, pairs: Sequence[tuple[Look, Look]], optics_b: Optics, turns: Sequence[FloatArray]
 ) -> float:
-    """Median over moments of how far camera b is from seeing the board where camera a has it."""
+    """Return the median over moments of camera b's error, with the board's pose from camera a."""
     told = [
         min(
             _off_px(b.sighting, optics_b, inverse(T_a_b) @ a.T_camera_board @ turn)
@@ -149,7 +149,7 @@ def _agreed(
     T_camera_first: Sequence[FloatArray],
     turns: Sequence[FloatArray],
 ) -> tuple[FloatArray, list[Sighting]]:
-    """(4, 4) T_first_board of a moment, and its sightings on a board that is held the same way up in all."""
+    """Return (4, 4) T_first_board of a moment, and its sightings with one orientation of the board."""
     best: tuple[float, FloatArray, list[Sighting]] | None = None
     for anchor in [one for one in seen if one.oriented] or seen:
         T_first_board = inverse(T_camera_first[anchor.sighting.camera]) @ anchor.T_camera_board

@@ -1,7 +1,7 @@
-"""A session with a board on disk: which images of which camera were taken at the same moment.
+"""Images of a session with a board: which images of which camera belong to the same moment.
 
 ``BOARD/node_00/{color_00.png, depth_00.png, infrared_00.png}``, ``BOARD/node_01/...``, or one folder of
-photographs for each camera. The last number in an image's name is its moment, or else the whole name.
+photographs per camera. The moment is the last number in an image's name, or else the whole name.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ ENDINGS = (".png", ".jpg", ".jpeg", ".pgm", ".ppm")
 MOST_CAMERAS = 6
 BOARD_FILE = "board.json"
 INFRARED = "/infrared"
-"""After a node's name: its separate depth camera."""
+"""Suffix of a node's name for its separate depth camera."""
 _LAST_NUMBER = re.compile(r"(\d+)\D*$")
 
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """What one node took at one moment."""
+    """Images of one node at one moment."""
 
     moment: str
     color: Path
     depth: Path | None = None
-    """16-bit image on the pixel grid of ``infrared`` where there is one, else of ``color``."""
+    """16-bit image on the pixel grid of ``infrared`` if there is one, else of ``color``."""
     infrared: Path | None = None
-    """Of a separate depth camera."""
+    """Image of a separate depth camera."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,17 +46,17 @@ class NodeShots:
     """node_00 and so on."""
     folder: Path
     shots: tuple[Shot, ...]
-    """In the order of their moments."""
+    """Shots in the order of their moments."""
 
 
 def node_shots(folders: Sequence[AnyPath]) -> tuple[NodeShots, ...]:
-    """The images of every node of a session.
+    """List the images of every node of a session.
 
     Args:
-        folders: one that holds node_00, node_01 and so on, or one for each camera.
+        folders: one that contains node_00, node_01 and so on, or one per camera.
 
     Raises:
-        InputError: no images, more nodes than a rig has, a folder twice, or two images of one moment.
+        InputError: there are no images, too many nodes, a repeated folder, or two images of one moment.
     """
     paths = [Path(folder) for folder in folders]
     for path in paths:
@@ -82,7 +82,7 @@ def node_shots(folders: Sequence[AnyPath]) -> tuple[NodeShots, ...]:
 
 
 def camera_images(nodes: Iterable[NodeShots]) -> dict[str, dict[Path, str]]:
-    """By camera, node_00 and, where there is one, node_00/infrared, the moments of its images."""
+    """Return the moments of images by camera: node_00 and, for a separate depth camera, node_00/infrared."""
     found: dict[str, dict[Path, str]] = {}
     for node in nodes:
         found[node.name] = {shot.color: shot.moment for shot in node.shots}
@@ -93,7 +93,7 @@ def camera_images(nodes: Iterable[NodeShots]) -> dict[str, dict[Path, str]]:
 
 
 def node_folders(folder: Path) -> list[Path]:
-    """The folders node_00, node_01 and so on below a session's folder; none in one of photographs."""
+    """Return the folders node_00, node_01 and so on in a session's folder; none among photographs."""
     return sorted(one for one in folder.glob("node_*") if one.is_dir())
 
 
@@ -104,11 +104,11 @@ def board_beside(
     rows: int | None = None,
     spacing_mm: float | None = None,
 ) -> Board:
-    """The board that images show: what is given, else what a board.json in or above their folder says, else
+    """Return the board in images: the given values, else those of a board.json in or above their folder, else
     the thesis's.
 
     Raises:
-        InputError: that file lacks pattern, columns, rows or spacing_mm, or no board is like that.
+        InputError: the file lacks pattern, columns, rows or spacing_mm, or the board is impossible.
     """
     known = Board()
     for path in (one / BOARD_FILE for word in images for one in (Path(word), Path(word).parent)):
@@ -124,10 +124,10 @@ def board_beside(
 
 
 def read_board(path: AnyPath) -> Board:
-    """The board that a file describes.
+    """Read the board from a file.
 
     Raises:
-        InputError: the file lacks pattern, columns, rows or spacing_mm, or no board is like that.
+        InputError: the file lacks pattern, columns, rows or spacing_mm, or the board is impossible.
     """
     values = read_json(path, "board file")
     try:
@@ -144,7 +144,7 @@ def read_board(path: AnyPath) -> Board:
 
 
 def photographs(folder: Path) -> list[Path]:
-    """The colour images in a folder, by name; neither depth_00.png nor infrared_00.png."""
+    """Return the colour images in a folder, by name, without depth_00.png or infrared_00.png."""
     return [path for path in _images(folder) if path.stem.partition("_")[0] not in ("depth", "infrared")]
 
 
@@ -179,6 +179,6 @@ def _by_moment(images: Iterable[Path]) -> dict[str, Path]:
 
 
 def _moment(stem: str) -> str:
-    """The last number without leading zeros, or all of it."""
+    """Return the last number in a name without leading zeros, or else the whole name."""
     number = _LAST_NUMBER.search(stem)
     return stem if number is None else number[1].lstrip("0") or "0"

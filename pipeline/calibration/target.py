@@ -1,4 +1,4 @@
-"""A board to print, true to scale: as PDF or SVG, or as PNG for a monitor whose pixels are known."""
+"""Calibration boards to print true to scale, as PDF or SVG, or for a monitor of known pixel size, as PNG."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from pipeline.types import ByteArray, FloatArray
 
 MARGIN_MM = 15.0
 FOOT_MM = 16.0
-"""Below the board: the ruler and what it is."""
+"""Height below the board for the ruler and the description."""
 RULER_MM, TICK_MM = 100.0, 10.0
 TEXT_MM = 3.5
 SUB_PIXEL = 6
-"""Bits of a pixel's fraction when a PNG is drawn."""
+"""Fractional bits of a pixel in the drawing of a PNG."""
 
 
 @dataclass(frozen=True, slots=True)
 class Disc:
-    """A filled circle in millimetres from the upper left."""
+    """A filled circle, in millimetres from the upper left."""
 
     x_mm: float
     y_mm: float
@@ -46,7 +46,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A line of text that begins at its base line."""
+    """A line of text, starting at its base line."""
 
     x_mm: float
     y_mm: float
@@ -55,7 +55,7 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """What is printed, and how large."""
+    """Size and shapes of a printed sheet."""
 
     width_mm: float
     height_mm: float
@@ -63,7 +63,7 @@ class Sheet:
 
 
 def sheet(board: Board) -> Sheet:
-    """The board with margins, a ruler to check the print and a line that says what it is."""
+    """Draw the board with margins, a ruler to check the print and a line that describes it."""
     points_mm = 1000.0 * board.points_m[:, :2]
     spacing_mm, radius_mm = 1000.0 * board.spacing_m, 1000.0 * board.radius_m
     rim_mm = _around_mm(board) + MARGIN_MM
@@ -84,19 +84,19 @@ def sheet(board: Board) -> Sheet:
 
 
 def place_of_first_mm(board: Board) -> FloatArray:
-    """(2,) where the board's first point is on the sheet."""
+    """Return the (2,) position of the board's first point on the sheet."""
     points_mm = 1000.0 * board.points_m[:, :2]
     return points_mm[0] - points_mm.min(axis=0) + _around_mm(board) + MARGIN_MM
 
 
 def _around_mm(board: Board) -> float:
-    """How far the board goes beyond its outermost points, with white paper around circles."""
+    """Return how far the board extends beyond its outermost points, with white paper around circles."""
     squares = board.pattern in ("chessboard", "charuco")
     return 1000.0 * (board.spacing_m if squares else 2.0 * board.radius_m)
 
 
 def _squares(board: Board, corner_mm: np.ndarray) -> Iterator[Box]:
-    """Black squares, the first of them at the upper left as OpenCV has it, and the markers between them."""
+    """Yield the black squares, the first at the upper left as in OpenCV, and the markers between them."""
     side_mm = 1000.0 * board.spacing_m
     for row in range(board.rows + 1):
         for column in range(board.columns + 1):
@@ -108,7 +108,7 @@ def _squares(board: Board, corner_mm: np.ndarray) -> Iterator[Box]:
 
 
 def _markers(board: Board, corner_mm: np.ndarray) -> Iterator[Box]:
-    """Every black cell of every marker, row by row in as few boxes as it takes."""
+    """Yield the black cells of every marker, joined to as few boxes per row as possible."""
     made, dictionary = board.charuco(), cv2.aruco.getPredefinedDictionary(MARKERS)
     cells = dictionary.markerSize + 2
     cell_mm = 1000.0 * MARKER_SHARE * board.spacing_m / cells
@@ -132,17 +132,17 @@ def _foot(board: Board, top_mm: float) -> Iterator[Box | Text]:
 
 
 def write_target(board: Board, path: Path, pixel_mm: float | None = None) -> Board:
-    """Write the board as its file's ending says; returns it as it is written.
+    """Write the board in the format of the suffix; returns the board as it was written.
 
-    On a monitor the spacing is a whole number of pixels, so that all squares are alike.
+    On a monitor the spacing is rounded to whole pixels, so that all squares are equal.
 
     Args:
-        board: what to draw.
+        board: the board to draw.
         path: a .pdf, .svg or .png file.
-        pixel_mm: side of a pixel of the monitor that shows a PNG.
+        pixel_mm: size of a pixel of the monitor that shows a PNG.
 
     Raises:
-        InputError: another ending, or a PNG whose pixels nobody knows.
+        InputError: the suffix is another, or the pixel size for a PNG is missing.
     """
     ending = path.suffix.lower()
     if ending == ".png":
@@ -166,7 +166,7 @@ def write_target(board: Board, path: Path, pixel_mm: float | None = None) -> Boa
 
 
 def svg_of(whole: Sheet) -> str:
-    """An SVG file whose units are millimetres."""
+    """Return an SVG file with millimetres as units."""
     size = f'width="{whole.width_mm:g}mm" height="{whole.height_mm:g}mm"'
     box = f'viewBox="0 0 {whole.width_mm:g} {whole.height_mm:g}"'
     lines = [
@@ -190,7 +190,7 @@ def svg_of(whole: Sheet) -> str:
 
 
 def pdf_of(whole: Sheet, title: str) -> bytes:
-    """A PDF file of one page as large as the sheet; the same bytes for the same board."""
+    """Return a PDF file of one page with the size of the sheet; equal boards give equal bytes."""
     import io
 
     from reportlab.lib.units import mm
@@ -220,13 +220,13 @@ def pdf_of(whole: Sheet, title: str) -> bytes:
 
 
 def picture_of(whole: Sheet, pixel_mm: float) -> ByteArray:
-    """(H, W) grey picture; edges fall between pixels as they do on the sheet."""
+    """Draw an (H, W) grey image; edges are between pixels at the same positions as on the sheet."""
     size = (round(whole.width_mm / pixel_mm), round(whole.height_mm / pixel_mm))
     picture = np.full(size[::-1], 255, np.uint8)
     scale = (1 << SUB_PIXEL) / pixel_mm
 
     def fixed(value_mm: float) -> int:
-        return round(value_mm * scale - 0.5 * (1 << SUB_PIXEL))  # pixel centres lie at integers
+        return round(value_mm * scale - 0.5 * (1 << SUB_PIXEL))  # pixel centres are at integers
 
     for shape in whole.shapes:
         if isinstance(shape, Disc):

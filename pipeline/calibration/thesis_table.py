@@ -1,4 +1,4 @@
-"""What the thesis prints of its noise experiment."""
+"""Printed results of the thesis's noise experiment."""
 
 TABLE_4_1 = {
     0.2: (500.013, 500.009, 300.132, 249.855, 0.0503, 0.1023),
@@ -7,4 +7,4 @@ TABLE_4_1 = {
     0.8: (501.329, 500.938, 299.021, 250.829, 0.0849, 0.1274),
     1.0: (502.474, 497.638, 301.327, 251.043, 0.1382, 0.0632),
 }
-"""By the noise in px: one estimate of fx, fy, cx, cy (px), k1 and k2 each."""
+"""For each noise level in px, one estimate of fx, fy, cx, cy (px), k1 and k2."""

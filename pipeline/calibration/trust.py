@@ -1,10 +1,10 @@
-"""How far a camera can be trusted at the range where it works: what noise does to it, and whether two halves
-of the views agree (SPEC 1.3 e).
+"""Accuracy of a camera at its working distance: the effect of noise, and the agreement of two halves of the
+views (SPEC 1.3 e).
 
-Both compare cameras of slightly different lenses, and a camera whose lens changes is placed anew: where it
-sees the boards of the calibration best, which stay where they are. So what a turn or a move makes good is no
-error, and a focal length that is wrong is one as soon as the range is not that of the boards. It is the idea
-of mrcal's uncertainty (Kogan, "mrcal: camera calibrations and more", 2021).
+Both compare cameras with slightly different lenses. A camera whose lens changes gets a new pose, in which it
+sees the boards of the calibration best, which do not move. So an error that a rotation or translation
+compensates does not count, but a wrong focal length counts at distances other than the boards'. The idea is
+that of mrcal's uncertainty (Kogan, "mrcal: camera calibrations and more", 2021).
 """
 
 from __future__ import annotations
@@ -28,67 +28,67 @@ from pipeline.kernels.geometry import apply
 from pipeline.types import FloatArray
 
 CELLS = 24
-"""Of a map, along the longer side of the image."""
+"""Number of a map's cells along the longer side of the image."""
 CIRCLE95 = 2.4477
-"""Radius around the mean of a round normal distribution in the plane that holds 95 % of it, in its sd."""
+"""Radius in sd around the mean of a round normal distribution in the plane that contains 95 % of it."""
 MOST_UNSURE = 20.0
-"""Times that a half may be less sure than the whole, and still say something."""
+"""A half whose sd is more than this many times the whole's is not used."""
 DRAWS = 2000
-"""Of lenses that noise may make, to tell how much two halves differ by noise alone."""
+"""Number of random lenses from which follows how much two halves differ by noise alone."""
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorMap:
-    """An error over the image, of points at one range."""
+    """An error over the image, for points at one distance."""
 
     range_m: float
-    """From the camera, along the ray of the pixel."""
+    """Distance from the camera, along the pixel's ray."""
     columns_px: FloatArray
-    """(C,) of the cells' middles."""
+    """(C,) centres of the cells."""
     rows_px: FloatArray
-    """(R,)"""
+    """(R,) centres of the cells."""
     error_px: FloatArray
-    """(R, C) in the image; NaN where the lens has no ray for the pixel."""
+    """(R, C) error in the image; NaN where the lens has no ray for the pixel."""
     error_m: FloatArray
-    """(R, C) the same across the ray, at the range."""
+    """(R, C) error perpendicular to the ray, at the distance."""
 
 
 @dataclass(frozen=True, slots=True)
 class HalfDifference:
-    """What every other view says against what the others say."""
+    """Difference of cameras calibrated from every other view and from the others."""
 
     map: ErrorMap
-    """Lengths of the difference."""
+    """Length of the difference."""
     ratio: float
-    """The difference over what noise alone lets one expect, root mean square over the image: near 1 if the
-    lens is right."""
+    """Difference over that expected from noise alone, root mean square over the image: near 1 if the lens
+    model is right."""
     most_by_noise: float
-    """Noise alone makes a smaller ``ratio`` in 95 of 100 cases."""
+    """Value below which ``ratio`` is in 95 of 100 cases by noise alone."""
 
     @property
     def beyond_noise(self) -> bool:
-        """Whether there is more than noise: a lens of the wrong kind, a board that is not flat."""
+        """Whether the difference exceeds noise, by a wrong lens model or a board that is not flat."""
         return self.ratio > self.most_by_noise
 
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """Points at a range in all pixels of a grid, and how their images change with the lens."""
+    """Points at a distance in all pixels of a grid, with the derivatives of their images."""
 
     range_m: float
     columns_px: FloatArray
     rows_px: FloatArray
     points_m: FloatArray
-    """(G, 3) row by row, in the camera's frame; NaN where the lens has no ray."""
+    """(G, 3) points row by row, in the camera's frame; NaN where the lens has no ray."""
     by_pose: FloatArray
-    """(G, 2, 6) derivatives of their pixels by the pose of all of them."""
+    """(G, 2, 6) derivatives of their pixels by their common pose."""
     by_lens: FloatArray
-    """(G, 2, P) by the lens."""
+    """(G, 2, P) derivatives by the lens."""
     metres: FloatArray
-    """(G, 2, 2) metres across the ray for pixels."""
+    """(G, 2, 2) conversion of pixels to metres perpendicular to the ray."""
 
     def map_of(self, error_px: FloatArray, error_m: FloatArray) -> ErrorMap:
-        """(G,) values in the picture's order."""
+        """Arrange (G,) values as a map."""
         shape = len(self.rows_px), len(self.columns_px)
         return ErrorMap(
             self.range_m, self.columns_px, self.rows_px, error_px.reshape(shape), error_m.reshape(shape)
@@ -96,10 +96,10 @@ class Sight:
 
 
 def sight(optics: Optics, size_px: tuple[int, int], range_m: float) -> Sight:
-    """The grid of a map.
+    """Compute the grid of a map.
 
     Raises:
-        InputError: no range at which anything can be seen.
+        InputError: the distance is impossible.
     """
     if not 0.0 < range_m < 1e4:
         raise InputError(f"A range of {range_m:g} m cannot be judged; try the distance of what is measured")
@@ -123,18 +123,18 @@ def sight(optics: Optics, size_px: tuple[int, int], range_m: float) -> Sight:
 
 
 def projected_covariance_px2(seen: Sight, covariance: FloatArray, placing: FloatArray) -> FloatArray:
-    """(G, 2, 2) of the pixels of a grid's points.
+    """Return (G, 2, 2) covariances of the pixels of a grid's points.
 
     Args:
         seen: the grid.
-        covariance: (P, P) of the lens.
-        placing: (6, P) how the camera is placed anew when the lens changes.
+        covariance: (P, P) covariance of the lens.
+        placing: (6, P) derivative of the camera's new pose by the lens.
     """
     return _carried(seen.by_lens + seen.by_pose @ placing, covariance)
 
 
 def placing(views: Sequence[tuple[FloatArray, FloatArray]], optics: Optics) -> FloatArray:
-    """(6, P) how the camera is placed anew, by the boards that stay where they are, when its lens changes.
+    """Return the (6, P) derivative by the lens of the camera's new pose, for boards that do not move.
 
     Args:
         views: (N, 3) points of each board and its (4, 4) pose in the camera's frame.
@@ -145,17 +145,17 @@ def placing(views: Sequence[tuple[FloatArray, FloatArray]], optics: Optics) -> F
 
 
 def projected_sd_px(calibration: Calibration, range_m: float) -> ErrorMap:
-    """Standard deviation, in the worst direction, of where points at a range are seen.
+    """Compute the standard deviation, in the worst direction, of the image of points at a distance.
 
-    It comes of noise in the views alone: of a lens that is wrong in kind it knows nothing, for which there is
-    ``half_difference_px``. The poses of the boards are parameters like the lens's own.
+    It includes only noise in the views, not a wrong lens model, which ``half_difference_px`` detects. The
+    poses of the boards are parameters like those of the lens.
 
     Args:
-        calibration: a camera.
-        range_m: of the points.
+        calibration: the camera.
+        range_m: distance of the points.
 
     Raises:
-        InputError: no range at which anything can be seen.
+        InputError: the distance is impossible.
     """
     optics = calibration.optics
     seen = sight(optics, calibration.size_px, range_m)
@@ -164,7 +164,7 @@ def projected_sd_px(calibration: Calibration, range_m: float) -> ErrorMap:
 
 
 def sd_map(seen: Sight, covariance_px2: FloatArray) -> ErrorMap:
-    """The worst direction of (G, 2, 2) covariances."""
+    """Return the map of the worst direction of (G, 2, 2) covariances."""
     covariance_m2 = seen.metres @ covariance_px2 @ seen.metres.transpose(0, 2, 1)
     return seen.map_of(_worst_sd(covariance_px2), _worst_sd(covariance_m2))
 
@@ -172,18 +172,18 @@ def sd_map(seen: Sight, covariance_px2: FloatArray) -> ErrorMap:
 def half_difference_px(
     views: Sequence[View], size_px: tuple[int, int], range_m: float, lens: Lens = "thesis"
 ) -> HalfDifference:
-    """Calibrate with every other view, and with the others, and tell how far apart both see a point.
+    """Calibrate with every other view, and with the others, and compare where both see a point.
 
-    A lens of the wrong kind fits each half by other parameters, so that both differ by more than noise.
+    A wrong lens model fits each half by other parameters, so that they differ by more than noise.
 
     Args:
         views: six or more.
         size_px: width and height of the images.
-        range_m: of the points.
-        lens: of both halves.
+        range_m: distance of the points.
+        lens: distortion model of both halves.
 
     Raises:
-        InputError: too few views, or no range at which anything can be seen.
+        InputError: there are too few views, or the distance is impossible.
         ReconstructionError: a half does not determine the lens.
     """
     if len(views) < 2 * LEAST_VIEWS:
@@ -216,11 +216,11 @@ def half_difference_px(
 
 
 def _over_noise(difference_px: FloatArray, change: FloatArray, covariance: FloatArray) -> tuple[float, float]:
-    """(G, 2) differences over their own predicted sd, root mean square, and what noise stays below.
+    """Return the RMS of (G, 2) differences over their predicted sd, and its 95 % limit under noise alone.
 
     Args:
-        difference_px: of two lenses.
-        change: (G, 2, P) of the pixels with the lens.
+        difference_px: (G, 2) difference of two lenses.
+        change: (G, 2, P) derivatives of the pixels by the lens.
         covariance: (P, P) of the difference of two lenses.
     """
     values, turns = np.linalg.eigh(covariance)
@@ -237,19 +237,19 @@ def _in_camera(views: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
 
 
 def _across(rays: FloatArray) -> FloatArray:
-    """(N, 2, 3) two directions across each of (N, 3) rays."""
+    """Return (N, 2, 3) two directions perpendicular to each of (N, 3) rays."""
     first = np.cross(rays, (0.0, 1.0, 0.0))
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return np.stack([first, np.cross(rays, first)], axis=1)
 
 
 def _carried(change: FloatArray, covariance: FloatArray) -> FloatArray:
-    """(G, 2, 2) covariance of pixels of (P, P) that of the lens, by (G, 2, P) derivatives."""
+    """Propagate the (P, P) covariance of the lens to (G, 2, 2) of pixels, by (G, 2, P) derivatives."""
     return change @ covariance @ change.transpose(0, 2, 1)
 
 
 def _worst_sd(covariances: FloatArray) -> FloatArray:
-    """(G,) along the longer axis of (G, 2, 2) ellipses."""
+    """Return the (G,) standard deviation along the longer axis of (G, 2, 2) covariances."""
     half = 0.5 * (covariances[:, 0, 0] + covariances[:, 1, 1])
     apart = np.hypot(0.5 * (covariances[:, 0, 0] - covariances[:, 1, 1]), covariances[:, 0, 1])
     return np.sqrt(half + apart)

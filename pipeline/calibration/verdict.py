@@ -1,4 +1,4 @@
-"""Pass or fail in plain words, at the range and accuracy that somebody needs (SPEC 1.3)."""
+"""Pass or fail of a camera in plain words, at the distance and accuracy that the user needs (SPEC 1.3)."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from pipeline.config import Lens
 from pipeline.types import FloatArray
 
 LEAST_SHARE = 0.95
-"""Of the image in which points must be placed well enough."""
+"""Share of the image in which points must be accurate enough."""
 RICHER: dict[Lens, Lens] = {"thesis": "brown", "brown": "rational"}
-"""Lenses with more freedom."""
+"""Lens models with more parameters."""
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Whether a camera is good enough."""
+    """Whether a camera is accurate enough."""
 
     passed: bool
     range_m: float
     accuracy_m: float
     error_m: FloatArray
-    """(R, C) of the map's cells, within which a point is placed 95 times in 100; NaN where it cannot be."""
+    """(R, C) error in the map's cells that is not exceeded in 95 of 100 cases; NaN without a ray."""
     share: float
-    """Of the image in which that is at most ``accuracy_m``."""
+    """Share of the image in which this error is at most ``accuracy_m``."""
     error_of_most_m: float
-    """It is not more over ``LEAST_SHARE`` of the image; infinite if more of it cannot be placed at all."""
+    """Error that is not exceeded over ``LEAST_SHARE`` of the image; infinite if too much has no rays."""
     sentence: str
-    """All this, and what to do."""
+    """Summary and advice."""
 
 
 def verdict(
@@ -43,20 +43,20 @@ def verdict(
     accuracy_m: float,
     following: NextView | None = None,
 ) -> Verdict:
-    """Judge a camera at the range of its maps.
+    """Judge a camera at the distance of its maps.
 
-    The error of a cell is that of noise; if both halves of the views differ by more than noise explains, it
-    is at least their difference.
+    The error of a cell is that of noise; if the two halves of the views differ by more than noise, it is at
+    least their difference.
 
     Args:
         calibration: the camera.
-        sd: its ``projected_sd_px``.
-        halves: its ``half_difference_px``; None if there are too few views for halves.
-        accuracy_m: within which a point must be placed.
-        following: the view to take next, for the advice.
+        sd: result of ``projected_sd_px``.
+        halves: result of ``half_difference_px``; None with too few views.
+        accuracy_m: error within which a point must be placed.
+        following: the best view to take next, for the advice.
 
     Raises:
-        InputError: no accuracy that could be met.
+        InputError: the accuracy is impossible.
     """
     if not accuracy_m > 0.0:
         raise InputError(f"An accuracy of {1000.0 * accuracy_m:g} mm cannot be met; try 5")

@@ -1,5 +1,5 @@
-"""A board that is not flat: its points are estimated with the lens (Strobl and Hirzinger, "More accurate
-pinhole camera calibration with imperfect planar target", ICCV workshops 2011).
+"""Estimation of a warped board, together with the lens (Strobl and Hirzinger, "More accurate pinhole
+camera calibration with imperfect planar target", ICCV workshops 2011).
 """
 
 from __future__ import annotations
@@ -30,46 +30,46 @@ from pipeline.types import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class BoardWarp:
-    """A board as the views have it."""
+    """The estimated shape of a board."""
 
     board_m: FloatArray
-    """(N, 3) its points; the first, the last and the upper right corner tell where it is and how large."""
+    """(N, 3) points of the board; the first, the last and the upper right define its frame and scale."""
     off_plane_m: FloatArray
-    """(N,) of them above or below the plane that lies best in them, along z."""
+    """(N,) distances of the points from their best-fitting plane, along z."""
     calibration: Calibration
-    """Of the camera with this board; its covariance takes the board as known."""
+    """Calibration of the camera with this board; its covariance assumes that the board is known."""
     held_out: tuple[FittedView, ...]
-    """Views that had no part in lens and board, with this board."""
+    """Held-out views, fitted with a lens and board estimated without them."""
     flat_rms_px: float
-    """Held out, with a flat board."""
+    """RMS of held-out views with a flat board."""
 
     @property
     def warp_m(self) -> float:
-        """From the deepest point of the board to the highest."""
+        """Distance from the deepest point of the board to the highest, along z."""
         return float(np.ptp(self.off_plane_m))
 
     @property
     def rms_px(self) -> float:
-        """Held out, with this board."""
+        """RMS of held-out views with this board."""
         return rms_px(np.concatenate([view.residuals_px for view in self.held_out]))
 
     @property
     def helps(self) -> bool:
-        """Whether views that had no part in it are predicted better."""
+        """Whether this board predicts held-out views better than a flat one."""
         return self.rms_px < self.flat_rms_px
 
 
 def board_warp(
     views: Sequence[View], size_px: tuple[int, int], board: Board, folds: int, lens: Lens = "thesis"
 ) -> BoardWarp:
-    """Estimate the board's points with the lens, and what held-out views say of them.
+    """Estimate the board's points with the lens, and test both on held-out views.
 
     Args:
-        views: all points of the board in each.
+        views: views that show all points of the board.
         size_px: width and height of the images.
-        board: as it was printed.
-        folds: in how many turns views are held out, 2 or more.
-        lens: which distortions the camera may have.
+        board: the board as printed.
+        folds: number of folds of held-out views, at least 2.
+        lens: distortion model of the camera.
 
     Raises:
         InputError: a fisheye lens, views of parts of the board, or too few views for the folds.
@@ -101,7 +101,7 @@ def board_warp(
 def _released(
     views: Sequence[View], size_px: tuple[int, int], board: Board, lens: Lens
 ) -> tuple[Calibration, FloatArray]:
-    """The camera, and (N, 3) points of the board."""
+    """Estimate the camera and the (N, 3) points of the board."""
     upper_right = board.columns - 1
     try:
         with one_thread():

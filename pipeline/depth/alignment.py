@@ -19,7 +19,7 @@ LOCAL_WIDTH_PX = 320
 LOCAL_SIGMAS_PX = (4.0, 12.0, 40.0)
 LOCAL_CLIP = 0.5
 LOCAL_PRIOR = 1e-4
-"""Weight of "no correction" relative to the Gaussians', so that the correction fades far from sensor depth."""
+"""Weight of "no correction" relative to the Gaussians': the correction fades far from sensor depth."""
 
 
 @dataclass(frozen=True, slots=True)

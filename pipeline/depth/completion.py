@@ -1,4 +1,4 @@
-"""Completion of a sensor's depth by a network, from colours and depth with holes to dense depth (SPEC 3.6)."""
+"""Completion of a sensor's depth by a network, from colours and depth with holes (SPEC 3.6)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class CompletedDepth:
 def complete(sensor: DepthMap, rgb: ByteArray, model: Path = SHIPPED_COMPLETION) -> CompletedDepth:
     """Extend measured depth into its holes.
 
-    The network predicts depth differences between near and distant pixels, and the certainty of each; the depth
+    The network predicts depth differences between near and far pixels, and the certainty of each; the depth
     that fits these best is adapted to the measured depth (``pipeline.depth.slopes``).
 
     Args:
@@ -74,7 +74,7 @@ def enlarged(plane: FloatArray, shape: tuple[int, int]) -> FloatArray:
 
 
 def meeting(log_z: FloatArray, sensor: DepthMap, rgb: ByteArray) -> FloatArray:
-    """Correct completed depth so that it meets the measured pixels around every hole; returns (H, W) metres."""
+    """Correct completed depth to meet the measured pixels around every hole; returns (H, W) metres."""
     measured_log = np.log(np.where(sensor.valid, sensor.z_m, 1.0)).astype(np.float32)
     mismatch = np.where(sensor.valid, measured_log - log_z, np.float32(0.0))
     usable: BoolArray = sensor.valid & (np.abs(mismatch) < LARGEST_MISMATCH)

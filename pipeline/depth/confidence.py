@@ -28,7 +28,7 @@ easier to complete. Fitted in the same way, on hidden depth."""
 TYPICAL_LOG_SCALE = -2.7
 LEAST_DIFFERENCE = 0.005
 RELIEF_APART = 0.02
-"""Distance of the pixels whose depth differences are compared with the sensor's, as a share of the diagonal."""
+"""Distance of pixels whose depth differences are compared with the sensor's, as a share of the diagonal."""
 RELIEF_STEP = 0.15
 """Larger steps of the sensor's logarithmic depth are edges and are left out."""
 RELIEF_AFTER_LOCAL = 0.3
@@ -50,12 +50,12 @@ ALIGNED_ODDS = (-10.20, -1.06, -1.83)
 
 @dataclass(frozen=True, slots=True)
 class JudgedDepth:
-    """Inferred depth after the tests of confidence, reach and flying pixels, with the results of these tests."""
+    """Inferred depth after the tests of confidence, reach and flying pixels, with their results."""
 
     depth: DepthMap
     """(H, W) metres, without flying pixels, pixels out of reach and those below the least confidence."""
     confidence: FloatArray
-    """(H, W) float32, estimated probability of an error within 5 % of the truth; NaN without inferred depth."""
+    """(H, W) float32, estimated probability of being within 5 % of the truth; NaN without depth."""
     flying: BoolArray
     """(H, W) True for pixels between two surfaces."""
     out_of_reach: BoolArray
@@ -79,7 +79,7 @@ def judge(
         rgb: (H, W, 3) uint8, the colours of both.
         reach: largest distance of a pixel from sensor depth, as a share of the image's diagonal.
         least_confidence: least confidence of the pixels that are kept, 0 to 1.
-        completed: (H, W) completed depth, which replaces aligned depth in the sensor's holes with a weight that
+        completed: (H, W) completed depth; it replaces aligned depth in the sensor's holes with a weight that
             grows with the distance from their rims.
         hidden: (H, W) True where measured depth was hidden, whose holes are easier; None if there is none.
 
@@ -114,7 +114,7 @@ def judge(
 
 
 def distance_to_measured(measured: BoolArray) -> FloatArray:
-    """Return (H, W) distances to the nearest measured pixel as shares of the diagonal; infinite without any."""
+    """Return (H, W) distances to the nearest measured pixel as shares of the diagonal; or infinity."""
     if not measured.any():
         return np.full(measured.shape, np.inf, np.float32)
     distance_px = cv2.distanceTransform((~measured).astype(np.uint8), cv2.DIST_L2, 5)
@@ -192,7 +192,7 @@ def odds_of_completion(
 def features_of_completion(aligned: DepthMap, completed: CompletedDepth, distance: FloatArray) -> FloatArray:
     """Return (4, H, W) features that predict whether completed depth is right.
 
-    They are the network's log scale and its square, the log of the distance as a share of the diagonal, and the
+    They are the network's log scale, its square, the log of the distance as a share of the diagonal, and the
     log of the difference between completed and aligned depth, which counts as 0 without aligned depth.
     """
     scale = completed.log_scale - TYPICAL_LOG_SCALE
@@ -202,7 +202,7 @@ def features_of_completion(aligned: DepthMap, completed: CompletedDepth, distanc
 
 
 def flying_pixels(depth: DepthMap, sensor: DepthMap) -> BoolArray:
-    """Return (H, W) True for flying pixels: on a steep step, off both its sides, and near no measured depth."""
+    """Return (H, W) True for flying pixels: on a steep step, off both its sides, near no measured depth."""
     measured = positive(sensor.z_m)
     complete_m = np.where(measured, sensor.z_m, depth.z_m)
     half_px = max(1, round(FLYING_WINDOW * np.hypot(*measured.shape)))

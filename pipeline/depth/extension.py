@@ -1,4 +1,4 @@
-"""Extension of a partly known field into unknown pixels, with its slope and along similar colours (SPEC 3.5)."""
+"""Extension of a field into unknown pixels, with its slope and along similar colours (SPEC 3.5)."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def _upsample(
     coarse_colors: FloatArray,
     step: int,
 ) -> None:
-    """Fill a field's unknown pixels from the coarse field, bilinearly with larger weights for similar colours.
+    """Fill a field's unknown pixels from the coarse field, bilinearly with more weight for similar colours.
 
     Args:
         field: (H, W) float32.

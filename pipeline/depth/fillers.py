@@ -51,7 +51,7 @@ def nearest(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
 
 
 def joint_bilateral(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
-    """Average the surrounding known depths, weighted by distance and colour similarity, from the rims inwards.
+    """Average surrounding known depths, weighted by distance and colour similarity, from the rims inwards.
 
     Iterated joint bilateral upsampling (Kopf et al. 2007): each pass fills the unknown pixels that have a
     known one within 3 pixels, from all known ones within 7.
@@ -100,4 +100,4 @@ PEERS: dict[str, Callable[[DepthMap, ByteArray], DepthMap]] = {
     "nearest": nearest,
     "joint-bilateral": joint_bilateral,
 }
-"""Fillers that return dense depth from the sensor's alone, or guided by colour; measured depth is unchanged."""
+"""Fillers that return dense depth from the sensor's, some guided by colour; measured depth is unchanged."""

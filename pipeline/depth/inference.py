@@ -35,7 +35,7 @@ class DepthNetwork:
             overrides: parts of the convention that replace the file's or the preset's.
 
         Raises:
-            InputError: the file is missing, no ONNX, damaged or no depth network, or neither it nor the caller
+            InputError: the file is missing, damaged, no ONNX or no depth network, or neither it nor the call
                 gives its convention.
         """
         if model_path is None and preset not in (None, "packetmesh"):
@@ -61,9 +61,9 @@ class DepthNetwork:
         return dict(self._session.get_modelmeta().custom_metadata_map)
 
     def infer(self, rgb: ByteArray, crop: bool = False) -> DepthMap:
-        """Infer depth on the pixel grid of ``rgb`` (SPEC 3.2): metric if the network gives metres, else relative.
+        """Infer depth on the grid of ``rgb`` (SPEC 3.2): metric if the network gives metres, else relative.
 
-        A network of the kind ``inverse`` gives disparity d up to scale and shift; the returned depth is 1/d, which
+        A network of the kind ``inverse`` gives disparity d up to scale and shift; the depth is 1/d, which
         the alignment ``affine_inverse`` makes metric. Where d is zero or negative, as most networks clip
         far pixels, the depth is NaN.
 
@@ -116,7 +116,7 @@ class DepthNetwork:
 
 
 def network_image(region: ByteArray, convention: Convention, crop: bool) -> tuple[ByteArray, int, int]:
-    """Resize the image for the network; returns it with the number of rows and columns that are not padding."""
+    """Resize the image for the network; returns it with the rows and columns that are not padding."""
     rows, columns = region.shape[:2]
     width_px, height_px = convention.width_px, convention.height_px
     if height_px is None:
@@ -145,7 +145,7 @@ def network_input(image: ByteArray, convention: Convention) -> FloatArray:
 def depth_of(output: FloatArray, size_px: tuple[int, int], convention: Convention) -> FloatArray:
     """Convert a network's output to depth of (width, height) pixels.
 
-    Depth is resized as its logarithm, disparity directly, so that its noise is uniform; values <= 0 become NaN.
+    Depth is resized as its logarithm, disparity directly: noise is then uniform. Values <= 0 become NaN.
     """
     if convention.depth_range_m is not None:
         near, far = (1.0 / depth_m for depth_m in convention.depth_range_m)

@@ -62,7 +62,7 @@ def padded(rgb: ByteArray, width_px: int, height_px: int) -> ByteArray:
 
 
 def normalised_input(rgb: ByteArray) -> FloatArray:
-    """Convert (H, W, 3) uint8, at most 240 x 320, to our network's (1, 3, 256, 320) float32, reflect-padded."""
+    """Convert (H, W, 3) uint8, at most 240 x 320, to our network's (1, 3, 256, 320) float32 input."""
     image = padded(rgb, WIDTH_PX, PADDED_HEIGHT_PX).astype(np.float32)
     scaled = (image / np.float32(255.0) - MEAN) / STANDARD_DEVIATION
     return np.ascontiguousarray(scaled.transpose(2, 0, 1)[None])

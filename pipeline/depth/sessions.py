@@ -31,7 +31,7 @@ def modified_ns(model_path: Path) -> int:
 
 @lru_cache(maxsize=2)
 def open_session(model_path: Path, modified_ns: int) -> onnxruntime.InferenceSession:
-    """Open a session with few, non-spinning threads; the last two are cached, as opening is as slow as inference.
+    """Open a session with few, non-spinning threads; the last two are cached: opening is as slow as a run.
 
     Raises:
         InputError: the file is no ONNX network, or needs too much time or memory.

@@ -47,7 +47,7 @@ class Grid:
 
 
 def coarse(z_m: FloatArray, known: BoolArray, rgb: ByteArray) -> Grid:
-    """Reduce colours to means over the grid's cells, and depth to the measured pixel nearest to a cell's centre.
+    """Reduce colours to means over grid cells, and depth to the measured pixel nearest to a cell's centre.
 
     Image sizes that are no multiple of the cell are padded with unknown depth.
     """
@@ -107,7 +107,7 @@ def network_input(grid: Grid) -> tuple[FloatArray, FloatArray]:
 
 
 def measured_slopes(grid: Grid) -> tuple[FloatArray, FloatArray]:
-    """Return (H, W) slopes of logarithmic depth along x and y, blurred over measured pixels on one surface."""
+    """Return (H, W) slopes of log depth along x and y, blurred over measured pixels on one surface."""
     slopes = []
     for axis in (1, 0):
         first = tuple(slice(None, -1) if a == axis else slice(None) for a in (0, 1))
