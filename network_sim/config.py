@@ -51,7 +51,7 @@ class RadioConfig:
     system_loss: float = 1.0
     """Loss of cables and filters, as a factor."""
     path_loss_exponent: float = 3.0
-    """How fast power falls with distance; only log-distance uses it."""
+    """Exponent by which power falls with distance; only log-distance uses it."""
     reference_m: float = 1.0
     """Distance up to which log-distance is free space."""
     shadowing_db: float = 0.0
@@ -63,7 +63,7 @@ class RadioConfig:
     sense_range_m: float = 220.0
     """Distance up to which a transmission keeps others silent."""
     capture_db: float = 10.0
-    """How much stronger than all others together a frame has to be to survive their overlap."""
+    """Least ratio of a frame's power to the sum of overlapping ones at which it survives."""
     noise_dbm: float | None = None
     """Power of the noise; None receives everything above the threshold without bit errors."""
     walls_m: tuple[float, ...] = ()
@@ -96,7 +96,7 @@ class MacConfig:
     ack: bool = True
     """Acknowledge frames and send lost ones again; IEEE 802.11b always does."""
     retries: int | None = None
-    """How often an unanswered frame is sent again; None is 3 times in IEEE 802.15.4, 6 in IEEE 802.11b."""
+    """Retransmissions of an unanswered frame; None is 3 times in IEEE 802.15.4, 6 in IEEE 802.11b."""
     rate_bps: float = 11e6
     """Rate of IEEE 802.11b's data frames: 1, 2, 5.5 or 11 Mb/s. A slower one reaches farther."""
     link_bps: float = 250e3
@@ -119,8 +119,8 @@ class NodesConfig:
     count: int = 3
     """Camera nodes, without the sink."""
     layout: Layout = "star"
-    """Where they stand: around the sink, in a line from it, in a square grid with the sink at a corner, or
-    at random in a square with the sink in its middle."""
+    """Positions of the nodes: around the sink, in a line from it, in a square grid with the sink at a corner,
+    or at random in a square with the sink in its middle."""
     spacing_m: float = 20.0
     """Distance to the sink (star) or between neighbours (line, grid; on average: random)."""
     places_m: tuple[float, ...] = ()
@@ -153,7 +153,7 @@ class NodesConfig:
     failures_per_h: float = 0.0
     """Mean failures of each node in an hour, at random."""
     recovery_s: float = 60.0
-    """How long a failed node stays down; its buffer is lost."""
+    """Time that a failed node stays down; its buffer is lost."""
 
     def __post_init__(self) -> None:
         at_least("nodes.count", self.count, 1)
@@ -219,11 +219,11 @@ class SchemeConfig:
     r_high: float = 8.0
     """Images of a cell in a control period from which pdc asks only for what covers it once."""
     validity_s: float = 10.0
-    """How long an image shows its cell (T_v)."""
+    """Time for which an image covers its cell (T_v)."""
     observation_s: float = 600.0
     """Time over which pdc counts offered images (T_obs)."""
     control_s: float = 60.0
-    """How often pdc sets its probabilities (S)."""
+    """Interval at which pdc sets its probabilities (S)."""
     sample_s: float = 2.0
     """Time between images of a vehicle."""
     buffer_images: int = 200

@@ -48,7 +48,7 @@ class EventKind(IntEnum):
     AIR = 2
     """A frame was on the air from ``t_ns`` for ``duration_ns``, sent by ``node`` to ``peer``."""
     ACK = 3
-    """Like AIR, for an acknowledgement, RTS or CTS: a frame without payload."""
+    """An acknowledgement, RTS or CTS (a frame without payload) was on the air; columns as for AIR."""
     LOSS = 4
     """A transmission attempt failed, for ``cause``; a retry may follow. ``t_ns`` is the attempt's end."""
     DELIVER = 5

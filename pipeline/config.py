@@ -101,7 +101,7 @@ class DepthConfig:
     crop: bool = False
     """Infer on the thesis's 304 x 228 centre crop instead of the whole image."""
     alignment: AlignmentMode = "local"
-    """How inferred depth is made metric against the sensor (SPEC 3.5)."""
+    """Alignment that makes inferred depth metric by the sensor's (SPEC 3.5)."""
     fill: Fill = "auto"
     """Depth for the sensor's holes: completed from colours and measured depth together (completion), or the
     colour network's aligned depth (network); auto is network if a model is named, else completion."""
@@ -218,7 +218,7 @@ class SurfaceConfig:
     """The clouds are averaged over voxels that leave about this many points, or fewer if such voxels would
     be smaller than twice the sensors' noise."""
     smoothing_passes: int = 2
-    """How many times every averaged point is moved onto the plane of its neighbours; 0 keeps the noise."""
+    """Times that every averaged point is moved onto the plane of its neighbours; 0 keeps the noise."""
 
     def __post_init__(self) -> None:
         _at_least("surface.max_points", self.max_points, 3)

@@ -48,9 +48,9 @@ def deliver(
     """Send a rig's images through a network and rebuild the scene from what has arrived at each moment.
 
     Args:
-        rig: one to six camera nodes with colour and depth images, intrinsics and believed poses.
+        rig: one to six camera nodes with colour and depth images, intrinsics and given poses.
         network: any network that collects images from fixed nodes.
-        coding: how images become bytes: a name of ``pipeline.delivery.CODINGS``.
+        coding: name in ``pipeline.delivery.CODINGS``, which decides how images become bytes.
         moments: number of moments at which the scene is rebuilt, after equal shares of the bytes that arrive.
         config: settings of the reconstruction.
 

@@ -149,8 +149,8 @@ class Medium:
             sender: Node that sends.
             duration_ns: Time on the air, with the preamble.
             receiver: Node that receives.
-            size_bytes: Size of the frame; with
-            modulation: it gives the bit errors. Both are unused when the radio has no noise.
+            size_bytes: Size of the frame, from which bit errors follow if the radio has noise.
+            modulation: Modulation of the frame.
             begins_ns: Start of the frame: None for now, or later for a reply; a frame that begins before
                 this start must end after it.
             reserve_ns: Duration of the reservation (NAV) after its end, for every node that can read it.

@@ -82,7 +82,7 @@ def free_space(tx_power_w: float, wavelength_m: float, gain: float = 1.0, loss: 
 def ground_reflection(
     tx_power_w: float, wavelength_m: float, height_m: float, gain: float = 1.0, loss: float = 1.0
 ) -> PathLoss:
-    """Two-ray: free space up to the crossover, then ``Pr = Pt G^2 h^4 / (d^4 L)`` (Rappaport 2002, 4.6)."""
+    """Return two-ray: free space; from the crossover ``Pr = Pt G^2 h^4 / (d^4 L)`` (Rappaport 2002, 4.6)."""
     near = free_space(tx_power_w, wavelength_m, gain, loss)
     far_w = tx_power_w * gain**2 * height_m**4 / loss
     return PathLoss(near.near_w, 2.0, far_w, 4.0, crossover_m(height_m, wavelength_m), near.least_m)

@@ -41,7 +41,7 @@ class FilterResult:
     score: FloatArray
     """(N,) as in ``Outliers``."""
     threshold: float
-    """As in ``Outliers``."""
+    """Largest score that is kept, as in ``Outliers``."""
 
 
 def filter_outliers(cloud: PointCloud, config: AcquisitionConfig, focal_px: float) -> FilterResult:

@@ -70,7 +70,7 @@ def _clipped_sd_m(values_m: FloatArray) -> float:
 def noise_law(points: NoisePoints) -> DepthNoise:
     """Fit max(s0, s1 z^p) / cos(angle)^q by least squares on its logarithm: near and far count equally.
 
-    The law bends where s1 z^p reaches s0 and is linear for a given bend; the bend with the least squares
+    The law bends where s1 z^p reaches s0. For a given bend the fit is linear; the bend with the least squares
     is chosen.
     """
     log_z, log_cos, log_sd = np.log(points.z_m), np.log(points.cosine), np.log(points.sd_m)

@@ -79,7 +79,7 @@ class HeldOutRig:
     views: Mapping[str, tuple[FittedView, ...]]
     """Views by camera; only the board's pose is fitted, to all cameras that see it."""
     rotation_deg: Mapping[str, float]
-    """By camera, the largest rotation between its poses without a fold and with all moments."""
+    """Largest rotation, by camera, between its poses without a fold and with all moments."""
     position_m: Mapping[str, float]
 
     @property

@@ -65,7 +65,7 @@ def write_rig_folder(
 
 
 def pose_like(rig: AnyPath | None, node: str) -> FloatArray:
-    """Return the (4, 4) pose of a rig's node, for placing cameras in its world; else of a node without pose.
+    """Return the (4, 4) pose of a rig's node, to place cameras in its world; without a rig a default pose.
 
     Raises:
         InputError: the rig has no such node, or the node has no pose.

@@ -93,7 +93,7 @@ def camera_images(nodes: Iterable[NodeShots]) -> dict[str, dict[Path, str]]:
 
 
 def node_folders(folder: Path) -> list[Path]:
-    """Return the folders node_00, node_01 and so on in a session's folder; none among photographs."""
+    """List node_00, node_01 and so on in a session's folder; empty for a folder of photographs."""
     return sorted(one for one in folder.glob("node_*") if one.is_dir())
 
 

@@ -30,11 +30,11 @@ from pipeline.types import FloatArray
 CELLS = 24
 """Number of a map's cells along the longer side of the image."""
 CIRCLE95 = 2.4477
-"""Radius in sd around the mean of a round normal distribution in the plane that contains 95 % of it."""
+"""Radius, in sd, that contains 95 % of a round normal distribution in the plane."""
 MOST_UNSURE = 20.0
-"""A half whose sd is more than this many times the whole's is not used."""
+"""Halves are not compared if the sd of one is more than this many times that of the whole."""
 DRAWS = 2000
-"""Number of random lenses from which follows how much two halves differ by noise alone."""
+"""Number of random lenses that are drawn to find how much two halves differ by noise alone."""
 
 
 @dataclass(frozen=True, slots=True)

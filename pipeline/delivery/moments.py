@@ -1,4 +1,4 @@
-"""Moments of a delivery: what the sink can reconstruct at a time, and its cost until then."""
+"""Moments of a delivery: what the sink can reconstruct at each, and its cost until then."""
 
 from __future__ import annotations
 

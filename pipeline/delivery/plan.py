@@ -24,7 +24,7 @@ def poses_known(rig: Rig) -> bool:
 def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> NetworkConfig:
     """Configure a network with the rig's cameras as nodes, each with one image to send.
 
-    Nodes are at ``nodes.places_m`` if it is given; else below their cameras, seen from above, with the sink
+    Nodes are at ``nodes.places_m`` if it is given; else at their cameras' x and y, with the sink
     ``nodes.spacing_m`` behind their centre; if the poses are unknown, by ``nodes.layout``. If some nodes of
     a rig are down, ``placed`` gives the positions of the others.
 

@@ -115,7 +115,7 @@ def _symbol_bytes(unit_bytes: int) -> int:
 
 
 def _certainly_of_base(count: int, repair_every: int) -> BoolArray:
-    """Return (count,) True for units that belong to a base of any length: a reader finds it there."""
+    """Return (count,) True for units that belong to a base of any length: they tell a reader its length."""
     every = min(repair_every, -(-count // _LEAST_CERTAIN))
     certain = np.zeros(count, np.bool_)
     certain[every - 1 :: every] = True

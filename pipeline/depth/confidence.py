@@ -114,7 +114,7 @@ def judge(
 
 
 def distance_to_measured(measured: BoolArray) -> FloatArray:
-    """Return (H, W) distances to the nearest measured pixel as shares of the diagonal; or infinity."""
+    """Return (H, W) distances to the nearest measured pixel, as shares of the diagonal; inf if none."""
     if not measured.any():
         return np.full(measured.shape, np.inf, np.float32)
     distance_px = cv2.distanceTransform((~measured).astype(np.uint8), cv2.DIST_L2, 5)

@@ -2,17 +2,17 @@
 
 An ONNX file stores it in its ``metadata_props``. All keys are optional text, plain or JSON:
 
-        preset             preset with the values of the other keys
+    preset             name of a preset, for the values that other keys do not set
     depth_kind         metric: metres; relative: depth up to scale; inverse: disparity up to scale and shift
     depth_range_m      0.1,100: the output is a sigmoid between the disparities of these depths (monodepth2)
     input_size_px      320x256: width and height; 518: any size whose shorter side is that long
     input_multiple_px  14: the sides of such a size are multiples of it
-        input_fit_px       320x240: the centre box of the input into which the image is fitted
-        input_resize       fit (keeps the aspect and pads by reflection) or stretch
-        input_scale        255 or 1: divisor of pixel values
-        input_mean         0.485,0.456,0.406: red, green, blue; subtracted afterwards
-        input_deviation    0.229,0.224,0.225: red, green, blue; divisor afterwards
-        input_normalised   inside (the graph itself subtracts and divides) or outside
+    input_fit_px       320x240: the centre box of the input into which the image is fitted
+    input_resize       fit (keeps the aspect and pads by reflection) or stretch
+    input_scale        255 or 1: divisor of pixel values
+    input_mean         0.485,0.456,0.406: red, green, blue; subtracted afterwards
+    input_deviation    0.229,0.224,0.225: red, green, blue; divisor afterwards
+    input_normalised   inside (the graph itself subtracts and divides) or outside
     input_channels     RGB or BGR
     input_layout       NCHW or NHWC
 

@@ -13,7 +13,7 @@ FILL_WIDTH_PX = 320
 WINDOW_PX = 3
 SPACE_SIGMA_PX = 1.7
 SLOPE_SIGMA_PX = 6.0
-"""In pixels at the filling width; these three numbers reconstruct hidden sensor depth best."""
+"""Window and sigmas in pixels at the filling width; these three fit hidden sensor depth best."""
 COLOR_SIGMA = 7.0
 """Root mean square of the three channels' differences, in grey levels."""
 LEAST_WEIGHT = 1e-6
@@ -22,7 +22,7 @@ SLOPE_SHARE = 0.5
 SLOPE_DECAY = 0.97
 """Factor of the slope after each ring of pixels inwards."""
 LARGEST_SLOPE = 0.03
-"""In logarithmic depth per pixel; steeper is an edge."""
+"""Largest slope, in logarithmic depth per pixel; a steeper one is an edge."""
 
 
 def extrapolated(field: FloatArray, known: BoolArray, rgb: ByteArray) -> FloatArray:

@@ -49,7 +49,7 @@ class BagNodes:
 
 @dataclass(frozen=True, slots=True)
 class _Topic:
-    """Times of the images of one topic."""
+    """An image topic with its camera and the times of its images."""
 
     connection: Any
     frame: str

@@ -115,7 +115,7 @@ def _in_view(points_m: FloatArray, limits: tuple[FloatArray, FloatArray]) -> Boo
 def _covered(
     sides_m: FloatArray, center_m: FloatArray, camera: CameraIntrinsics
 ) -> tuple[IntArray, FloatArray, BoolArray]:
-    """Return (P,) flat indices of colour pixels, a piece's depth there, and if it covers them unenlarged."""
+    """Return (P,) colour pixels covered by pieces, their depth, and False where only OVERLAP covers them."""
     left, right, above, below = (project(camera, side_m) for side_m in sides_m)
     center = project(camera, center_m)
     across, down = right - left, below - above

@@ -61,7 +61,7 @@ def triangle_scene(vertices_m: FloatArray, triangles: IntArray) -> o3d.t.geometr
 def first_hits(
     scene: o3d.t.geometry.RaycastingScene, origins_m: FloatArray, directions: FloatArray
 ) -> FloatArray:
-    """Return lengths (...) of (..., 3) rays to the first triangle, in units of their directions; or inf."""
+    """Return (...) lengths of (..., 3) rays to the first triangle, in units of the direction; inf if none."""
     rays = np.concatenate([origins_m, directions], axis=-1)
     return scene.cast_rays(tensor(rays, np.float32))["t_hit"].numpy()
 

@@ -33,7 +33,7 @@ SHARED_VIEW = 0.25
 LEAST_OVERLAP = 0.05
 """Least share of two nodes' points that the other camera can judge, for their agreement to count."""
 LEAST_AGREEMENT = 0.4
-"""Least agreement of a node with a given pose with all others; with less it is excluded."""
+"""A node with a given pose is excluded if a smaller share of its shared measurements is within 2 %."""
 SURE_OVERLAP, SURE_AGREEMENT = 0.15, 0.88
 """Least overlap and agreement of a pose found without a first guess; a given one with less gets a warning.
 At correct poses, nodes of rendered rigs reach .92 to .98 and those of a real SR300 .92 to .99; 3 degrees and

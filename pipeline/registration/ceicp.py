@@ -146,7 +146,7 @@ class CeicpR(PairWeighting):
 
 
 def _smallest_sigma_m(target: PointCloud, gate_m: float) -> float:
-    """Return 0.6 times the target's median spacing, or its median depth noise if that is larger."""
+    """Return the larger of 0.6 median spacings and the median depth noise, at least a share of the gate."""
     noise_m = 0.0
     if target.sigma_m is not None and np.isfinite(target.sigma_m).any():
         noise_m = float(np.nanmedian(target.sigma_m))
