@@ -12,7 +12,7 @@ import pytest
 from onnx import TensorProto, helper
 
 from tests.bad_input.samples import MM, RGB, bag, opencv
-from tests.browser.hands import PATIENCE_MS, go, unfold
+from tests.browser.hands import PATIENCE_MS, STEPS, go, unfold
 from tests.browser.test_policy import WATCH
 
 MARKUP = (
@@ -109,7 +109,7 @@ def test_names_of_a_rig_its_cameras_and_its_folder(page):
     upload(page, "Recording", f"{NAME}.zip", zipped(files))
     says(page, f"node_00{NAME}")
     page.get_by_text("Up to date").wait_for(timeout=120_000)
-    for screen in ("Calibrate", "Depth", "Fuse", "Surface", "Network", "Export"):
+    for screen in STEPS[1:]:
         go(page, screen)
         page.wait_for_timeout(1500)
         unharmed(page)

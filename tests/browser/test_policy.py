@@ -5,7 +5,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
-from tests.browser.hands import PATIENCE_MS, go
+from tests.browser.hands import PATIENCE_MS, STEPS, go
 
 WATCH = """
 window.forbidden = [];
@@ -43,7 +43,7 @@ def page(browser, app):
 
 def test_every_screen_works_under_the_policy_and_nothing_is_sent_elsewhere(page):
     page.get_by_text("Each camera node delivers").wait_for()
-    for step in ("Calibrate", "Depth", "Fuse", "Surface", "Network", "Export"):
+    for step in STEPS[1:]:
         go(page, step)
         page.wait_for_timeout(1000)
     assert page.evaluate("window.forbidden") == []
