@@ -20,13 +20,21 @@ autodoc_type_aliases = {
 python_use_unqualified_type_names = True
 
 DOCS = Path(__file__).parent
-LINK = re.compile(r"\[([^\]]*)\]\(((?:\.\./|results|examples)[^)#\s]*)(#[^)\s]*)?\)")
+LINK = re.compile(r"\[([^\]]*)\]\(((?:\.\./|results(?=[/)])|examples(?=[/)]))[^)#\s]*)(#[^)\s]*)?\)")
 """Links to files of the repository that are no pages of the site."""
 
 
 def setup(app):
     """Have links that leave the site written as plain text."""
     app.connect("source-read", without_links_out)
+    app.connect("include-read", seen_from_docs)
+
+
+def seen_from_docs(app, path, page, content):
+    """Have an included file of the repository's root link as a page in docs does."""
+    text = re.sub(r"\]\((?!https?:|#)", "](../", content[0]).replace("](../docs/", "](")
+    content[0] = text.replace("](../CHANGELOG.md", "](changelog.md")
+    without_links_out(app, page, content)
 
 
 def without_links_out(app, page, source):

@@ -48,6 +48,29 @@ def test_links_lead_to_files(path):
     assert [link for link in links if not (path.parent / link).exists()] == []
 
 
+PAGES = [README, ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def anchors(path):
+    """The names by which headings of a page can be linked."""
+    found = set()
+    for heading in re.findall(r"^#{1,4} (.+)$", FENCED.sub("", path.read_text("utf-8")), re.MULTILINE):
+        name = again = re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
+        times = 0
+        while again in found:
+            again = f"{name}-{(times := times + 1)}"
+        found.add(again)
+    return found
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.name)
+def test_anchors_lead_to_headings(path):
+    links = re.findall(r"\]\(([^)#:\s]*\.md|)#([^)\s]+)\)", FENCED.sub("", path.read_text("utf-8")))
+    targets = [((path.parent / page) if page else path, anchor) for page, anchor in links]
+    assert links or path != README
+    assert [(page.name, anchor) for page, anchor in targets if anchor not in anchors(page)] == []
+
+
 @pytest.mark.parametrize("path", [README, USING], ids=lambda path: path.name)
 def test_commands_and_their_options_exist(path, capsys):
     lines = [line for line in "".join(blocks(path, "sh")).splitlines() if line.startswith("packetmesh")]
