@@ -1,4 +1,4 @@
-"""Averaging of measured depth over its own surface, by which no pixel moves farther than its noise."""
+"""Averaging of measured depth over its own surface; no pixel moves farther than its noise."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ def averaged(planes: LocalPlanes) -> DepthMap:
 
     This is the sigma filter (Lee 1983) along the local plane, in 1/z: a neighbour counts if its distance from
     the pixel's plane is within the noise, so that edges stay and no pixel moves beyond its noise. Where noise
-    is as large as the point spacing, a ball that should roll along a wall would get caught inside it;
-    averaging makes the wall thin again before points are merged.
+    is as large as the point spacing, the ball of ball pivoting would get caught inside a wall; averaging
+    makes the wall thin again before points are merged.
 
     Returns:
         (H, W) metric depth, known where it was known before.

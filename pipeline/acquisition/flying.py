@@ -1,8 +1,8 @@
 """Detection of flying pixels: depths that a sensor reports between a surface and the one behind it.
 
-At the edge of an object a sensor may mix front and back into a depth where nothing is. These are the real
-outliers of a depth image, unlike slanted walls, far floors and steps of quantised disparity, although
-the points of these are equally far apart.
+At the edge of an object a sensor may mix the depths of front and back to a depth without any surface. These
+pixels are the real outliers of a depth image. Points of slanted walls, far floors and steps of quantised
+disparity are no outliers, although they are equally far apart.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ LINES = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 
 def flying_score(planes: LocalPlanes) -> FloatArray:
-    """Return how far every pixel is from all surfaces to which it could belong, in standard deviations.
+    """Return every pixel's distance from all surfaces to which it could belong, in standard deviations.
 
     On each of four lines through a pixel, the plane of the next measured pixel on either side is extended
     to it. For a pixel between a plane in front of it and one behind it, the score is the smaller of both

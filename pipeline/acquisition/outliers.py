@@ -19,7 +19,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Outliers:
-    """Outliers of a cloud, with the scores that decided."""
+    """Outliers of a cloud, and the scores by which they were found."""
 
     keep: BoolArray
     """(N,) False for outliers."""

@@ -63,7 +63,7 @@ def local_planes(
 
     Args:
         depth: (H, W) metric.
-        intrinsics: the camera, from which follows which step between pixels is too steep for a surface.
+        intrinsics: the camera, whose focal length determines which steps are too steep for a surface.
         noise: the sensor's calibrated noise; None estimates it from the image.
     """
     known = depth.valid & (depth.z_m > 0)

@@ -78,8 +78,8 @@ def assess(
         calibration: the camera.
         views: the views of its calibration.
         board: the board in the views.
-        range_m: distance of what the camera will measure.
-        accuracy_m: error within which a point must be placed.
+        range_m: distance of the surfaces that the camera will measure.
+        accuracy_m: largest error of a point that is accepted.
 
     Raises:
         InputError: the range or the accuracy is impossible.
@@ -106,6 +106,6 @@ def assess(
 
 
 def _summary(values: np.ndarray) -> dict[str, float]:
-    """Summarise the part of the image for which the lens has rays."""
+    """Return the median and the maximum over the pixels that have rays; empty if there are none."""
     known = values[np.isfinite(values)]
     return {"median": float(np.median(known)), "most": float(known.max())} if len(known) else {}

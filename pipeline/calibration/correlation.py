@@ -1,4 +1,4 @@
-"""Correlations of a camera's parameters, which the views hardly separate if they are strong (SPEC 1.3 d)."""
+"""Correlations of the errors of a camera's parameters; views hardly separate correlated ones (SPEC 1.3 d)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pipeline.types import FloatArray
 
 DISTANCE = "distance"
 """Mean distance of the board from the camera: not a lens parameter, but the quantity with which a focal
-length is confused first."""
+length is confused most easily."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Correlations:
 def correlations(lens: Calibration) -> Correlations:
     """Compute the correlations of the errors of a camera's parameters and of the board's distance.
 
-    A pose's error has a part of its own and one that follows from the lens; the lens's covariance already
+    The error of a pose has an independent part and a part due to the lens; the lens's covariance already
     includes the poses, so both parts of the mean distance are computed view by view.
     """
     noise = coordinate_sd_px(lens.views, lens.lens) ** 2

@@ -1,5 +1,5 @@
-"""Bias of a depth sensor from the boards that calibrate its camera: offset, scale, curvature, a map over the
-image, and the noise, with as many terms as held-out views justify (SPEC 1.5).
+"""Estimation of a depth sensor's bias (offset, scale, curvature, a map over the image) and noise from views
+of calibration boards, with as many terms as held-out views justify (SPEC 1.5).
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ class DepthFit:
     terms: tuple[str, ...]
     """Terms that held-out views justify."""
     covariance: FloatArray
-    """(p, p) covariance of the terms' parameters: of those of offset, scale and curvature in use, then
-    the map's eleven coefficients along ``depth_terms.map_directions``."""
+    """(p, p) covariance of the parameters of ``terms``: offset, scale and curvature as far as they are used,
+    then the map's eleven coefficients along ``depth_terms.map_directions``."""
     held_out_m: Mapping[str, float]
     """RMS depth error in held-out views, by the terms of each model that was tried."""
     rms_before_m: float
@@ -108,13 +108,13 @@ class DepthFit:
 def fit_depth(samples: DepthSamples) -> DepthFit:
     """Estimate a sensor's bias and noise.
 
-    Weights are 1/sd^2 of the noise law, with Huber's at 3 sd, and every view has the same weight, because the
-    error of the board's pose affects all its pixels alike. A term is kept only if the error in views held
-    out in turn falls by more than its standard error. Standard errors combine the jackknife over views with
+    A pixel's weight is 1/sd^2 by the noise law times Huber's at 3 sd; every view has the same weight, because
+    the error of the board's pose affects all its pixels alike. A term is kept only if it lowers the error in
+    held-out views by more than the standard error. Standard errors combine the jackknife over views with
     the lens's uncertainty.
 
     Args:
-        samples: pixels of at least four views; those on ink are not used.
+        samples: pixels of at least four views; the fit leaves out those on ink.
 
     Raises:
         InputError: there are fewer views.
@@ -178,7 +178,7 @@ def _correction(
     noise: DepthNoise,
     intervals: Mapping[str, FloatArray],
 ) -> DepthCorrection:
-    """Build the correction from the terms, with intervals."""
+    """Build the correction from the terms, with 95 % intervals."""
     columns = columns_of(terms)
     values, spread = np.zeros(WIDTH), np.zeros((WIDTH, WIDTH))
     values[columns], spread[np.ix_(columns, columns)] = problem.solve(columns), problem.covariance(columns)
@@ -211,7 +211,7 @@ def _correction(
 
 
 def _ink_offset_m(samples: DepthSamples, correction: DepthCorrection) -> tuple[float, float] | None:
-    """Return the mean over views and its standard error; None if fewer than two views have ink and paper."""
+    """Return the error on ink minus that on paper, and its sd; None if fewer than two views have both."""
     off_m = correction.corrected_m(samples.measured_m, samples.pixels) - samples.true_m
     apart = [
         float(np.median(off_m[rows[ink]]) - np.median(off_m[rows[~ink]]))

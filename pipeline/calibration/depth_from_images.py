@@ -30,7 +30,7 @@ def with_depth(
     """Add the depth sensor's bias to a report, or the reason why it is unknown.
 
     Args:
-        report: report of the camera to which the depth belongs.
+        report: report of the node's colour camera.
         depths: depth images, by the name of the photograph of the same moment.
         depth_camera: the camera with the depth's pixel grid, if another; its images' names are in ``depths``.
         depth_scale: depth units per metre; by default whole numbers are millimetres.

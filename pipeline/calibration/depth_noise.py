@@ -11,7 +11,7 @@ from pipeline.calibration.depth_samples import DepthSamples
 from pipeline.types import DepthNoise, FloatArray
 
 PARTS, FEWEST = 4, 60
-"""Parts of each view, by distance, that give one point each, and least pixels per part."""
+"""Number of parts of a view, by distance, each of which is one noise point, and least pixels per part."""
 BENDS = 24
 """Number of distances that are tried for the bend of the law."""
 STEEPEST = 4.0
@@ -60,7 +60,7 @@ def noise_points(samples: DepthSamples, residuals_m: FloatArray) -> NoisePoints:
 
 
 def _clipped_sd_m(values_m: FloatArray) -> float:
-    """Return the standard deviation without values more than four of it off; never quite 0."""
+    """Return the standard deviation after clipping at four standard deviations; at least ``LEAST_M``."""
     kept = values_m
     for _ in range(5):
         kept = kept[np.abs(kept - kept.mean()) <= CLIP_SDS * max(kept.std(), LEAST_M)]
@@ -70,8 +70,8 @@ def _clipped_sd_m(values_m: FloatArray) -> float:
 def noise_law(points: NoisePoints) -> DepthNoise:
     """Fit max(s0, s1 z^p) / cos(angle)^q by least squares on its logarithm: near and far count equally.
 
-    The law bends where s1 z^p reaches s0. For a given bend the fit is linear; the bend with the least squares
-    is chosen.
+    The law bends where s1 z^p reaches s0. For a given bend the fit is linear; the bend with the smallest sum
+    of squared residuals is chosen.
     """
     log_z, log_cos, log_sd = np.log(points.z_m), np.log(points.cosine), np.log(points.sd_m)
     best, least = DepthNoise(LEAST_M, LEAST_M, 0.0, 0.0), np.inf

@@ -20,11 +20,11 @@ RIM_PX = 3
 INK_PX = 1.0
 """Black areas are enlarged by this much, because pixels at their border are partly black."""
 MOST_PER_VIEW, FEWEST = 600, 100
-"""Most pixels of a view that are used, evenly spread, and fewest with which a view counts."""
+"""Largest number of pixels used per view, evenly spread, and smallest number with which a view is used."""
 GATE_SDS, LEAST_GATE_M = 6.0, 0.02
 """Pixels beyond this many robust standard deviations from their view's median show a hand or background."""
 MOST_SHARE = 0.25
-"""Depth with a larger relative error has another unit, or shows another place."""
+"""Largest relative error of a view's median depth; a larger one means a wrong unit or another scene."""
 MAD_TO_SD = 1.4826
 
 
@@ -116,7 +116,7 @@ def board_depth_samples(
 
 
 def _errors(calibration: Calibration) -> FloatArray:
-    """Return (P, P) standard deviations of the lens's independent errors, by parameter and error."""
+    """Return (P, P) changes of the lens's parameters (rows) by one sd of each independent error (columns)."""
     variances, directions = np.linalg.eigh(calibration.covariance)
     return directions * np.sqrt(np.maximum(variances, 0.0))
 
@@ -191,7 +191,7 @@ def _rays(lens: Optics, pixels: IntArray) -> FloatArray:
 
 
 def _pixels_on_board(board: Board, T: FloatArray, lens: Optics, depth: DepthMap) -> IntArray:
-    """Return (N, 2) pixels with depth inside the board's points and off their rim, evenly thinned."""
+    """Return (N, 2) pixels with depth inside the board's points, away from their rim, evenly thinned."""
     low_m, high_m = board.points_m[:, :2].min(axis=0), board.points_m[:, :2].max(axis=0)
     corners_m = np.array([low_m, (high_m[0], low_m[1]), high_m, (low_m[0], high_m[1])])
     along = np.linspace(0.0, 1.0, 16, endpoint=False)[:, None]
@@ -212,7 +212,7 @@ def _evenly(count: int, most: int) -> IntArray:
 
 
 def _gate(name: str, measured_m: FloatArray, true_m: FloatArray) -> IntArray:
-    """Return rows of one view without pixels in front of or behind the board, evenly thinned."""
+    """Return the rows of one view's pixels that are not in front of or behind the board, evenly thinned."""
     if len(measured_m) < FEWEST:
         return np.zeros(0, np.int64)
     ratio = float(np.median(measured_m / true_m))

@@ -1,4 +1,4 @@
-"""Terms of a depth sensor's bias as a linear least-squares problem, view by view (SPEC 1.5)."""
+"""Linear least squares for the terms of a depth sensor's bias, each view as one observation (SPEC 1.5)."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ LADDER: tuple[tuple[str, ...], ...] = (
     ("offset", "scale"),
     ("offset", "scale", "curvature"),
 )
-"""Models in the order of complexity; the map is added to the one that is chosen."""
+"""Models in the order of complexity; the map can be added to any of them."""
 APART, FAR_APART = 1.3, 2.0
 """Least ratio of farthest to nearest view that separates offset from scale, and both from curvature."""
 VIEWS_OF_A_PART = 2
-"""Least number of views in which each of the map's 3 x 4 image parts must have the board."""
+"""Least number of views that must show the board in each of the map's 3 x 4 image parts."""
 HUBER_SDS, HUBER_ROUNDS = 3.0, 8
 
 
@@ -36,7 +36,7 @@ def title_of(terms: Iterable[str]) -> str:
 
 
 def columns_of(terms: Iterable[str]) -> IntArray:
-    """Return the (p,) columns of the design matrix."""
+    """Return the (p,) indices of the terms' columns in the design matrix."""
     return np.array([column for term in terms for column in GROUPS[term]], np.int64)
 
 
@@ -46,7 +46,7 @@ def map_directions() -> FloatArray:
 
 
 def design(samples: DepthSamples, z_m: FloatArray) -> FloatArray:
-    """Return (N, 14) derivatives of the true depth by each parameter at (N,) depths z: 1, z, z^2, z s."""
+    """Return (N, 14) derivatives 1, z, z^2, z s of the true depth at depths z; s are 11 map functions."""
     rows, columns = map_basis(samples.size_px, samples.pixels)
     both = np.einsum("nr,nc->nrc", rows, columns).reshape(len(z_m), -1)
     return np.column_stack([np.ones(len(z_m)), z_m, z_m**2, z_m[:, None] * (both @ map_directions())])
@@ -96,7 +96,7 @@ def separable(samples: DepthSamples) -> Choice:
 
 
 def _seen_parts(samples: DepthSamples) -> BoolArray:
-    """Return (3, 4) True for image parts with the board in enough views."""
+    """Return a (3, 4) mask of the image parts that show the board in enough views."""
     share = (samples.pixels + 0.5) / np.array(samples.size_px)
     column, row = np.minimum((share * MAP_SHAPE[::-1]).astype(int), np.array(MAP_SHAPE[::-1]) - 1).T
     seen = np.zeros((*MAP_SHAPE, len(samples.names)), bool)
@@ -111,7 +111,7 @@ def rows_of_views(samples: DepthSamples) -> list[IntArray]:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """The weighted problem y = X x + L e, where e are the lens's errors with mean 0 and variance 1.
+    """Weighted problem y = X x + L e, where e are the lens's errors with mean 0 and variance 1.
 
     Each view counts as one observation, however large its board appears, because the error of the board's
     pose correlates the errors of its pixels.
@@ -134,14 +134,14 @@ class Problem:
 
     @property
     def weights(self) -> FloatArray:
-        """(N,) Huber weights over the variance and the number of the view's pixels."""
+        """(N,) Huber weights divided by the variance and by the number of pixels in the view."""
         weights = self.trust / self.sd_m**2
         for rows in self.views:
             weights[rows] /= len(rows)
         return weights
 
     def _normal(self, columns: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return normal equations of each view, (V, p + P, p + P) and (V, p + P), and the lens's prior."""
+        """Return each view's normal equations, (V, p + P, p + P) and (V, p + P), and the lens's prior."""
         Z = np.column_stack([self.X[:, columns], self.L_m])
         weighted = self.weights[:, None] * Z
         left = np.array([Z[rows].T @ weighted[rows] for rows in self.views])
@@ -187,7 +187,7 @@ class Problem:
         return self.y_m - self.X[:, columns] @ self.solve(columns)
 
     def unseen_m(self, columns: IntArray) -> FloatArray:
-        """Return (N,) residuals of each view, with parameters and lens fitted without it."""
+        """Return (N,) residuals of each view, with parameters and lens fitted to the other views."""
         Z = np.column_stack([self.X[:, columns], self.L_m])
         residuals_m = np.empty_like(self.y_m)
         for rows, x in zip(self.views, self._without_each(columns), strict=True):
@@ -199,12 +199,12 @@ class Problem:
         return np.array([np.average(values[rows], weights=self.trust[rows]) for rows in self.views])
 
     def rms_m(self, residuals_m: FloatArray) -> float:
-        """Return the root of the mean over views of the mean square."""
+        """Return the root mean square of (N,) residuals, metres, with equal weight for each view."""
         return float(np.sqrt(self.mean_by_view(residuals_m**2).mean()))
 
 
 def solved(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve normal equations; returns the smallest solution if they are singular."""
+    """Solve normal equations; if they are singular, return the solution of least norm."""
     return np.linalg.lstsq(left, right, rcond=1e-12)[0]
 
 
@@ -232,7 +232,7 @@ def robust_problem(
 
 
 def chosen_terms(problem: Problem, choice: Choice) -> tuple[tuple[str, ...], dict[str, float]]:
-    """Return the terms that held-out views justify, and the RMS error there of every model tried.
+    """Return the terms that held-out views justify, and the held-out RMS error of every model tried.
 
     A more complex model replaces a simpler one if its squared error in sd is lower by more than the standard
     error of that difference over the views, and if the interval of the added term excludes 0. Every model may
@@ -265,8 +265,8 @@ def _falls(before: FloatArray, after: FloatArray) -> bool:
 
 
 def _certain(problem: Problem, model: tuple[str, ...], added: Iterable[str]) -> bool:
-    """Return whether every added term has a parameter whose interval excludes 0; intervals are of 95 % for
-    all the term's parameters and all models together.
+    """Return whether every added term has a parameter whose interval excludes 0; the 95 % intervals have a
+    Bonferroni correction for the term's parameters and for the number of models.
     """
     columns = columns_of(model)
     sds = np.abs(problem.solve(columns)) / np.sqrt(np.diag(problem.covariance(columns)))

@@ -22,13 +22,13 @@ SIZES = 4.0
 """Ratio of the largest to the smallest circle of a tilted board, and to the marked circle's core."""
 CORNER_WINDOW_PX = 5
 MARK_STEP = 0.25
-"""Least brightness, over that of the surrounding paper, by which the white ring is recognised."""
+"""Least brightness at which the white ring is recognised: 0 is that of a circle, 1 that of the paper."""
 LINK = 2.0
-"""Blobs farther from the others than this many usual distances of neighbours are not on the board."""
+"""Blobs farther from the others than this many median neighbour distances are not on the board."""
 MOST_BEND = 0.5
 """Largest change of the step between neighbours along a row or column, as a share of the step."""
 NEAR, MOST_OF_A_SIDE = 0.3, 0.8
-"""A grid continues if this share of another row or column has blobs this close to it, in pitches."""
+"""The grid continues if blobs are this near, in pitches, to this share of the points of another row."""
 ALTERNATES = 0.75
 """Least contrast of alternating squares over that of the row inside it; at the board's rim it is a half."""
 INTO_A_SQUARE = 0.3
@@ -46,7 +46,7 @@ class Detection:
     indices: IntArray
     """(N,) index of each in ``Board.points_m``."""
     reason: str = ""
-    """Why the board was not found, in a sentence with what to try."""
+    """Sentence on the reason why the board was not found, with advice; empty if it was found."""
     blobs_px: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     """(B, 2) circle-like blobs, if the board was not found."""
     oriented: bool = True
@@ -239,7 +239,7 @@ def _right_handed(points_px: FloatArray, board: Board) -> bool:
 
 
 def _ring(gray: ByteArray, points_px: FloatArray, board: Board) -> float:
-    """Return the first circle's brightness at its ring: 0 as its neighbours there, 1 as the paper."""
+    """Return the first circle's brightness at its ring: 0 is that of neighbouring circles, 1 of the paper."""
     reach = 0.5 * sum(RING) * board.radius_m / board.spacing_m
     near = [0, 1, board.columns, board.columns + 1]
     right, down = points_px[1] - points_px[0], points_px[board.columns] - points_px[0]
@@ -291,8 +291,8 @@ def _chessboard(gray: ByteArray, board: Board) -> Detection:
 
 
 def _alternation(gray: ByteArray, board: Board, points_px: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return (4,) how strongly squares alternate at the outermost rows and columns of corners, and one row or
-    column further out, each over the one inside it: 1 at corners, 0.5 at the board's rim.
+    """Return (4,) contrasts of alternating squares at the outermost rows and columns of corners, and (4,) one
+    row or column further out, each over its inner neighbour's: 1 at corners, 0.5 at the board's rim.
     """
     grid = points_px.reshape(board.rows, board.columns, 2)
     for _ in range(2):  # extrapolate a row on either side; then, transposed, a column
@@ -321,7 +321,7 @@ def _refined(gray: ByteArray, board: Board) -> tuple[bool, FloatArray | None]:
 
 
 def _dark_first(gray: ByteArray, board: Board, points_px: FloatArray) -> Detection:
-    """Order corners to start at a black square between the first four; some boards have one at both ends."""
+    """Order corners to have a black square between the first four; ambiguous boards have one at both ends."""
     square = [0, 1, board.columns, board.columns + 1]
     here, there = (
         float(_brightness(gray, order[square].mean(axis=0)[None])[0])

@@ -43,8 +43,8 @@ class RadialResiduals:
     radius_px: FloatArray
     """(N,) distance from the principal point."""
     outward_px: FloatArray
-    """(N,) component of the residual away from the principal point: a wrong lens model shows in it as
-    a wave."""
+    """(N,) component of the residual away from the principal point; with a wrong lens model it is a wave
+    over the radius."""
     edges_px: FloatArray
     """(B + 1,) edges of the radius bands."""
     mean_px: FloatArray
@@ -97,7 +97,7 @@ def radial_residuals(calibration: Calibration) -> RadialResiduals:
 
 
 def radial_curve(calibration: Calibration) -> RadialCurve:
-    """Compute the distortion from the principal point to the farthest corner, along the image's rows."""
+    """Compute the distortion along an image row, from the principal point to the farthest corner's radius."""
     optics, (width, height) = calibration.optics, calibration.size_px
     middle_px = calibration.matrix[:2, 2]
     corners_px = np.array([(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)]) - 0.5

@@ -26,9 +26,9 @@ SETTLE_STEPS = 30
 MOST_RMS_SHARE = 0.1
 """RMS as a share of the image's longer side above which the estimate is meaningless."""
 LEAST_INFORMATION = 1e-14
-"""Least information on a combination of parameters, over that on each alone: less is rounding."""
+"""Least eigenvalue of the information matrix scaled to unit diagonal; smaller ones are rounding errors."""
 LEAST_TILT_DEG = 5.0
-"""Least angle between the two views that differ most: equal tilts fit many lenses."""
+"""Least angle between the boards of the two views that differ most: equal tilts fit many lenses."""
 Z95 = 1.959964
 
 
@@ -315,8 +315,8 @@ def _fitted(view: View, T_camera_board: FloatArray, optics: Optics) -> FittedVie
 
 
 def information(fitted: Sequence[FittedView], optics: Optics) -> FloatArray:
-    """Return (P, P) information of views on the lens, for coordinates known to 1 px: its part of J^T J with
-    the poses as parameters too (SPEC 1.3 d).
+    """Return the (P, P) information of views about the lens, for image coordinates with a standard deviation
+    of 1 px: the Schur complement of the poses in J^T J (SPEC 1.3 d).
     """
     return sum(
         (informed(view.board_m, view.T_camera_board, optics) for view in fitted),
@@ -333,7 +333,7 @@ def inverted(told: FloatArray) -> FloatArray:
 
 
 def informed(board_m: FloatArray, T_camera_board: FloatArray, optics: Optics) -> FloatArray:
-    """Return the (P, P) information of one view."""
+    """Return the (P, P) information of one view, whose pose is unknown, about the lens."""
     told = optics.linearised(board_m, T_camera_board)
     base = np.linalg.qr(told.by_pose)[0]
     left = told.by_lens - base @ (base.T @ told.by_lens)

@@ -43,7 +43,7 @@ class CameraReport:
     """Views from which the camera was estimated."""
     calibration: Calibration
     held_out: tuple[FittedView, ...]
-    """The same views, each fitted by a lens of other views; empty if none was held out."""
+    """The same views, each fitted with a lens estimated from other views; empty if none was held out."""
     left_out: tuple[str, ...] = ()
     """Images that the user excluded."""
     warp: BoardWarp | None = None
@@ -51,7 +51,7 @@ class CameraReport:
     depth: DepthFit | None = None
     """Bias of the depth sensor, if there are depth images."""
     depth_reason: str = ""
-    """Why the bias is unknown although there are depth images."""
+    """Reason why the bias is unknown although there are depth images; else empty."""
     depth_notes: tuple[str, ...] = ()
     """Doubts about the depth scale, one sentence each."""
 

@@ -15,7 +15,7 @@ FLAGS: dict[Lens, int] = {
     "brown": 0,
     "rational": cv2.CALIB_RATIONAL_MODEL,
 }
-"""k1 and k2 (SPEC 1.1); additionally tangential p1, p2 and k3; additionally k4, k5, k6 of the denominator."""
+"""OpenCV's flags: k1, k2 for thesis (SPEC 1.1); brown adds p1, p2, k3; rational adds k4, k5, k6."""
 NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 """Names of the parameters, in OpenCV's order."""
 FREE: dict[Lens, tuple[str, ...]] = {
@@ -86,7 +86,7 @@ class Optics:
         return rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
     def _unfolded(self, rays: FloatArray) -> BoolArray:
-        """Return (N,) True if the image grows all the way from the axis to each of (N, 3) rays with z = 1."""
+        """Return (N,) True where the projection does not fold between axis and (N, 3) rays with z = 1."""
         grows = np.ones(len(rays), bool)
         for share in np.linspace(0.0, 1.0, _PATH):
             grows &= np.linalg.det(self._slopes(rays * (share, share, 1.0))[1]) > 0.0

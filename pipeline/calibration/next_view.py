@@ -1,4 +1,4 @@
-"""Choice of the next view: of many board poses, the one that adds most information on the lens at the
+"""Choice of the next view to take: of many board poses, the one that most reduces the predicted error at the
 working distance (SPEC 1.3 e).
 """
 
@@ -65,7 +65,7 @@ def next_view(calibration: Calibration, board: Board, range_m: float) -> NextVie
 
     Args:
         calibration: the calibration so far.
-        board: the one that is shown.
+        board: the calibration board.
         range_m: distance at which the camera will measure.
 
     Raises:
@@ -96,7 +96,7 @@ def next_view(calibration: Calibration, board: Board, range_m: float) -> NextVie
 
 
 def candidates(board: Board, optics: Optics, size_px: tuple[int, int]) -> Iterator[FloatArray]:
-    """Yield a fixed set of (4, 4) poses of the board that are completely in the image.
+    """Yield from a fixed set of (4, 4) poses those at which the whole board is in the image.
 
     They combine all positions, tilts, tilt directions and distances; the upper edge of the board is up.
     """
@@ -123,7 +123,7 @@ def candidates(board: Board, optics: Optics, size_px: tuple[int, int]) -> Iterat
 
 
 def _angle(optics: Optics, size: FloatArray, share: float) -> float:
-    """Return twice the tangent of half the angle that a share of the image's width spans at its centre."""
+    """Return 2 tan(angle / 2) of the angle that a share of the image's width subtends at its centre."""
     ends_px = 0.5 * size + np.array([[-0.5 * share * size[0], 0.0], [0.5 * share * size[0], 0.0]])
     left, right = optics.rays(ends_px)
     return float(2.0 * np.tan(0.5 * np.arccos(np.clip(left @ right, -1.0, 1.0))))
@@ -137,12 +137,12 @@ def _facing(ray: FloatArray) -> FloatArray:
 
 
 def _cost_m2(seen: Sight, place: FloatArray) -> FloatArray:
-    """Return the (P, P) matrix whose product with a lens's covariance has the mean squared error as trace."""
+    """Return the (P, P) matrix M; trace(M C) is the mean squared error of a lens with covariance C."""
     change = seen.metres @ (seen.by_lens + seen.by_pose @ place)
     change = change[np.isfinite(change).all(axis=(1, 2))]
     return np.einsum("gij,gik->jk", change, change) / len(change)
 
 
 def _error_m(covariance: FloatArray, cost_m2: FloatArray) -> float:
-    """Return the root mean square error over the image."""
+    """Return the root mean square error over the image, metres."""
     return float(np.sqrt(np.sum(covariance * cost_m2)))

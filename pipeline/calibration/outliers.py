@@ -1,4 +1,4 @@
-"""Views that do not fit the others: proposed with a reason, but never excluded automatically (issue 14)."""
+"""Detection of views that do not fit the others, with a reason; only the user excludes them (issue 14)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def outlier_views(calibration: Calibration, views: Sequence[View]) -> tuple[Outl
     """Find the views whose error stands out, the worst first.
 
     Because one wrong view affects the fit of all, they are found one after the other, each with a lens
-    without those found before.
+    estimated without those found before.
 
     Args:
         calibration: calibration from all views.

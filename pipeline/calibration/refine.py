@@ -31,8 +31,8 @@ MOST_SHIFT_PX = 1.0
 def refined_px(gray: ByteArray, board: Board, view: FittedView, optics: Optics) -> FloatArray:
     """Return (N, 2) refined centres of a view's circles, as seen perpendicular to the board.
 
-    Each circle's neighbourhood is rectified by lens and pose; the centre of darkness there (of light, on dark
-    paper) is projected back to the image.
+    Each circle's neighbourhood is rectified by lens and pose; the centroid of darkness there (of brightness,
+    on dark paper) is projected back to the image.
 
     Args:
         gray: (H, W) uint8.
@@ -66,7 +66,7 @@ def _samples(view: FittedView, board: Board) -> int:
 
 
 def _centres_m(patches: FloatArray, around_m: FloatArray, away: FloatArray) -> FloatArray:
-    """Return (N, 3) centres of darkness relative to paper that may be unevenly lit; NaN without any."""
+    """Return (N, 3) centroids of darkness relative to paper with uneven light; NaN with too low contrast."""
     base = np.column_stack([around_m[:, :2], np.ones(len(around_m))])
     paper = away >= PAPER
     slopes = np.linalg.lstsq(base[paper], patches[:, paper].T, rcond=None)[0]

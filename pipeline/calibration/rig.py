@@ -238,7 +238,7 @@ def _turns(board: Board) -> list[FloatArray]:
 def _held_out(
     names: Sequence[str], titles: Sequence[str], sightings: Sequence[Sighting], whole: Bundle, folds: int
 ) -> HeldOutRig | None:
-    """Predict every moment by cameras from the other folds; None if these do not link the cameras."""
+    """Predict every moment with cameras estimated from the other folds; None if these do not link them."""
     views: dict[str, tuple[FittedView, ...]] = dict.fromkeys(names, ())
     turned_deg, moved_m = dict.fromkeys(names[1:], 0.0), dict.fromkeys(names[1:], 0.0)
     for fold in range(folds):

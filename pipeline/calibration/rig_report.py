@@ -65,7 +65,7 @@ def write_rig_folder(
 
 
 def pose_like(rig: AnyPath | None, node: str) -> FloatArray:
-    """Return the (4, 4) pose of a rig's node, to place cameras in its world; without a rig a default pose.
+    """Return the (4, 4) pose of a node of a rig in whose world cameras are placed; LEVEL_POSE without a rig.
 
     Raises:
         InputError: the rig has no such node, or the node has no pose.

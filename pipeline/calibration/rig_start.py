@@ -17,12 +17,12 @@ from pipeline.kernels.geometry import apply, inverse, rotation_angle_rad
 from pipeline.types import FloatArray
 
 MOST_TRIED = 12
-"""Most moments whose relative pose of two cameras is tried on all their common moments."""
+"""Largest number of moments whose relative pose of two cameras is tested on all their common moments."""
 APART_RAD = np.radians(20.0)
 LOST_PX = 20.0
-"""An error that no orientation of the board explains."""
+"""Error above which no orientation of the board explains the views."""
 TELLING = 1.5
-"""Least ratio of the errors of the other orientation and this one, for a decision."""
+"""Least ratio of another orientation's error to the best one's for a decision."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ def look(sighting: Sighting, optics: Optics, oriented: bool) -> Look:
 def start(
     looks: Sequence[Look], optics: Sequence[Optics], names: Sequence[str], turns: Sequence[FloatArray]
 ) -> tuple[Bundle, tuple[Sighting, ...]]:
-    """Estimate approximate poses of cameras and boards; orients the board alike in all sightings of a moment.
+    """Estimate approximate poses of cameras and boards; give the board one orientation at each moment.
 
     Cameras are linked in the order of the number of moments that they share with linked ones.
 

@@ -1,4 +1,4 @@
-"""Images of a session with a board: which images of which camera belong to the same moment.
+"""Images of a calibration session, grouped by camera and moment.
 
 ``BOARD/node_00/{color_00.png, depth_00.png, infrared_00.png}``, ``BOARD/node_01/...``, or one folder of
 photographs per camera. The moment is the last number in an image's name, or else the whole name.

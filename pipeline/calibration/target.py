@@ -46,7 +46,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A line of text, starting at its base line."""
+    """A line of text; x and y are those of the left end of its base line."""
 
     x_mm: float
     y_mm: float
@@ -90,7 +90,7 @@ def place_of_first_mm(board: Board) -> FloatArray:
 
 
 def _around_mm(board: Board) -> float:
-    """Return how far the board extends beyond its outermost points, with white paper around circles."""
+    """Return the distance from the outermost points to the board's edge; circles have white paper around."""
     squares = board.pattern in ("chessboard", "charuco")
     return 1000.0 * (board.spacing_m if squares else 2.0 * board.radius_m)
 
@@ -132,7 +132,7 @@ def _foot(board: Board, top_mm: float) -> Iterator[Box | Text]:
 
 
 def write_target(board: Board, path: Path, pixel_mm: float | None = None) -> Board:
-    """Write the board in the format of the suffix; returns the board as it was written.
+    """Write the board in the format of the suffix; returns the board with the spacing that was written.
 
     On a monitor the spacing is rounded to whole pixels, so that all squares are equal.
 
@@ -142,7 +142,7 @@ def write_target(board: Board, path: Path, pixel_mm: float | None = None) -> Boa
         pixel_mm: size of a pixel of the monitor that shows a PNG.
 
     Raises:
-        InputError: the suffix is another, or the pixel size for a PNG is missing.
+        InputError: the suffix is none of these, or the pixel size for a PNG is missing.
     """
     ending = path.suffix.lower()
     if ending == ".png":

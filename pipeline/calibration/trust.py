@@ -1,10 +1,10 @@
 """Accuracy of a camera at its working distance: the effect of noise, and the agreement of two halves of the
 views (SPEC 1.3 e).
 
-Both compare cameras with slightly different lenses. A camera whose lens changes gets a new pose, in which it
-sees the boards of the calibration best, which do not move. So an error that a rotation or translation
-compensates does not count, but a wrong focal length counts at distances other than the boards'. The idea is
-that of mrcal's uncertainty (Kogan, "mrcal: camera calibrations and more", 2021).
+Both compare cameras with slightly different lenses. A camera whose lens changes gets the new pose that fits
+the unmoved boards of the calibration best. So an error that a rotation or translation compensates does not
+count, but a wrong focal length counts at distances other than the boards'. The idea is that of mrcal's
+uncertainty (Kogan, "mrcal: camera calibrations and more", 2021).
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class ErrorMap:
 
 @dataclass(frozen=True, slots=True)
 class HalfDifference:
-    """Difference of cameras calibrated from every other view and from the others."""
+    """Difference of two cameras, one calibrated from the even views and one from the odd views."""
 
     map: ErrorMap
     """Length of the difference."""
@@ -73,7 +73,7 @@ class HalfDifference:
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """Points at a distance in all pixels of a grid, with the derivatives of their images."""
+    """Points at one distance on the rays of a grid of pixels, with the derivatives of their images."""
 
     range_m: float
     columns_px: FloatArray
@@ -96,7 +96,7 @@ class Sight:
 
 
 def sight(optics: Optics, size_px: tuple[int, int], range_m: float) -> Sight:
-    """Compute the grid of a map.
+    """Compute the points of a map's grid.
 
     Raises:
         InputError: the distance is impossible.
@@ -164,7 +164,7 @@ def projected_sd_px(calibration: Calibration, range_m: float) -> ErrorMap:
 
 
 def sd_map(seen: Sight, covariance_px2: FloatArray) -> ErrorMap:
-    """Return the map of the worst direction of (G, 2, 2) covariances."""
+    """Return the map of the standard deviation in the worst direction, from (G, 2, 2) covariances."""
     covariance_m2 = seen.metres @ covariance_px2 @ seen.metres.transpose(0, 2, 1)
     return seen.map_of(_worst_sd(covariance_px2), _worst_sd(covariance_m2))
 
@@ -172,9 +172,9 @@ def sd_map(seen: Sight, covariance_px2: FloatArray) -> ErrorMap:
 def half_difference_px(
     views: Sequence[View], size_px: tuple[int, int], range_m: float, lens: Lens = "thesis"
 ) -> HalfDifference:
-    """Calibrate with every other view, and with the others, and compare where both see a point.
+    """Calibrate one camera with the even views and one with the odd views, and compare their projections.
 
-    A wrong lens model fits each half by other parameters, so that they differ by more than noise.
+    A wrong lens model has other best parameters for each half, so that they differ by more than noise.
 
     Args:
         views: six or more.
@@ -237,7 +237,7 @@ def _in_camera(views: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
 
 
 def _across(rays: FloatArray) -> FloatArray:
-    """Return (N, 2, 3) two directions perpendicular to each of (N, 3) rays."""
+    """Return the (N, 2, 3) pair of directions perpendicular to each of (N, 3) rays."""
     first = np.cross(rays, (0.0, 1.0, 0.0))
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return np.stack([first, np.cross(rays, first)], axis=1)

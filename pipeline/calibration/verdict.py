@@ -52,7 +52,7 @@ def verdict(
         calibration: the camera.
         sd: result of ``projected_sd_px``.
         halves: result of ``half_difference_px``; None with too few views.
-        accuracy_m: error within which a point must be placed.
+        accuracy_m: largest error of a point that is accepted.
         following: the best view to take next, for the advice.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Estimation of a warped board, together with the lens (Strobl and Hirzinger, "More accurate pinhole
+"""Estimation of a warped board's shape together with the lens (Strobl and Hirzinger, "More accurate pinhole
 camera calibration with imperfect planar target", ICCV workshops 2011).
 """
 
@@ -72,7 +72,7 @@ def board_warp(
         lens: distortion model of the camera.
 
     Raises:
-        InputError: a fisheye lens, views of parts of the board, or too few views for the folds.
+        InputError: the lens is a fisheye, a view shows a part of the board, or the folds need more views.
         ReconstructionError: the views do not determine lens and board.
     """
     if lens == "fisheye":

@@ -1,4 +1,4 @@
-"""Encoding of a node's images, and decoding of what reaches the sink (SPEC 6.5)."""
+"""Codings of a node's images: encoding at the node, decoding of the bytes that reach the sink (SPEC 6.5)."""
 
 from packetmesh.errors import InputError
 from pipeline.delivery.coding import Coding

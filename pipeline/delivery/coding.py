@@ -25,7 +25,7 @@ class Images:
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """Images that follow from the received bytes, without any guess."""
+    """Images decoded from the received bytes; pixels that these do not describe stay unknown."""
 
     rgb: ByteArray
     """(H, W, 3), zero where the colour is unknown."""
@@ -34,7 +34,7 @@ class Received:
     depth: DepthArray
     """(H, W) as ``Images.depth``, 0 where it is unknown or was not measured."""
     coarse: DepthArray
-    """(H, W) depth from a base layer only, 0 where the image itself arrived: a guess, no measurement."""
+    """(H, W) approximate depth from a base layer; 0 where the depth itself arrived. It is no measurement."""
 
     @staticmethod
     def nothing(shape: tuple[int, int]) -> Received:
@@ -48,7 +48,7 @@ class Received:
 
 
 class Coding(Protocol):
-    """A way to write a node's images as bytes."""
+    """Encoder and decoder of a node's images."""
 
     @property
     def name(self) -> str:
@@ -72,7 +72,7 @@ class Coding(Protocol):
     def decode(
         self, data: ByteArray, arrived: BoolArray, shape: tuple[int, int], packet_bytes: int
     ) -> Received:
-        """Decode what is possible of a frame of which some packets are missing.
+        """Decode as many pixels as possible of a frame of which some packets are missing.
 
         Args:
             data: (S,) all bytes of the frame, zero where they have not arrived.

@@ -77,7 +77,7 @@ def _fill(powers: Words, logarithms: NDArray[np.int32]) -> None:
 
 @_compiled
 def _add(target: Words, factor: int, symbol: Words, powers: Words, logarithms: NDArray[np.int32]) -> None:
-    """Add ``factor`` times a symbol to another."""
+    """Add ``factor`` times ``symbol`` to ``target``, in GF(2^16)."""
     if factor == 0:
         return
     shift = logarithms[factor]

@@ -11,7 +11,7 @@ from pipeline.types import RgbdFrame
 
 Result = TypeVar("Result")
 COLOR_ONLY, DEPTH_ONLY = ("inferred",), ("outliers",)
-"""Stages that use only one of the images; so does placing the nodes by their sensor clouds."""
+"""Stages that use only colour, or only depth; placement by sensor clouds also uses only depth."""
 
 
 class Memory:
@@ -37,7 +37,7 @@ class Memory:
     def remember(
         self, key: tuple[Hashable, ...], compute: Callable[[], Generator[Progress, None, Result]]
     ) -> Generator[Progress, None, Result]:
-        """Do as ``pipeline.stages.Cache.remember``, keyed by the images that the stage uses."""
+        """Return a result as ``pipeline.stages.Cache.remember`` does; the key is the images of the stage."""
         stage, images = key[0], self._images(key[0])
         kept = self._kept.get(stage)
         if kept is not None and kept[0] == images:

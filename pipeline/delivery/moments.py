@@ -1,4 +1,4 @@
-"""Moments of a delivery: what the sink can reconstruct at each, and its cost until then."""
+"""Moments of a delivery: the sink's reconstruction at each moment, and the network's cost until then."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from pipeline.types import BoolArray, ByteArray, FloatArray, RgbdFrame, Rig, Sur
 
 @dataclass(frozen=True, slots=True)
 class NodeArrival:
-    """Shares of one node's images that the sink knows."""
+    """Shares of one node's images that the sink has received."""
 
     name: str
     total_bytes: int
@@ -66,7 +66,7 @@ NOTHING: Rebuilt = None, None, {}
 
 
 class Rebuilder:
-    """Reconstructs moments of a delivery, fastest in order of time, because unchanged results are kept."""
+    """Reconstructs moments of a delivery. Order of time is fastest, because unchanged results are kept."""
 
     def __init__(self, sending: Sending) -> None:
         self.sending = sending

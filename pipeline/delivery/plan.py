@@ -26,7 +26,7 @@ def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> 
 
     Nodes are at ``nodes.places_m`` if it is given; else at their cameras' x and y, with the sink
     ``nodes.spacing_m`` behind their centre; if the poses are unknown, by ``nodes.layout``. If some nodes of
-    a rig are down, ``placed`` gives the positions of the others.
+    a rig are down, ``placed`` computes the positions of the others.
 
     Args:
         rig: one to six nodes; the world's third axis points up.

@@ -1,9 +1,9 @@
 """Packets with two kinds of bytes: a protected base, and a body of which any part may be lost.
 
-The base is divided into symbols, from which repair symbols are computed; any of them, as many as the base
-has, restore it (``erasure``). Its own symbols come first, so that a transfer that stops early includes it;
-the repair symbols are spread over the stream at equal intervals, so that a burst hits few of them. Each
-of these packets starts with the number of its symbol and the length of the base.
+The base is divided into k symbols, from which repair symbols are computed; any k of all these symbols
+restore it (``erasure``). Its own symbols come first, so that a transfer that stops early includes it; the
+repair symbols are spread over the stream at equal intervals, so that a burst hits few of them. Each of these
+packets starts with the number of its symbol and the length of the base.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def _symbol_bytes(unit_bytes: int) -> int:
 
 
 def _certainly_of_base(count: int, repair_every: int) -> BoolArray:
-    """Return (count,) True for units that belong to a base of any length: they tell a reader its length."""
+    """Return (count,) True for units that belong to a base of any length; its length is read from them."""
     every = min(repair_every, -(-count // _LEAST_CERTAIN))
     certain = np.zeros(count, np.bool_)
     certain[every - 1 :: every] = True
@@ -134,7 +134,7 @@ def _of_base(source_count: int, count: int, repair_every: int) -> BoolArray:
 
 
 def _enough(source_count: int) -> int:
-    """Return how many symbols to send so that ``source_count`` nearly always arrive, even with bursts."""
+    """Return the number of symbols of which ``source_count`` nearly always arrive, even with bursts."""
     return math.ceil((source_count + 2 * math.sqrt(source_count) + 1) / (1 - BASE_LOSS))
 
 

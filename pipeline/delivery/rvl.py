@@ -142,7 +142,7 @@ def _decode(stream: ByteArray, values: NDArray[np.uint16]) -> tuple[int, int]:
 
 @_compiled
 def _get(stream: ByteArray, nibbles: int, most_bits: int) -> tuple[int, int]:
-    """Read the number after ``nibbles`` nibbles: -1 if the stream ends in it, -2 if it has too many bits.
+    """Read the number after ``nibbles`` nibbles; -1 if the stream ends within it, -2 if it is too long.
 
     If the stream ends within a number, the returned position is one nibble beyond the end.
     """

@@ -1,4 +1,4 @@
-"""Transmission of a rig's images: the bytes of every node, and when they reach the sink."""
+"""Transmission of a rig's images: the bytes of every node, and the times at which they reach the sink."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def moment_times_ns(came: Arrivals, trace: NetworkTrace, count: int) -> NDArray[
 
 
 def arrived_bytes(sending: Sending, t_ns: int) -> list[BoolArray]:
-    """Return, for each node, (S,) True for the bytes of its stream that have reached the sink at a time."""
+    """Return each node's (S,) mask of the bytes of its stream that have reached the sink by ``t_ns``."""
     came, marks = sending.arrivals, []
     there = came.t_ns <= t_ns
     for node, stream in enumerate(sending.streams):
@@ -134,7 +134,7 @@ def arrived_bytes(sending: Sending, t_ns: int) -> list[BoolArray]:
 
 
 def received_at(sending: Sending, t_ns: int) -> list[Received]:
-    """Decode each node's images from the bytes that have reached the sink at a time."""
+    """Decode each node's images from the bytes that have reached the sink by ``t_ns``."""
     return [
         sending.coding.decode(np.where(there, stream, 0), there, frame.rgb.shape[:2], sending.packet_bytes)
         for frame, stream, there in zip(

@@ -12,7 +12,7 @@ from pipeline.kernels.masks import nearest_colors
 from pipeline.types import DepthMap, RgbdFrame
 
 UNITS_PER_M = (1000.0, 5000.0, 10_000.0, 256.0, 100.0)
-"""Units per metre of depth cameras: the first that represents an image's depths exactly is sent."""
+"""Units per metre of depth cameras: the first that represents all depths of an image exactly is used."""
 MOST_UNITS = np.iinfo(np.uint16).max
 LEAST_DEPTH_SHARE = 0.02
 """Least share of pixels with depth for a node to be used."""
@@ -69,7 +69,7 @@ def heard(frame: RgbdFrame) -> bool:
 
 
 def _depth_map(counts: DepthArray, units: float) -> DepthMap:
-    """Convert counts to depth with the same bits as ``pipeline.io.images.read_depth``."""
+    """Convert counts to depth, bit for bit as ``pipeline.io.images.read_depth`` does."""
     z_m = (counts / units).astype(np.float32)
     z_m[counts == 0] = np.nan
     return DepthMap(z_m)

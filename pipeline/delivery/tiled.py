@@ -31,7 +31,7 @@ class Tiled:
     base: bool
     """Whether there is a base layer, which replaces lost tiles."""
     repair_every: int
-    """Interval in packets of those that repair the protected part."""
+    """Interval, in packets, between the packets that repair the protected part."""
 
     def encode(self, images: Images, packet_bytes: int) -> bytes:
         """Encode as ``Coding.encode``; whole packets unless ``packet_bytes`` is very small or large."""
@@ -50,7 +50,7 @@ class Tiled:
     def decode(
         self, data: ByteArray, arrived: BoolArray, shape: tuple[int, int], packet_bytes: int
     ) -> Received:
-        """Decode as ``Coding.decode``; of a depth tile also the values before its first gap."""
+        """Decode as ``Coding.decode``; an incomplete depth tile gives the values before its first gap."""
         from pipeline.delivery import coarse, rvl
         from pipeline.delivery.pictures import read_scan
 

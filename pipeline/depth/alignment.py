@@ -87,7 +87,7 @@ Aligned = tuple[FloatArray, dict[str, float]]
 
 
 def unchanged(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.random.Generator) -> Aligned:
-    """Return the network's own metres."""
+    """Return the network's depth unchanged, in its metres."""
     return z, {}
 
 
@@ -106,7 +106,7 @@ def affine_depth(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.rando
 
 
 def affine_inverse(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.random.Generator) -> Aligned:
-    """Fit 1/z' = a/z + b, the right model for networks that give disparity up to scale and shift.
+    """Fit 1/z' = a/z + b, the right model for networks whose output is disparity up to scale and shift.
 
     Depths beyond three times the sensor's farthest become unknown, because their disparity is near zero.
     """
@@ -125,13 +125,13 @@ def local(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.random.Gener
 
 
 def local_inverse(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.random.Generator) -> Aligned:
-    """Do the same as ``local`` with the affine fit of disparities."""
+    """Multiply the affine fit of disparities by exp(C), as ``local`` does for depths."""
     line, coefficients = affine_inverse(z, p, overlap, rng)
     return corrected(line, p, overlap), coefficients
 
 
 def corrected(line: FloatArray, p: FloatArray, overlap: BoolArray) -> FloatArray:
-    """Multiply an aligned depth by exp(C)."""
+    """Multiply an aligned depth by exp(C), with C the smoothed logarithmic residual."""
     usable = overlap & positive(line)
     residual = np.zeros(line.shape, np.float32)
     residual[usable] = np.clip(np.log(p[usable] / line[usable]), -LOCAL_CLIP, LOCAL_CLIP)

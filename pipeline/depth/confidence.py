@@ -81,7 +81,7 @@ def judge(
         least_confidence: least confidence of the pixels that are kept, 0 to 1.
         completed: (H, W) completed depth; it replaces aligned depth in the sensor's holes with a weight that
             grows with the distance from their rims.
-        hidden: (H, W) True where measured depth was hidden, whose holes are easier; None if there is none.
+        hidden: (H, W) True where measured depth was hidden for a test; such holes are easier. None: nowhere.
 
     Raises:
         InputError: the images differ in size, the reach is negative, or a confidence is outside 0 to 1.
@@ -202,7 +202,7 @@ def features_of_completion(aligned: DepthMap, completed: CompletedDepth, distanc
 
 
 def flying_pixels(depth: DepthMap, sensor: DepthMap) -> BoolArray:
-    """Return (H, W) True for flying pixels: on a steep step, off both its sides, near no measured depth."""
+    """Return (H, W) True for pixels on a steep step, away from both its sides and from measured depth."""
     measured = positive(sensor.z_m)
     complete_m = np.where(measured, sensor.z_m, depth.z_m)
     half_px = max(1, round(FLYING_WINDOW * np.hypot(*measured.shape)))
@@ -237,8 +237,8 @@ def meet_rims(alignment: AlignmentResult, sensor: DepthMap, rgb: ByteArray) -> D
 
     z' = z^g exp(C), where g is the share of the network's relief that the sensor confirms in this frame, and
     C = log p - g log z is extended from the measured pixels with its slope, along similar colours (joint
-    bilateral weights, Kopf et al. 2007), from the rims inwards. So a poor network is followed only as far as
-    it is right.
+    bilateral weights, Kopf et al. 2007), from the rims inwards. So the relief of a poor network has little
+    effect.
 
     Args:
         alignment: (H, W) inferred depth in metres.

@@ -1,4 +1,4 @@
-"""Convention of a depth network: its input and the meaning of its output, by file, preset or flags.
+"""Conventions of depth networks: formats of input and output, read from the file, a preset or flags.
 
 An ONNX file stores it in its ``metadata_props``. All keys are optional text, plain or JSON:
 

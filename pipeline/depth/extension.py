@@ -26,7 +26,7 @@ LARGEST_SLOPE = 0.03
 
 
 def extrapolated(field: FloatArray, known: BoolArray, rgb: ByteArray) -> FloatArray:
-    """Return the (H, W) field, where it is unknown inpainted at ``FILL_WIDTH_PX`` and upsampled.
+    """Return the (H, W) field with its unknown pixels inpainted at ``FILL_WIDTH_PX`` and upsampled.
 
     Args:
         field: (H, W) float32.
@@ -126,13 +126,13 @@ def _predict(
 
 @compiled
 def _likeness(color: FloatArray, other: FloatArray) -> float:
-    """Return the weight of two colours' difference, never quite zero."""
+    """Return the weight of two colours' difference, at least ``LEAST_WEIGHT``."""
     red, green, blue = color[0] - other[0], color[1] - other[1], color[2] - other[2]
     return np.exp(-(red * red + green * green + blue * blue)) + LEAST_WEIGHT
 
 
 def slopes(field: FloatArray, known: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Return the (H, W) slopes down and to the right that are to be continued, zero where none is near."""
+    """Return the (H, W) slopes, down and to the right, to continue; zero where no slope is known nearby."""
     found = []
     for axis in (0, 1):
         before, after = (np.roll(field, way, axis) for way in (1, -1))

@@ -16,8 +16,8 @@ from pipeline.types import ByteArray, DepthMap, FloatArray
 
 INPAINT_RADIUS_PX = 5.0
 FULL_SCALE = 60_000.0
-"""Farthest depth in the 16-bit numbers that are inpainted: a step is 0.1 mm at 6 m. Telea's method rounds to
-whole steps, so floating-point metres would be wrong by up to one metre."""
+"""Value of the farthest depth in the 16-bit image to inpaint: a step is 0.1 mm at 6 m. Telea's method rounds
+to whole steps, so floating-point metres would be wrong by up to one metre."""
 WINDOW_PX = 7
 """Half width of the joint bilateral window."""
 SPACE_SIGMA_PX = 3.5

@@ -19,7 +19,7 @@ SHIPPED_MODEL = Path(__file__).resolve().parents[2] / "assets" / "depth" / "resn
 
 
 class DepthNetwork:
-    """A loaded depth network, ours or any other; one object can serve many images and threads."""
+    """A loaded depth network, PacketMesh's or any other; one object can serve many images and threads."""
 
     def __init__(
         self,
@@ -47,7 +47,7 @@ class DepthNetwork:
 
     @classmethod
     def of(cls, config: DepthConfig) -> DepthNetwork:
-        """Load the network that the settings name; raises as the constructor."""
+        """Load the network that the settings name; raises the errors of the constructor."""
         return cls(config.model, config.preset, Overrides.of(config))
 
     @property
@@ -61,9 +61,9 @@ class DepthNetwork:
         return dict(self._session.get_modelmeta().custom_metadata_map)
 
     def infer(self, rgb: ByteArray, crop: bool = False) -> DepthMap:
-        """Infer depth on the grid of ``rgb`` (SPEC 3.2): metric if the network gives metres, else relative.
+        """Infer depth on the grid of ``rgb`` (SPEC 3.2): metric if the output is in metres, else relative.
 
-        A network of the kind ``inverse`` gives disparity d up to scale and shift; the depth is 1/d, which
+        The output of the kind ``inverse`` is disparity d up to scale and shift; the depth is 1/d, which
         the alignment ``affine_inverse`` makes metric. Where d is zero or negative, as most networks clip
         far pixels, the depth is NaN.
 
@@ -73,7 +73,7 @@ class DepthNetwork:
 
         Raises:
             InputError: ``rgb`` is not an 8-bit colour image, or the network cannot process it.
-            ReconstructionError: the network gives no positive depth.
+            ReconstructionError: the network's output has no positive depth.
         """
         if rgb.ndim != 3 or rgb.shape[2] != 3 or rgb.dtype != np.uint8 or not rgb.size:
             raise InputError(

@@ -23,7 +23,7 @@ MOST_BYTES = 1_500_000_000
 
 
 def modified_ns(model_path: Path) -> int:
-    """Return when a network's file was last written."""
+    """Return the time of the last change of a network's file, nanoseconds."""
     if not model_path.is_file():
         raise InputError(f"There is no depth network at {model_path}: name an ONNX file, or none at all.")
     return model_path.stat().st_mtime_ns
@@ -31,7 +31,7 @@ def modified_ns(model_path: Path) -> int:
 
 @lru_cache(maxsize=2)
 def open_session(model_path: Path, modified_ns: int) -> onnxruntime.InferenceSession:
-    """Open a session with few, non-spinning threads; the last two are cached: opening is as slow as a run.
+    """Open a session with two non-spinning threads; the last two are cached: opening is as slow as a run.
 
     Raises:
         InputError: the file is no ONNX network, or needs too much time or memory.

@@ -23,7 +23,7 @@ class Signature:
 
     input_name: str
     output_name: str
-    """Largest of several depth maps, or the first if their sizes are open."""
+    """Name of the largest depth map, or of the first if their sizes are open."""
     dtype: str
     """float32 or float16."""
     layout: Layout | None

@@ -1,7 +1,7 @@
-"""Depth from measured pixels and predicted differences, by a linear system on a coarse grid.
+"""Computation of depth from measured pixels and predicted differences, by a linear system on a coarse grid.
 
-A network predicts differences of logarithmic depth between pixels, and their certainty; least squares finds
-the depth: measured pixels are fixed, every difference is a spring (the optimisation layer of OGNI-DC, Zuo
+A network predicts differences of logarithmic depth between pixels, and their certainty. Weighted least
+squares finds the depth that fits them, with measured pixels fixed (the optimisation layer of OGNI-DC, Zuo
 and Deng 2024; several distances, as in OMNI-DC, Zuo et al. 2025).
 """
 
@@ -19,7 +19,7 @@ from pipeline.types import BoolArray, ByteArray, FloatArray
 
 GRID_WIDTH_PX = 160
 DISTANCES = (1, 4, 16)
-"""Grid cells between the two ends of a difference; the long ones carry depth across wide holes."""
+"""Distances, in grid cells, of the pixels of a difference; long ones carry depth across wide holes."""
 CHANNELS_IN = 8
 CHANNELS_OUT = 2 + 4 * len(DISTANCES)
 MULTIPLE = 16

@@ -57,7 +57,7 @@ class _Topic:
     times_s: FloatArray
     """(N,) time of each image, from its header."""
     recorded_ns: list[int]
-    """(N,) time at which each image was recorded, by which the bag finds it."""
+    """(N,) time at which each image was recorded, which locates it in the bag."""
 
     @property
     def name(self) -> str:
@@ -73,7 +73,7 @@ def iterate_bag(path: Path, frames: int, depth_scale: float | None) -> Generator
     """Read several cameras' images of one moment, or ``frames`` evenly spread moments of a single camera.
 
     Raises:
-        InputError: no bag, no colour, depth or camera_info, or no images of one time.
+        InputError: the bag is unreadable, lacks colour, depth or camera_info, or has no images of one time.
     """
     with _opened(path) as reader:
         topics = yield from _image_topics(reader)

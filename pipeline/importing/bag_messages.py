@@ -24,7 +24,7 @@ _DEPTHS: dict[str, np.dtype[Any]] = {
 }
 _COMPRESSED_DEPTH = "compressedDepth"
 _CONFIG_BYTES = 12
-"""Header before the PNG or RVL data of compressed depth: format and two parameters that quantise 32FC1."""
+"""Size of the header of compressed depth: format and two parameters that quantise 32FC1, then PNG or RVL."""
 
 
 def is_depth(message: Any) -> bool:

@@ -11,17 +11,17 @@ from pipeline.types import CameraIntrinsics, FloatArray
 LEAST_OVERLAP = 0.5
 """Share of a chosen frame that another chosen frame also sees; registration needs about half."""
 MOST_COMPARED = 150
-"""Most frames, spread over the recording, that are compared; the work grows with the square."""
+"""Largest number of frames, spread over the recording, that are compared; the work grows with its square."""
 _GRID_PX = 12
 _DEPTHS = (0.6, 1.0, 1.6)
-"""Depths, in typical depths, of the points that represent what a camera sees."""
+"""Depths, as multiples of the typical depth, of the points that represent a camera's view."""
 
 
 def choose(sequence: Sequence, count: int, typical_depth_m: float) -> tuple[int, ...]:
     """Choose at most ``count`` candidates; returns their indices in order of time.
 
     With poses: the first view has the largest overlap with all others; each next one has the smallest overlap
-    with the chosen views, but at least ``LEAST_OVERLAP`` with one of them. Without poses: spread evenly.
+    with the chosen views, but at least ``LEAST_OVERLAP`` with one of them. Without poses: evenly spread.
 
     Args:
         sequence: the recording; its images are not read.

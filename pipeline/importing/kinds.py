@@ -13,7 +13,7 @@ from pipeline.importing.sequence import Sequence
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """One layout of files."""
+    """One kind of recording, with the layout of its files and its reader."""
 
     name: str
     looks_like: str

@@ -19,7 +19,7 @@ from pipeline.kernels.geometry import inverse
 from pipeline.types import CameraIntrinsics, FloatArray
 
 MOST_CANDIDATES = 600
-"""Most frames that are considered; longer recordings are subsampled."""
+"""Largest number of frames that are considered; longer recordings are subsampled."""
 COLOR_FOLDERS = ("color", "rgb", "image", "images")
 _COLOR_SUFFIXES = (".jpg", ".jpeg", ".png", ".ppm")
 _SEVEN_SCENES = CameraIntrinsics.pinhole(585.0, 585.0, 320.0, 240.0, 640, 480)

@@ -1,4 +1,4 @@
-"""Frames of a recording, in the form into which every kind is read."""
+"""Frames of a recording, the common form into which the reader of every kind converts it."""
 
 from __future__ import annotations
 

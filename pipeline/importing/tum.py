@@ -1,4 +1,4 @@
-"""Import of TUM RGB-D sequences: colour, depth and poses, each with its own times.
+"""Import of TUM RGB-D sequences: colour, depth and poses, each with separate times.
 
 Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems", IROS 2012.
 """
@@ -114,7 +114,7 @@ def _rows(file: Path, what: str, least: int, form: str) -> list[tuple[float, lis
 
 
 def _poses(file: Path, wanted_s: FloatArray) -> dict[int, FloatArray]:
-    """Return T_world_camera by index of those (N,) times with a pose at most 20 ms away."""
+    """Return T_world_camera by the index of each of (N,) times that has a pose at most 20 ms away."""
     if not file.is_file():
         return {}
     rows = _rows(file, "trajectory", 7, "a time, tx ty tz in metres and a quaternion qx qy qz qw")

@@ -1,1 +1,1 @@
-"""Reading and writing of images, intrinsics, poses, clouds, meshes and rigs; no file is written in part."""
+"""Reading and writing of images, intrinsics, poses, clouds, meshes and rigs, with no partly written file."""

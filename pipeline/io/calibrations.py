@@ -1,7 +1,7 @@
-"""Calibrations on disk: a rig folder without images, whose files replace a rig's own.
+"""Calibrations on disk: a rig folder without images, whose files replace those of a rig.
 
 ``CAL/node_00/{intrinsics.json, pose.txt, depth_intrinsics.json, extrinsics.json, depth_correction.json}``,
-``CAL/node_01/...``: each node has those files that were calibrated.
+``CAL/node_01/...``: each node has the files of the parts that were calibrated.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ its pose relative to the colour camera, and the depth sensor's bias."""
 
 
 class NodeFiles(TypedDict, total=False):
-    """Those of ``FILES`` that exist."""
+    """Paths of the files of ``FILES`` that exist."""
 
     intrinsics: AnyPath
     pose: AnyPath

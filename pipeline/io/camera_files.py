@@ -31,7 +31,7 @@ _MATLAB = re.compile(
 
 
 def opencv_yaml(camera: CameraIntrinsics) -> str:
-    """Return the camera as ``cv2.FileStorage`` and programs around OpenCV write it."""
+    """Return the camera in the YAML of ``cv2.FileStorage``, which programs that use OpenCV read."""
     return "\n".join(
         (
             "%YAML:1.0",
@@ -111,7 +111,7 @@ def kalibr_yaml(camera: CameraIntrinsics) -> str:
     """Return Kalibr's camchain of one camera with the distortion model radtan, which has no k3.
 
     Raises:
-        InputError: the camera has a k3.
+        InputError: the camera's k3 is not 0.
     """
     _refuse(camera, camera.distortion[4:], "Kalibr's radtan", "calibrate with the lens 'thesis'")
     places = np.array([camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px])

@@ -1,4 +1,4 @@
-"""Clouds as tables of named columns, the result of every format's reader."""
+"""Tables of named columns, into which the reader of every format converts a cloud."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _log = logging.getLogger(__name__)
 
 MAX_POINTS = 20_000_000
 FARTHEST, MOST_FAR_SHARE = 1e12, 0.1
-"""A share of coordinates beyond FARTHEST (in any unit) above this means that the file was misread."""
+"""If a larger share of points than MOST_FAR_SHARE is beyond FARTHEST (in any unit), the file was misread."""
 POSITION, NORMAL, COLOR = ("x", "y", "z"), ("nx", "ny", "nz"), ("red", "green", "blue")
 LABEL = "source"
 
@@ -101,7 +101,7 @@ def number_rows(path: AnyPath, body: bytes, count: int, width: int) -> np.ndarra
     """Read (count, width) float64 numbers from the first lines that are not blank.
 
     Raises:
-        InputError: there are fewer lines, or a line has no ``width`` numbers.
+        InputError: there are fewer lines, or a line has fewer than ``width`` numbers.
     """
     lines = [line for line in body.splitlines() if line.strip()][:count]
     if len(lines) < count:

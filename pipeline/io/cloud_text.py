@@ -11,7 +11,7 @@ from pipeline.types import AnyPath
 _NAMES = {"r": "red", "g": "green", "b": "blue", "normal_x": "nx", "normal_y": "ny", "normal_z": "nz"}
 MOST_COLUMNS = 1000
 _UNIT_TOLERANCE = 0.02
-"""Largest deviation from one of the lengths of triples that are read as normals."""
+"""Largest deviation of a triple's length from 1 with which it is read as a normal."""
 
 
 def parse_text(path: AnyPath, data: bytes) -> np.ndarray:
@@ -50,7 +50,7 @@ def parse_text(path: AnyPath, data: bytes) -> np.ndarray:
 
 
 def table_of_columns(rows: np.ndarray) -> np.ndarray:
-    """Convert (N, 3 or more) numbers to a structured array: positions, then normals or colours as guessed."""
+    """Convert (N, 3 or more) numbers to a structured array; guess which columns are normals or colours."""
     return _table(rows, _guessed(rows))
 
 

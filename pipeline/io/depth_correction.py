@@ -47,7 +47,7 @@ class DepthCorrection:
     range_m: tuple[float, float] = (0.0, float("inf"))
     """Nearest and farthest depth in the calibration; outside this range the correction is extrapolated."""
     ci95: Mapping[str, FloatArray] = field(default_factory=dict)
-    """95 % intervals (..., 2) by the name of a field above or of the noise, which has the shape (...)."""
+    """95 % intervals by the name of a field above or of the noise, (..., 2) for a field of shape (...)."""
 
     def apply(self, depth: DepthMap) -> DepthMap:
         """Return the corrected depth image.

@@ -19,7 +19,7 @@ NO_VALUE = 65535
 FARTHEST_M = 65.534
 """Largest depth that 16 bits store in millimetres, without ``NO_VALUE``."""
 FARTHEST_FLOAT_M, MOST_FAR_SHARE = 1e6, 0.05
-"""A share of floating-point depths beyond FARTHEST_FLOAT_M above this means that the file was misread."""
+"""If a larger share of depths than MOST_FAR_SHARE is beyond FARTHEST_FLOAT_M, the file was misread."""
 PLAUSIBLE_MEDIAN_M = (0.01, 100.0)
 """Range of plausible median depths; images outside it are rejected."""
 ROOM_M = (0.2, 15.0)
@@ -45,7 +45,7 @@ def usual_scale(values: NDArray[Any]) -> float:
 
 
 def doubts(values: NDArray[Any], depth_scale: float, stated: bool) -> tuple[str, ...]:
-    """Return doubts about a depth image read at a scale, one sentence each, with what to try.
+    """Return doubts about a depth image read at a scale, one sentence each, with advice.
 
     Args:
         values: (H, W) as stored in the file; some are known.

@@ -53,7 +53,7 @@ def register_depth(
 def carried(
     z_m: FloatArray, rays_at: RaysAt, color_camera: CameraIntrinsics, T_color_depth: FloatArray
 ) -> FloatArray:
-    """Do ``register_depth`` for a depth camera given only by its rays; returns (H, W) float32."""
+    """Register depth of a camera given only by its rays, as ``register_depth``; returns (H, W) float32."""
     size = color_camera.height_px * color_camera.width_px
     own, near = np.full(size, np.inf, np.float32), np.full(size, np.inf, np.float32)
     limits = _limits(color_camera)
@@ -98,7 +98,7 @@ def _slope(z_m: FloatArray, axis: int) -> FloatArray:
 
 
 def _limits(camera: CameraIntrinsics) -> tuple[FloatArray, FloatArray]:
-    """Return least and largest x / z and y / z in the image; the lens model may fold others into it."""
+    """Return least and largest x / z and y / z in the image; the lens model may fold other rays into it."""
     u, v = np.arange(-1, camera.width_px + 1), np.arange(-1, camera.height_px + 1)
     rim = [np.column_stack([u, np.full_like(u, edge)]) for edge in (-1, camera.height_px)]
     rim += [np.column_stack([np.full_like(v, edge), v]) for edge in (-1, camera.width_px)]

@@ -65,7 +65,7 @@ def read_intrinsics(path: AnyPath, size_px: tuple[int, int] | None = None) -> Ca
 
 
 def _bare_numbers(text: str) -> FloatArray | None:
-    """Return the (N,) numbers of a text of nothing but numbers, separated by blanks or commas; else None."""
+    """Return the (N,) numbers of a text that has only numbers, separated by blanks or commas; else None."""
     try:
         return np.array(text.replace(",", " ").split(), dtype=np.float64)
     except ValueError:

@@ -35,7 +35,7 @@ def write_mesh(path: AnyPath, surface: Surface, texture: Texture | None = None) 
         texture: photographs for the surface, which only .glb files store.
 
     Raises:
-        InputError: the suffix is another, there is no triangle, or the folder cannot be written.
+        InputError: the suffix is none of these, there is no triangle, or the folder cannot be written.
 
     >>> import numpy as np, packetmesh as pm
     >>> surface = pm.Surface(np.eye(3), np.array([[0, 1, 2]]))

@@ -57,7 +57,7 @@ def raw_values(path: AnyPath, data: bytes, what: str) -> np.ndarray:
 
 
 class _TooLarge(Exception):
-    """The image exceeds the largest number of pixels; its text is the size."""
+    """The image exceeds the largest number of pixels; the error's text is the image size."""
 
 
 def _check(height_px: int, width_px: int) -> None:
@@ -95,7 +95,7 @@ def _exr(data: bytes) -> np.ndarray:
 
 
 def _pfm(data: bytes) -> np.ndarray:
-    """Read a portable float map: rows from the bottom; the sign of the scale gives the byte order."""
+    """Read a portable float map: rows from the bottom; the scale's sign determines the byte order."""
     header = _PFM.match(data)
     if header is None:
         raise ValueError

@@ -206,7 +206,7 @@ def save_rig(directory: AnyPath, rig: Rig) -> None:
 
 
 def _write_noise(folder: Path, frame: RgbdFrame) -> None:
-    """Write the frame's noise; delete an older rig's files: depth is saved corrected and registered."""
+    """Write the frame's noise; delete an older rig's files, as depth is saved corrected and registered."""
     for name in ("depth_correction", "depth_intrinsics", "extrinsics"):
         (folder / FILES[name]).unlink(missing_ok=True)
     if frame.noise is not None:

@@ -22,7 +22,7 @@ INTRINSICS_NAME = "true_intrinsics.json"
 
 
 def read_truth(directory: Path, names: Sequence[str]) -> RigTruth | None:
-    """Read the true surface and poses of a rig's nodes; renders the depth that the true cameras see of it.
+    """Read the true surface and the nodes' true poses; renders the true depth of each camera. None without.
 
     Raises:
         InputError: a true surface exists but cannot be read, or a node has no true pose.
@@ -53,7 +53,7 @@ def write_truth(directory: Path, frames: Mapping[str, RgbdFrame], truth: RigTrut
     Args:
         directory: folder of the rig.
         frames: frames by the names of the nodes' folders; true intrinsics are written if they differ.
-        truth: what to write.
+        truth: the ground truth.
 
     Raises:
         InputError: the folder cannot be written.
