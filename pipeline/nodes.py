@@ -11,6 +11,7 @@ from pipeline.acquisition import Acquired, FilterResult, back_project
 from pipeline.config import DepthConfig, FusionMode, RegistrationConfig
 from pipeline.depth import AlignmentResult, DepthNetwork, JudgedDepth, align_depth, complete, judge
 from pipeline.kernels.masks import near
+from pipeline.kernels.straight_view import bends_strongly, bent_depth, straight_image, straight_view
 from pipeline.registration import fuse, register
 from pipeline.types import DepthMap, PointCloud, PointSource, RegistrationResult, RgbdFrame
 
@@ -48,9 +49,15 @@ class NodeClouds:
 
 
 def infer_depth(network: DepthNetwork, frame: RgbdFrame, crop: bool = False) -> InferredDepth:
-    """Run the depth network on a frame's colour image."""
+    """Run the depth network on a frame's colour image; that of a rational or fisheye lens is straightened."""
     started = time.perf_counter()
-    depth = network.infer(frame.rgb, crop=crop)
+    camera = frame.intrinsics
+    if bends_strongly(camera):
+        view = straight_view(camera)
+        depth = network.infer(straight_image(frame.rgb, camera, view), crop=crop)
+        depth = bent_depth(depth, camera, view)
+    else:
+        depth = network.infer(frame.rgb, crop=crop)
     elapsed_s = time.perf_counter() - started
     return InferredDepth(depth, network.convention.kind == "inverse", network.provider, elapsed_s)
 

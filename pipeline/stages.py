@@ -10,14 +10,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Hashable, Iterable, Sequence
 from concurrent.futures import wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal, Protocol, TypeVar
 
 import numpy as np
 
 from packetmesh.progress import Progress, drain
-from pipeline.acquisition import Acquired, acquire
+from pipeline.acquisition import Acquired, acquire, without_rayless
 from pipeline.config import (
     AcquisitionConfig,
     DepthConfig,
@@ -139,7 +139,8 @@ def _ready(stage: StageName, results: dict[StageName, Done]) -> bool:
 def open_rig(source: Source) -> Steps[Rig]:
     """Load the images and, if it is known, the truth."""
     yield Progress(f"loading {source.title}", 0.0)
-    return source.load()
+    rig = source.load()
+    return replace(rig, frames=tuple(without_rayless(frame) for frame in rig.frames))
 
 
 def infer_depths(depth: DepthConfig, rig: Rig) -> Steps[tuple[InferredDepth, ...]]:

@@ -32,14 +32,21 @@ class PointSource(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class CameraIntrinsics:
-    """A pinhole camera with Brown-Conrady distortion (SPEC 1.1, OpenCV's direction)."""
+    """A camera and its lens, in OpenCV's direction from a point to its pixel (SPEC 1.1).
+
+    ``kernels.geometry`` maps points to pixels and pixels to rays for every lens.
+    """
 
     matrix: FloatArray
     """(3, 3) camera matrix, pixels, zero skew."""
     distortion: FloatArray
-    """(5,) k1, k2, p1, p2, k3; dimensionless."""
+    """Dimensionless: (5,) k1, k2, p1, p2, k3 (Brown and Conrady); (8,) also k4, k5, k6 (rational); (12,) also
+    s1 to s4 (thin prism); (14,) also two angles of a tilted sensor, rad. Of a fisheye (4,) k1 to k4."""
     width_px: int
     height_px: int
+    fisheye: bool = False
+    """Whether the lens is that of ``cv2.fisheye``: equidistant with four coefficients (Kannala and Brandt, "A
+    generic camera model", PAMI 2006)."""
 
     @property
     def fx_px(self) -> float:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.kernels.geometry import pixel_rays
+from pipeline.kernels.geometry import has_ray, pixel_rays
 from pipeline.types import BoolArray, DepthMap, FloatArray, PointCloud, PointSource, RgbdFrame
 
 
@@ -13,6 +15,9 @@ def back_project(
     frame: RgbdFrame, depth: DepthMap | None = None, source: PointSource = PointSource.SENSOR
 ) -> PointCloud:
     """Convert each pixel with known depth to a point in the camera frame, after removing the distortion.
+
+    Depth is z, along the optical axis, for every lens. So a pixel at 90 degrees to the axis or more, or
+    beyond the range in which the lens model holds, has none and gives no point.
 
     Args:
         frame: source of colours, intrinsics and, when ``depth`` is None, the depth.
@@ -51,12 +56,24 @@ def pixels_in_front(frame: RgbdFrame, depth: DepthMap) -> BoolArray:
         InputError: as for ``back_project``.
     """
     _check_grid(frame, depth)
-    known = depth.valid & (depth.z_m > 0)
+    known = depth.valid & (depth.z_m > 0) & has_ray(frame.intrinsics)
     if not known.any():
         raise InputError(
             f"The depth image of {frame.name} has no valid pixel; check the file and the depth scale."
         )
     return known
+
+
+def without_rayless(frame: RgbdFrame) -> RgbdFrame:
+    """Return the frame with unknown depth at the pixels that its lens gives no ray; itself without any."""
+    camera = frame.intrinsics
+    if frame.depth.z_m.shape != (camera.height_px, camera.width_px):
+        return frame  # ``pixels_in_front`` explains the sizes
+    rayless = ~has_ray(camera)
+    if not np.any(rayless & frame.depth.valid):
+        return frame
+    z_m = np.where(rayless, np.float32(np.nan), frame.depth.z_m)
+    return replace(frame, depth=replace(frame.depth, z_m=z_m))
 
 
 def _sigma_m(frame: RgbdFrame, z_m: FloatArray) -> FloatArray:

@@ -98,11 +98,13 @@ def _slope(z_m: FloatArray, axis: int) -> FloatArray:
 
 
 def _limits(camera: CameraIntrinsics) -> tuple[FloatArray, FloatArray]:
-    """Return least and largest x / z and y / z in the image; the lens model may fold other rays into it."""
+    """Return least and largest x / z and y / z in the image; infinite if the rim has pixels without a ray."""
     u, v = np.arange(-1, camera.width_px + 1), np.arange(-1, camera.height_px + 1)
     rim = [np.column_stack([u, np.full_like(u, edge)]) for edge in (-1, camera.height_px)]
     rim += [np.column_stack([np.full_like(v, edge), v]) for edge in (-1, camera.width_px)]
     rays = undistorted_rays(camera, np.concatenate(rim).astype(float))[:, :2]
+    if np.isnan(rays).any():
+        return np.full(2, -np.inf), np.full(2, np.inf)
     return rays.min(axis=0), rays.max(axis=0)
 
 
@@ -116,8 +118,11 @@ def _covered(
     sides_m: FloatArray, center_m: FloatArray, camera: CameraIntrinsics
 ) -> tuple[IntArray, FloatArray, BoolArray]:
     """Return (P,) colour pixels covered by pieces, their depth, and False where only OVERLAP covers them."""
-    left, right, above, below = (project(camera, side_m) for side_m in sides_m)
+    sides = np.stack([project(camera, side_m) for side_m in sides_m])
     center = project(camera, center_m)
+    imaged = np.isfinite(sides).all(axis=(0, 2)) & np.isfinite(center).all(axis=1)
+    sides_m, center_m, center = sides_m[:, imaged], center_m[imaged], center[imaged]
+    left, right, above, below = sides[:, imaged]
     across, down = right - left, below - above
     wide = 1.0 + OVERLAP / REACH
     half = np.minimum(0.5 * wide * (np.abs(across) + np.abs(down)), 0.5 * WIDEST_PX)

@@ -1,13 +1,15 @@
-"""Rigid motions and the pinhole camera with its distortion."""
+"""Rigid motions, and cameras: pixels to rays and points to pixels."""
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pipeline.types import CameraIntrinsics, FloatArray
+from pipeline.kernels.lens import distorted, reach, straightened
+from pipeline.types import BoolArray, CameraIntrinsics, FloatArray
 
 
 def rigid(rotation: FloatArray, translation_m: FloatArray) -> FloatArray:
@@ -59,30 +61,58 @@ LEVEL_POSE = look_at(np.zeros(3), np.array([0.0, 1.0, 0.0]))
 
 def scaled(intrinsics: CameraIntrinsics, factor: float) -> CameraIntrinsics:
     """Return the camera of an image resized by ``factor``; pixel centres stay at integers."""
-    matrix = intrinsics.matrix.copy()
-    matrix[:2, :2] *= factor
-    matrix[:2, 2] = (matrix[:2, 2] + 0.5) * factor - 0.5
     size = round(intrinsics.width_px * factor), round(intrinsics.height_px * factor)
-    return CameraIntrinsics(matrix, intrinsics.distortion, *size)
+    return _resized(intrinsics, (factor, factor), size)
+
+
+def scaled_to(intrinsics: CameraIntrinsics, width_px: int, height_px: int) -> CameraIntrinsics | None:
+    """Return the camera of an image resized to this size; None if the proportions differ.
+
+    They agree if the height follows from the width, or the width from the height, to the nearest pixel.
+    """
+    shares = width_px / intrinsics.width_px, height_px / intrinsics.height_px
+    if height_px != round(intrinsics.height_px * shares[0]) and width_px != round(
+        intrinsics.width_px * shares[1]
+    ):
+        return None
+    return _resized(intrinsics, shares, (width_px, height_px))
+
+
+def _resized(
+    intrinsics: CameraIntrinsics, shares: tuple[float, float], size_px: tuple[int, int]
+) -> CameraIntrinsics:
+    """Return the camera of an image resized by these shares of width and height to this size."""
+    matrix = intrinsics.matrix.copy()
+    matrix[[0, 1], [0, 1]] *= shares
+    matrix[:2, 2] = (matrix[:2, 2] + 0.5) * shares - 0.5
+    return replace(intrinsics, matrix=matrix, width_px=size_px[0], height_px=size_px[1])
 
 
 def pixel_rays(intrinsics: CameraIntrinsics) -> FloatArray:
     """Return (H, W, 3) camera-frame directions of the pixel centres with z = 1, undistorted; read-only.
 
-    The last four cameras are cached: reconstructing one frame calls this five times.
+    Pixels without such a direction are NaN, as in ``undistorted_rays``. The last four cameras are cached:
+    reconstructing one frame calls this five times.
     """
     size = intrinsics.width_px, intrinsics.height_px
     find = _kept_rays if size[0] * size[1] <= _KEPT_PX else _rays
     matrix, distortion = (np.asarray(of, np.float64) for of in (intrinsics.matrix, intrinsics.distortion))
-    return find(matrix.tobytes(), distortion.tobytes(), *size)
+    return find(matrix.tobytes(), distortion.tobytes(), *size, intrinsics.fisheye)
 
 
-def _rays(matrix: bytes, distortion: bytes, width_px: int, height_px: int) -> FloatArray:
+def has_ray(intrinsics: CameraIntrinsics) -> BoolArray:
+    """Return (H, W) True for the pixels that have a direction in ``pixel_rays``."""
+    if _is_pinhole(intrinsics):
+        return np.ones((intrinsics.height_px, intrinsics.width_px), dtype=bool)
+    return np.isfinite(pixel_rays(intrinsics)[..., 2])
+
+
+def _rays(matrix: bytes, distortion: bytes, width_px: int, height_px: int, fisheye: bool) -> FloatArray:
     """Compute ``pixel_rays`` of a camera whose parameters are given as bytes of float64."""
     numbers = np.frombuffer(matrix).reshape(3, 3), np.frombuffer(distortion)
     u, v = np.meshgrid(np.arange(width_px), np.arange(height_px))
     pixels = np.stack([u, v], axis=-1).reshape(-1, 2)
-    rays = undistorted_rays(CameraIntrinsics(*numbers, width_px, height_px), pixels)
+    rays = undistorted_rays(CameraIntrinsics(*numbers, width_px, height_px, fisheye), pixels)
     rays.setflags(write=False)
     return rays.reshape(height_px, width_px, 3)
 
@@ -95,36 +125,48 @@ _KEPT_PX = 1_000_000
 def undistorted_rays(intrinsics: CameraIntrinsics, pixels: ArrayLike) -> FloatArray:
     """Return (N, 3) camera-frame directions with z = 1 of (N, 2) image positions, SPEC 1.1.
 
-    Distortion is inverted by fixed-point iteration to 1e-10 in normalised image coordinates.
+    A position that the lens model does not reach, or a fisheye's at 90 degrees or more to the optical axis,
+    has no such direction: its row is NaN. The others project to their pixels within 1e-7 pixels.
     """
     pixels = np.asarray(pixels, dtype=np.float64)
     if not len(pixels):
         return np.empty((0, 3))
-    if not np.any(intrinsics.distortion):
+    if _is_pinhole(intrinsics):
         x = (pixels[:, 0] - intrinsics.cx_px) / intrinsics.fx_px
         y = (pixels[:, 1] - intrinsics.cy_px) / intrinsics.fy_px
         return np.stack([x, y, np.ones_like(x)], axis=1)
-    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
-    xy = cv2.undistortPoints(pixels[:, None], intrinsics.matrix, intrinsics.distortion, criteria=criteria)[
-        :, 0
-    ]
-    return np.concatenate([xy, np.ones((len(xy), 1))], axis=1)
+    xy = straightened(intrinsics, pixels)
+    return np.concatenate([xy, np.where(np.isnan(xy[:, :1]), np.nan, 1.0)], axis=1)
 
 
 def project(intrinsics: CameraIntrinsics, points_m: FloatArray) -> FloatArray:
-    """Project (N, 3) camera-frame points in front of the camera to (N, 2) image positions (eq. 3.1-3.3)."""
+    """Project (N, 3) camera-frame points in front of the camera to (N, 2) image positions (eq. 3.1-3.3).
+
+    A point beyond the range in which the lens model holds has no image: its row is NaN.
+    """
     if not len(points_m):
         return np.empty((0, 2))
-    if not np.any(intrinsics.distortion):  # OpenCV would also compute fifty derivatives per point
-        depth_m = points_m[:, 2]
-        nearness = np.divide(1.0, depth_m, out=np.ones_like(depth_m), where=depth_m != 0.0)
+    depth_m = points_m[:, 2]
+    nearness = np.divide(1.0, depth_m, out=np.ones_like(depth_m), where=depth_m != 0.0)
+    if _is_pinhole(intrinsics):  # OpenCV would also compute fifty derivatives per point
         u_px = points_m[:, 0] * nearness * intrinsics.fx_px + intrinsics.cx_px
         v_px = points_m[:, 1] * nearness * intrinsics.fy_px + intrinsics.cy_px
         return np.stack([u_px, v_px], axis=1)
-    return cv2.projectPoints(
-        np.ascontiguousarray(points_m, dtype=np.float64),
-        np.zeros(3),
-        np.zeros(3),
-        intrinsics.matrix,
-        intrinsics.distortion,
-    )[0][:, 0]
+    straight = points_m[:, :2] * nearness[:, None]
+    if intrinsics.fisheye:
+        pixels = distorted(intrinsics, straight) * intrinsics.matrix[[0, 1], [0, 1]]
+        pixels += intrinsics.matrix[:2, 2]
+    else:
+        pixels = cv2.projectPoints(
+            np.ascontiguousarray(points_m, dtype=np.float64),
+            np.zeros(3),
+            np.zeros(3),
+            intrinsics.matrix,
+            intrinsics.distortion,
+        )[0][:, 0]
+    pixels[np.hypot(*straight.T) >= reach(intrinsics)] = np.nan
+    return pixels
+
+
+def _is_pinhole(intrinsics: CameraIntrinsics) -> bool:
+    return not intrinsics.fisheye and not np.any(intrinsics.distortion)

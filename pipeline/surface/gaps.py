@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from pipeline.kernels.geometry import has_ray
 from pipeline.kernels.rays import Camera
 from pipeline.types import BoolArray, DepthMap, FloatArray, Gaps
 
@@ -33,19 +34,20 @@ def gaps_of(seen: Sequence[DepthMap], cameras: Sequence[Camera]) -> Gaps:
 
 def _areas_m2(depth: DepthMap, camera: Camera) -> FloatArray:
     """Return (G,) areas of the gaps in one image, which must have a pixel with depth."""
-    missed = ~depth.valid
+    unknown = ~depth.valid
+    missed = unknown & has_ray(camera.intrinsics)
     count, patch = cv2.connectedComponents(missed.astype(np.uint8), connectivity=4)
-    pixel_m2 = _filled_m(depth, missed) ** 2 / (camera.intrinsics.fx_px * camera.intrinsics.fy_px)
+    pixel_m2 = _filled_m(depth, unknown) ** 2 / (camera.intrinsics.fx_px * camera.intrinsics.fy_px)
     sums_m2: FloatArray = np.bincount(patch[missed], pixel_m2[missed], count).astype(float)
     return sums_m2[1:]
 
 
-def _filled_m(depth: DepthMap, missed: BoolArray) -> FloatArray:
+def _filled_m(depth: DepthMap, unknown: BoolArray) -> FloatArray:
     """Return (H, W) depth, at pixels without depth that of the nearest pixel with depth."""
     _, nearest = cv2.distanceTransformWithLabels(
-        missed.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
+        unknown.astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL
     )
     known_m = np.zeros(int(nearest.max()) + 1)
-    known_m[nearest[~missed]] = depth.z_m[~missed]
+    known_m[nearest[~unknown]] = depth.z_m[~unknown]
     filled_m: FloatArray = known_m[nearest]
     return filled_m

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from pipeline.kernels.geometry import has_ray
 from pipeline.kernels.rays import (
     Camera,
     camera_hits,
@@ -38,7 +39,8 @@ class Seen:
     depth: DepthMap
     """(H, W) depth of the mesh; NaN where a ray misses."""
     guessed: BoolArray | None
-    """(H, W) rays that hit a triangle most of whose corners were inferred; None if sources are unknown."""
+    """(R,) pixel rays that hit a triangle most of whose corners were inferred; None if sources are
+    unknown."""
 
 
 def measure_quality(
@@ -68,7 +70,7 @@ def measure_quality(
     rim_vertices, rim_corners = np.unique(rim, return_inverse=True)
     rim_parts = connected_parts(rim_corners.reshape(-1, 2), len(rim_vertices))
     return SurfaceQuality(
-        no_hit_ray_share=missed_share(seen),
+        no_hit_ray_share=missed_share(seen, cameras),
         boundary_loops=len(np.unique(rim_parts)),
         boundary_length_m=float(np.linalg.norm(vertices_m[rim[:, 0]] - vertices_m[rim[:, 1]], axis=1).sum()),
         hole_area_m2=open_area_m2(vertices_m, triangles, parts),
@@ -103,25 +105,27 @@ def seen_by(
     for camera in cameras:
         hits = camera_hits(scene, camera)
         triangle = np.minimum(hits["primitive_ids"].numpy(), len(triangles))  # a miss has a larger id
-        yield Seen(depth_of(hits), None if guessed is None else guessed[triangle])
+        rays = has_ray(camera.intrinsics)
+        yield Seen(depth_of(hits), None if guessed is None else guessed[triangle[rays]])
 
 
 def no_hit_ray_share(vertices_m: FloatArray, triangles: IntArray, cameras: Sequence[Camera]) -> float:
     """Return the share of all cameras' pixel rays that miss the mesh, 0 to 1; NaN without cameras."""
-    return missed_share(list(hit_depths(vertices_m, triangles, cameras)))
+    return missed_share(list(hit_depths(vertices_m, triangles, cameras)), cameras)
 
 
-def missed_share(seen: Sequence[DepthMap]) -> float:
-    """Return the share of all cameras' pixels without a hit, 0 to 1; NaN without cameras."""
+def missed_share(seen: Sequence[DepthMap], cameras: Sequence[Camera]) -> float:
+    """Return the share of all cameras' pixel rays without a hit, 0 to 1; NaN without cameras."""
     if not seen:
         return float("nan")
-    return 1.0 - sum(int(depth.valid.sum()) for depth in seen) / sum(depth.z_m.size for depth in seen)
+    rays = sum(int(has_ray(camera.intrinsics).sum()) for camera in cameras)
+    return 1.0 - sum(int(depth.valid.sum()) for depth in seen) / rays
 
 
 def guessed_share(views: Sequence[Seen]) -> float:
-    """Return the share of all cameras' pixels on inferred surface, 0 to 1; NaN if sources are unknown."""
+    """Return the share of all cameras' rays on inferred surface, 0 to 1; NaN if sources are unknown."""
     guessed = [view.guessed for view in views if view.guessed is not None]
-    return float(np.mean(np.concatenate([part.ravel() for part in guessed]))) if guessed else float("nan")
+    return float(np.mean(np.concatenate(guessed))) if guessed else float("nan")
 
 
 def kept_share(seen: Sequence[DepthMap], sensed: Sequence[DepthMap], within: float) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.kernels.geometry import apply, inverse, project, undistorted_rays
+from pipeline.kernels.geometry import apply, has_ray, inverse, project, undistorted_rays
 from pipeline.kernels.open3d_runtime import o3d
 from pipeline.kernels.rays import Camera, camera_hits, first_hits, guessed_triangles, triangle_scene
 from pipeline.surface.findings import RayParts
@@ -78,6 +78,7 @@ def ray_parts(surface: SurfaceResult, views: Sequence[View]) -> RayParts:
         sensor, network = _known_pixels(view)
         triangle = camera_hits(scene, view.camera)["primitive_ids"].numpy()  # a miss has a larger id
         hit = triangle < len(inferred)
+        missed = ~hit & has_ray(view.camera.intrinsics)
         on_inferred = np.zeros(hit.shape, dtype=bool)
         on_inferred[hit] = inferred[triangle[hit]]
         counts += [
@@ -85,9 +86,9 @@ def ray_parts(surface: SurfaceResult, views: Sequence[View]) -> RayParts:
             for part in (
                 hit & ~on_inferred,
                 on_inferred,
-                ~hit & sensor,
-                ~hit & ~sensor & network,
-                ~hit & ~sensor & ~network,
+                missed & sensor,
+                missed & ~sensor & network,
+                missed & ~sensor & ~network,
             )
         ]
     return RayParts(*(counts / counts.sum()).tolist())

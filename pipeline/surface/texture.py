@@ -75,11 +75,12 @@ def _shrink(camera: Camera) -> float:
 
 
 def _pixels(camera: Camera, points_m: FloatArray) -> FloatArray:
-    """Return (N, 2) pixels of world points; far outside the image for points behind the camera."""
+    """Return (N, 2) pixels of world points; far outside the image for those without an image."""
     own_m = apply(inverse(camera.T_world_camera), points_m)
     ahead = own_m[:, 2] > 1e-3
     pixels = np.full((len(points_m), 2), FAR_OUTSIDE_PX)
     pixels[ahead] = project(camera.intrinsics, own_m[ahead])
+    pixels[np.isnan(pixels)] = FAR_OUTSIDE_PX
     return np.clip(pixels, FAR_OUTSIDE_PX, -FAR_OUTSIDE_PX)
 
 

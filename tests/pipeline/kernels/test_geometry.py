@@ -77,3 +77,24 @@ def test_concatenation_keeps_only_the_columns_that_all_clouds_have():
     assert len(joined) == 3
     assert joined.normals is None
     np.testing.assert_array_equal(joined.sigma_m, [1, 1, 0])
+
+
+def test_the_camera_of_a_resized_image_sees_each_direction_at_the_same_place_of_it():
+    """Pixel 0 of 640 extends from -0.5 to 0.5, and so does that of 320: u' + 0.5 = (u + 0.5) / 2."""
+    fisheye = replace(DISTORTED, distortion=np.array([0.1, -0.02, 0.0, 0.0]), fisheye=True)
+    points_m = np.random.default_rng(0).uniform((-0.5, -0.4, 1.0), (0.5, 0.4, 2.0), (50, 3))
+    for camera in (DISTORTED, fisheye):
+        half = geometry.scaled_to(camera, 320, 240)
+        assert half is not None
+        assert (half.width_px, half.height_px, half.fisheye) == (320, 240, camera.fisheye)
+        expected = (geometry.project(camera, points_m) + 0.5) / 2.0 - 0.5
+        np.testing.assert_allclose(geometry.project(half, points_m), expected, atol=1e-9)
+        np.testing.assert_array_equal(half.matrix, geometry.scaled(camera, 0.5).matrix)
+
+
+@pytest.mark.parametrize(
+    ("size_px", "fits"),
+    [((640, 480), True), ((1280, 960), True), ((100, 75), True), ((101, 76), True), ((848, 480), False)],
+)
+def test_an_image_of_other_proportions_is_of_another_camera(size_px, fits):
+    assert (geometry.scaled_to(DISTORTED, *size_px) is not None) == fits
