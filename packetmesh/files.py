@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import errno
 import json
@@ -171,15 +172,32 @@ def read_bytes(path: str | os.PathLike[str], max_bytes: int, what: str) -> bytes
 
 
 def read_text(path: str | os.PathLike[str], what: str, max_bytes: int | None = None) -> str:
-    """Return the content of a UTF-8 text file of at most ``max_bytes`` (None means ``MAX_TEXT_BYTES``).
+    """Return the content of a text file of at most ``max_bytes`` (None means ``MAX_TEXT_BYTES``).
+
+    It is UTF-8, or UTF-16 with a byte order mark, as Windows writes it; all line ends become ``\\n``.
 
     Raises:
-        InputError: as for ``read_bytes``, or it is not UTF-8 text.
+        InputError: as for ``read_bytes``, or it is no such text.
     """
+    data = read_bytes(path, MAX_TEXT_BYTES if max_bytes is None else max_bytes, what)
     try:
-        return read_bytes(path, MAX_TEXT_BYTES if max_bytes is None else max_bytes, what).decode("utf-8-sig")
+        return text_in(data)
     except UnicodeDecodeError:
-        raise InputError(f"The {what} {path} is not a text file; check the path") from None
+        raise InputError(
+            f"The {what} {path} is not a text file in UTF-8; try to save it as one, or check the path"
+        ) from None
+
+
+def text_in(data: bytes, errors: str = "strict") -> str:
+    """Decode UTF-8, or UTF-16 with a byte order mark, without the mark and with ``\\n`` for all line ends.
+
+    Raises:
+        UnicodeDecodeError: it is neither, and ``errors`` is "strict".
+    """
+    marked = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    is_utf16 = marked and data.count(0) > len(data) // 4  # most letters are ASCII, every other byte 0
+    text = data.decode("utf-16" if is_utf16 else "utf-8-sig", errors)
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def unpacked(archive: zipfile.ZipFile, item: zipfile.ZipInfo) -> bytes:

@@ -19,16 +19,20 @@ def import_rig(
     intrinsics: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Make a rig of frames of a recording: TUM, 7-Scenes, ScanNet, SUN RGB-D, Redwood, Open3D, COLMAP, ROS.
+    """Convert a recording to a rig: of a data set, COLMAP, ROS or a telephone.
+
+    Data sets: TUM, ICL-NUIM, 7-Scenes, ScanNet, SUN RGB-D, Redwood and Open3D. Telephones: Stray Scanner,
+    Polycam and Record3D.
 
     Args:
         path: The recording's folder, unpacked; or a bag of ROS 1 or 2 (.bag, .db3, .mcap or its folder).
-        out: The rig's folder, new or empty; `packetmesh reconstruct --rig` takes it.
-        frames: How many frames become nodes, at most 6; chosen apart from each other but overlapping. A
-            bag of several cameras gives a node a camera.
-        depth_scale: Depth units per metre; without it what the kind of recording uses.
-        intrinsics: The colour camera, if there is no file of it beside the images or another is meant.
-        json: Print what was found and taken as one JSON object.
+        out: Folder for the rig, new or empty; give it to `packetmesh reconstruct --rig`.
+        frames: Number of frames that become nodes, at most 6; they are far apart but overlap. A bag of
+            several cameras gives one node for each camera.
+        depth_scale: Depth units per metre; without it, the value of the kind of recording.
+        intrinsics: Intrinsics of the colour camera, if the recording has no file of them or another file is
+            meant.
+        json: Print the frames that were found and used as one JSON object.
     """
     from dataclasses import asdict
 

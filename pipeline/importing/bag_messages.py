@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from packetmesh.errors import InputError
 from pipeline.importing.rvl import decode_rvl
 from pipeline.kernels.geometry import rigid
-from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
+from pipeline.types import ByteArray, FloatArray
 
 _COLORS = {"rgb8": (3, [0, 1, 2]), "bgr8": (3, [2, 1, 0]), "rgba8": (4, [0, 1, 2]), "bgra8": (4, [2, 1, 0])}
 _COLORS |= {"mono8": (1, [0, 0, 0]), "8UC1": (1, [0, 0, 0]), "8UC3": (3, [2, 1, 0])}
@@ -44,6 +44,17 @@ def stamp_s(raw: bytes, is_ros2: bool) -> float:
     return seconds + 1e-9 * nanoseconds
 
 
+def size_of(message: Any, topic: str) -> tuple[int, int]:
+    """Return width and height of an Image or CompressedImage; 0 and 0 if its data are damaged."""
+    if not hasattr(message, "format"):
+        return message.width, message.height
+    try:
+        image = depth_values_of(message, topic) if is_depth(message) else color_of(message, topic)
+    except InputError:
+        return 0, 0
+    return image.shape[1], image.shape[0]
+
+
 def color_of(message: Any, topic: str) -> ByteArray:
     """Return an Image or CompressedImage as (H, W, 3) RGB.
 
@@ -57,7 +68,8 @@ def color_of(message: Any, topic: str) -> ByteArray:
         return np.ascontiguousarray(bgr[..., ::-1])
     if message.encoding not in _COLORS:
         raise InputError(
-            f"{topic} has images of the encoding {message.encoding}; those known are {', '.join(_COLORS)}"
+            f"{topic} has images of the encoding {message.encoding}; try to record it in one of "
+            f"{', '.join(_COLORS)}"
         )
     channels, order = _COLORS[message.encoding]
     values = _rows(message, np.dtype(np.uint8), channels, topic)
@@ -76,27 +88,9 @@ def depth_values_of(message: Any, topic: str) -> NDArray[Any]:
     return _rows(message, type_, 1, topic)
 
 
-def camera_in(message: Any, topic: str) -> CameraIntrinsics:
-    """Return the camera of a CameraInfo, whose field names are capitals in ROS 1.
-
-    Raises:
-        InputError: the lens is not Brown-Conrady with five coefficients, or not calibrated.
-    """
-    d = np.asarray(message.d if hasattr(message, "d") else message.D, float)
-    matrix = np.asarray(message.k if hasattr(message, "k") else message.K, float).reshape(3, 3)
-    if message.distortion_model not in ("", "plumb_bob", "rational_polynomial") or np.any(d[5:]):
-        raise InputError(
-            f"The camera of {topic} has the lens {message.distortion_model} with {len(d)} coefficients; try "
-            "a recording of rectified images, or plumb_bob"
-        )
-    if not (matrix[0, 0] > 0 and matrix[1, 1] > 0):
-        raise InputError(f"The camera of {topic} is not calibrated; try to record its real camera_info")
-    return CameraIntrinsics(matrix, np.pad(d[:5], (0, max(0, 5 - len(d)))), message.width, message.height)
-
-
 def transform_in(message: Any) -> FloatArray:
-    """Return the (4, 4) T_parent_child of a TransformStamped, metres."""
-    q, t = message.transform.rotation, message.transform.translation
+    """Return the (4, 4) matrix of a geometry_msgs Transform, metres."""
+    q, t = message.rotation, message.translation
     rotation = Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix()
     return rigid(rotation, np.array([t.x, t.y, t.z]))
 

@@ -13,13 +13,19 @@ PRIMESENSE = CameraIntrinsics.pinhole(525.0, 525.0, 319.5, 239.5, 640, 480)
 """Factory intrinsics of a Kinect or Asus Xtion, which ROS and Open3D also assume."""
 
 
+_SUFFIXES = ("json", "yaml", "yml")
+_NAMED = ("*intrinsic*.txt", "camera_matrix.csv")
+"""Files that contain a camera by their names; those of ``_SUFFIXES`` may contain other things."""
+
+
 def camera_of(
     folder: Path, color: Path, given: Path | None, default: CameraIntrinsics | None, default_name: str
 ) -> tuple[CameraIntrinsics, tuple[str, ...]]:
     """Return the camera of a recording, and a note if it had to be assumed.
 
     Args:
-        folder: folder of the recording; JSON files in it, then \\*intrinsic\\*.txt in it and above are tried.
+        folder: folder of the recording; JSON and YAML files in it, then \\*intrinsic\\*.txt and
+            camera_matrix.csv in it, then \\*intrinsic\\*.txt above are tried.
         color: one of the colour images.
         given: intrinsics file given by the user, which is preferred.
         default: camera to assume if there is no such file.
@@ -30,27 +36,39 @@ def camera_of(
     """
     height_px, width_px = read_color(color).shape[:2]
     size_px = width_px, height_px
-    camera = _in_files(folder, size_px) if given is None else read_intrinsics(given, size_px)
-    notes: tuple[str, ...] = ()
-    if camera is None:
-        if default is None:
-            raise InputError(f"{folder} has no file with the camera's intrinsics; try --intrinsics FILE")
-        camera = default
-        notes = (f"No intrinsics beside the images: taken as {default_name}; --intrinsics names others",)
-    if (camera.width_px, camera.height_px) != (width_px, height_px):
+    found, others = (given, []) if given else _file_in(folder, size_px)
+    if found is not None:
+        camera = read_intrinsics(found, size_px)
+        if (camera.width_px, camera.height_px) != size_px:
+            raise InputError(
+                f"The intrinsics file {found} is for {camera.width_px} x {camera.height_px} pixels but "
+                f"{color.name} has {width_px} x {height_px}; try --intrinsics FILE with those of these images"
+            )
+        return camera, ()
+    none = f"no intrinsics that can be read{f' ({others[0]} holds none)' if others else ''}"
+    if default is None:
+        raise InputError(f"{folder} has {none}; try --intrinsics FILE")
+    if (default.width_px, default.height_px) != size_px:
         raise InputError(
-            f"The intrinsics of {folder} are for {camera.width_px} x {camera.height_px} pixels but "
-            f"{color.name} has {width_px} x {height_px}; try --intrinsics FILE with those of these images"
+            f"{folder} has {none}, and {color.name} has {width_px} x {height_px} pixels, not the "
+            f"{default.width_px} x {default.height_px} of the camera that would be assumed ({default_name}); "
+            "try --intrinsics FILE"
         )
-    return camera, notes
+    return default, (f"{none[0].upper()}{none[1:]}: taken as {default_name}; --intrinsics names others",)
 
 
-def _in_files(folder: Path, size_px: tuple[int, int]) -> CameraIntrinsics | None:
-    for path in sorted(folder.glob("*.json")):
+def _file_in(folder: Path, size_px: tuple[int, int]) -> tuple[Path | None, list[str]]:
+    """Return the intrinsics file of a recording, and the names of files that may have been meant as such."""
+    others, of_other_sizes = list[str](), list[Path]()
+    for path in [path for suffix in _SUFFIXES for path in sorted(folder.glob(f"*.{suffix}"))]:
         try:
-            return read_intrinsics(path)
-        except InputError:  # JSON of another kind
+            camera = read_intrinsics(path, size_px)
+        except InputError:  # JSON or YAML of another kind
+            others.append(path.name)
             continue
-    for path in [*sorted(folder.glob("*intrinsic*.txt")), *sorted(folder.parent.glob("*intrinsic*.txt"))]:
-        return read_intrinsics(path, size_px)
-    return None
+        if (camera.width_px, camera.height_px) == size_px:
+            return path, []
+        of_other_sizes.append(path)
+    named = [path for pattern in _NAMED for path in sorted(folder.glob(pattern))]
+    found = [*of_other_sizes, *named, *sorted(folder.parent.glob(_NAMED[0]))]
+    return next(iter(found), None), others

@@ -6,6 +6,7 @@ import numpy as np
 
 from pipeline.importing.sequence import Sequence
 from pipeline.kernels.geometry import apply, inverse, pixel_rays, scaled
+from pipeline.kernels.straight_view import bends_strongly, straight_view
 from pipeline.types import CameraIntrinsics, FloatArray
 
 LEAST_OVERLAP = 0.5
@@ -71,6 +72,7 @@ def overlaps(T_world_camera: FloatArray, camera: CameraIntrinsics, typical_depth
         typical_depth_m: typical distance of the scene.
     """
     small = scaled(camera, _GRID_PX / max(camera.width_px, camera.height_px))
+    small = straight_view(small) if bends_strongly(small) else small
     rays = pixel_rays(small).reshape(-1, 3)
     points_m = np.concatenate([rays * depth * typical_depth_m for depth in _DEPTHS])
     seen = np.empty((len(T_world_camera),) * 2)

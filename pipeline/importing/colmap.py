@@ -7,19 +7,20 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
-from packetmesh.files import MAX_GEOMETRY_BYTES, MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, read_bytes
+from packetmesh.files import MAX_GEOMETRY_BYTES, MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, read_bytes, text_in
 from pipeline.importing.cameras import camera_of
 from pipeline.importing.sequence import DEPTH_SUFFIXES, Candidate, Sequence, named_inside
 from pipeline.io.depth_scale import usual_scale
 from pipeline.io.images import read_depth_units, read_depth_values
-from pipeline.kernels.geometry import inverse, rigid, scaled
+from pipeline.io.lenses import FISHEYE, lens_of
+from pipeline.kernels.geometry import inverse, rigid
 from pipeline.types import CameraIntrinsics, FloatArray
 
 CENTRE_PX = 0.5
@@ -32,8 +33,13 @@ _PARAMETERS = {
     "SIMPLE_RADIAL": ("fx", "cx", "cy", "k1"),
     "RADIAL": ("fx", "cx", "cy", "k1", "k2"),
     "OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"),
+    "FULL_OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
+    "SIMPLE_RADIAL_FISHEYE": ("fx", "cx", "cy", "k1"),
+    "RADIAL_FISHEYE": ("fx", "cx", "cy", "k1", "k2"),
+    "OPENCV_FISHEYE": ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"),
 }
-_DISTORTION = ("k1", "k2", "p1", "p2", "k3")
+_DISTORTION = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+_FISHEYE_DISTORTION = ("k1", "k2", "k3", "k4")
 _MODEL_FOLDERS = (".", "sparse", "sparse/0")
 _IMAGE_FOLDERS = ("images", "image", "color", "rgb", ".")
 _DEPTH_FOLDERS = ("depth", "depths", "depth_images")
@@ -67,29 +73,26 @@ def read_colmap(folder: Path, intrinsics: Path | None) -> Sequence:
     """
     model = _model_folder(folder, ".txt")
     if model is None:
+        binary = _model_folder(folder, ".bin")
         raise InputError(
-            f"The model in {folder} is binary; try colmap model_converter --output_type TXT beside it"
+            f"The model in {binary} is binary; try colmap model_converter --input_path {binary} "
+            f"--output_path {binary} --output_type TXT"
         )
-    cameras, images = _cameras(model / "cameras.txt"), list(_images(model / "images.txt"))
-    found = [
-        (image, color, depth)
-        for image in images
-        if (color := _beside(folder, _IMAGE_FOLDERS, image.name)) and (depth := _depth(folder, image.name))
-    ]
-    if not found:
-        raise InputError(
-            f"{folder} has no image of images.txt with its depth; try colmap patch_match_stereo, which "
-            "writes stereo/depth_maps, or put the sensor's images of the same names in depth/"
-        )
+    (cameras, others), images = _cameras(model / "cameras.txt"), list(_images(model / "images.txt"))
+    found = _with_depth(folder, images)
     most, _ = Counter(image.camera for image, _, _ in found).most_common(1)[0]
     ours = sorted((one for one in found if one[0].camera == most), key=lambda one: one[0].name)
-    if most not in cameras:
-        raise InputError(f"{model / 'cameras.txt'} has no camera {most}, which images.txt names; check both")
-    camera, notes = cameras[most], list[str]()
+    notes = list[str]()
     if intrinsics is not None:
         camera, _ = camera_of(folder, ours[0][1], intrinsics, None, "")
+    elif most in cameras:
+        camera = cameras[most]
+    else:
+        raise _no_camera(model / "cameras.txt", most, others)
     if len(ours) < len(images):
-        notes.append(f"{len(images) - len(ours)} of {len(images)} images have no depth or another camera")
+        notes.append(
+            f"{len(images) - len(ours)} of {len(images)} images have no file, no depth or another camera"
+        )
     dense = ours[0][2].suffix == ".bin"
     if dense:
         units, metres = 1.0, 1.0
@@ -98,22 +101,45 @@ def read_colmap(folder: Path, intrinsics: Path | None) -> Sequence:
         )
     else:
         units = usual_scale(read_depth_values(ours[0][2]))
-        metres = _metres_a_unit(model / "points3D.txt", [(image, depth) for image, _, depth in ours], units)
+        metres = _metres_a_unit(
+            model / "points3D.txt", [(image, depth) for image, _, depth in ours], camera, units
+        )
         notes.append(f"A unit of the model is {metres:.4g} m by the depth that was measured at its points")
     candidates = []
     for image, color, depth in ours:
         T_model_camera = inverse(image.T_camera_model)
         T_model_camera[:3, 3] *= metres
         candidates.append(Candidate(color, depth, T_model_camera))
-    depth_camera = _depth_camera(camera, ours[0][2])
-    return Sequence(
-        tuple(candidates),
-        camera,
-        units,
-        depth_camera=depth_camera,
-        T_color_depth=None if depth_camera is None else np.eye(4),
-        poses_in_depth_units=True,
-        notes=tuple(notes),
+    return Sequence(tuple(candidates), camera, units, poses_in_depth_units=True, notes=tuple(notes))
+
+
+def _with_depth(folder: Path, images: list[_Image]) -> list[tuple[_Image, Path, Path]]:
+    """Return the images whose photograph and depth exist, with both files."""
+    photographed = [
+        (image, color) for image in images if (color := _beside(folder, _IMAGE_FOLDERS, image.name))
+    ]
+    found = [(image, color, depth) for image, color in photographed if (depth := _depth(folder, image.name))]
+    if not photographed:
+        example = f", such as {images[0].name}" if images else ""
+        raise InputError(
+            f"{folder} has none of the {len(images)} photographs of images.txt{example}; try to put "
+            "them in images/"
+        )
+    if not found:
+        raise InputError(
+            f"{folder} has photographs of images.txt but depth of none; try colmap patch_match_stereo, which "
+            "writes stereo/depth_maps, or put the sensor's images of the same names in depth/"
+        )
+    return found
+
+
+def _no_camera(file: Path, camera: int, others: dict[int, str]) -> InputError:
+    """Return the error of a camera that images.txt names and that cannot be used."""
+    if camera not in others:
+        return InputError(f"{file} has no camera {camera}, which images.txt names; check both")
+    return InputError(
+        f"Camera {camera} of {file} has the model {others[camera]}, which is not read; try colmap "
+        "image_undistorter, whose cameras are PINHOLE, or --intrinsics FILE"
     )
 
 
@@ -138,7 +164,9 @@ def read_depth_map(path: Path) -> FloatArray:
     return np.where(known, values, 0.0)
 
 
-def _metres_a_unit(file: Path, frames: list[tuple[_Image, Path]], units_per_metre: float) -> float:
+def _metres_a_unit(
+    file: Path, frames: list[tuple[_Image, Path]], camera: CameraIntrinsics, units_per_metre: float
+) -> float:
     """Return the metres per unit of the model: median ratio of measured depth to depth of model points."""
     points = _points(file)
     ratios = [np.empty(0)]
@@ -151,7 +179,9 @@ def _metres_a_unit(file: Path, frames: list[tuple[_Image, Path]], units_per_metr
         z = (places @ image.T_camera_model[:3, :3].T + image.T_camera_model[:3, 3])[:, 2]
         units = read_depth_units(depth)
         height_px, width_px = units.shape
-        pixels = np.array([(y, x) for x, y, _ in seen]).astype(int)  # COLMAP's pixel 0 extends from 0 to 1
+        shares = height_px / camera.height_px, width_px / camera.width_px
+        places_px = np.array([(y, x) for x, y, _ in seen]) * shares
+        pixels = places_px.astype(int)  # COLMAP's pixel 0 extends from 0 to 1
         inside = ((pixels >= 0) & (pixels < (height_px, width_px))).all(axis=1) & (z > 0)
         measured = units[tuple(pixels[inside].T)] / units_per_metre
         ratios.append((measured / z[inside])[measured > 0])
@@ -164,28 +194,15 @@ def _metres_a_unit(file: Path, frames: list[tuple[_Image, Path]], units_per_metr
     return float(np.median(known))
 
 
-def _depth_camera(camera: CameraIntrinsics, depth: Path) -> CameraIntrinsics | None:
-    """Return the camera of a depth image smaller than its photograph; None if both have the same size."""
-    shape = read_depth_map(depth).shape if depth.suffix == ".bin" else read_depth_units(depth).shape
-    if shape == (camera.height_px, camera.width_px):
-        return None
-    smaller = scaled(camera, shape[1] / camera.width_px)
-    if (smaller.height_px, smaller.width_px) != shape:
-        raise InputError(
-            f"The depth image {depth} has {shape[1]} x {shape[0]} pixels, which is not the shape of its "
-            f"photograph, {camera.width_px} x {camera.height_px}; try depth of the same view"
-        )
-    return smaller
-
-
-def _cameras(file: Path) -> dict[int, CameraIntrinsics]:
-    """Read the cameras with supported models, by their ids."""
-    cameras, others = {}, set()
+def _cameras(file: Path) -> tuple[dict[int, CameraIntrinsics], dict[int, str]]:
+    """Read the cameras with supported models, and the names of the other models, by their ids."""
+    cameras, others = dict[int, CameraIntrinsics](), dict[int, str]()
     for line in _lines(file):
         words = line.split()
         names = _PARAMETERS.get(words[1] if len(words) > 1 else "")
         if names is None:
-            others.update(words[1:2])
+            if len(words) > 1 and words[0].isdigit():
+                others[int(words[0])] = words[1]
             continue
         (row,) = _numbers([words[0], *words[2:]], 3 + len(names), file)
         given = dict(zip(names, row[3:], strict=True))
@@ -193,14 +210,14 @@ def _cameras(file: Path) -> dict[int, CameraIntrinsics]:
         pinhole = CameraIntrinsics.pinhole(
             fx, fy, given["cx"] - CENTRE_PX, given["cy"] - CENTRE_PX, int(row[1]), int(row[2])
         )
-        distortion = np.array([given.get(name, 0.0) for name in _DISTORTION])
-        cameras[int(row[0])] = CameraIntrinsics(pinhole.matrix, distortion, int(row[1]), int(row[2]))
-    if not cameras:
-        raise InputError(
-            f"{file} has no camera that is read ({', '.join(sorted(others)) or 'none at all'}); try colmap "
-            "image_undistorter, whose cameras are PINHOLE"
-        )
-    return cameras
+        fisheye = words[1].endswith("FISHEYE")
+        lens = [given.get(name, 0.0) for name in (_FISHEYE_DISTORTION if fisheye else _DISTORTION)]
+        distortion = lens_of(FISHEYE if fisheye else "", np.array(lens))
+        assert distortion is not None  # all models of _PARAMETERS are supported
+        cameras[int(row[0])] = replace(pinhole, distortion=distortion, fisheye=fisheye)
+    if not cameras and not others:
+        raise InputError(f"{file} has no line of a camera; try to export the model again")
+    return cameras, others
 
 
 def _images(file: Path) -> Iterator[_Image]:
@@ -230,7 +247,7 @@ def _lines(file: Path) -> Iterator[str]:
 
 
 def _text(file: Path) -> str:
-    return read_bytes(file, MAX_GEOMETRY_BYTES, "part of a COLMAP model").decode("utf-8", "replace")
+    return text_in(read_bytes(file, MAX_GEOMETRY_BYTES, "part of a COLMAP model"), "replace")
 
 
 def _numbers(words: list[str], columns: int, file: Path) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from packetmesh.errors import InputError
 from pipeline.importing.colmap import read_depth_map
-from pipeline.importing.sequence import Sequence
+from pipeline.importing.sequence import Candidate, Sequence
 from pipeline.io.depth_scale import (
     FARTHEST_M,
     MILLIMETRES,
@@ -19,18 +20,44 @@ from pipeline.io.depth_scale import (
     likely_depth_scale,
     usual_scale,
 )
-from pipeline.io.images import ReadDepth, read_depth_values
-from pipeline.types import DepthMap
+from pipeline.io.images import ReadDepth, read_color, read_depth_values
+from pipeline.types import BoolArray, DepthMap
 
 _ROTATED_SHARE = 0.95
 
 
-def depth_in(path: Path, sequence: Sequence) -> ReadDepth:
-    """Read one depth image of a recording.
+def depth_in(candidate: Candidate, sequence: Sequence) -> ReadDepth:
+    """Read the depth image of a moment, without depth of low confidence.
 
     Raises:
         InputError: it cannot be read, or has no depth within 65 m.
     """
+    read = _depth_in(candidate.depth, sequence)
+    if candidate.confidence is None:
+        return read
+    low = _low_confidence(candidate.confidence, read.depth.z_m.shape)
+    z_m = np.where(low, np.float32(np.nan), read.depth.z_m)
+    if not np.isfinite(z_m).any():
+        raise InputError(
+            f"All depth in {candidate.depth} has low confidence by {candidate.confidence}; try to "
+            "remove the confidence images, so that all depth is kept"
+        )
+    return replace(read, depth=DepthMap(z_m))
+
+
+def _low_confidence(path: Path, shape: tuple[int, ...]) -> BoolArray:
+    """Return (H, W) True where a confidence image is 0."""
+    levels = read_color(path)[..., 0]
+    if levels.shape != shape:
+        raise InputError(
+            f"The confidence image {path} has {levels.shape[1]} x {levels.shape[0]} pixels and its depth "
+            f"image {shape[1]} x {shape[0]}; try to remove the confidence images, so that all depth is kept"
+        )
+    low: BoolArray = levels == 0
+    return low
+
+
+def _depth_in(path: Path, sequence: Sequence) -> ReadDepth:
     if path.suffix == ".bin":
         return depth_of(str(path), read_depth_map(path), sequence.units_per_metre, sequence.scale_stated)
     values = read_depth_values(path)

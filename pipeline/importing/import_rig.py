@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +16,9 @@ from pipeline.importing.choosing import choose
 from pipeline.importing.depth_units import depth_in
 from pipeline.importing.kinds import kind_of, recognise
 from pipeline.importing.rig_folder import NodeImages, new_folder, write_node
-from pipeline.importing.sequence import Candidate, Sequence
+from pipeline.importing.sequence import Candidate, Sequence, distinct
 from pipeline.io.images import read_color
+from pipeline.io.same_view import depth_camera_of, same_view_note
 from pipeline.kernels.geometry import rigid
 from pipeline.types import MAX_NODES, AnyPath, FloatArray
 
@@ -90,15 +91,18 @@ def iterate_import(
         raise InputError(f"{out} is there already; try another name for the rig")
     if is_bag(Path(path)):
         if intrinsics is not None:
-            raise InputError(f"The bag {path} has recorded its own cameras; try without intrinsics")
+            raise InputError(
+                f"The cameras of the bag {path} are read from its camera_info; try without intrinsics"
+            )
         return (yield from _from_bag(Path(path), out, frames, depth_scale))
     kind, folder = recognise(Path(path))
     yield Progress("files", 0.0)
     sequence = kind.read(folder, None if intrinsics is None else Path(intrinsics))
     if depth_scale is not None:
         sequence = sequence.with_scale(depth_scale)
+    sequence = replace(sequence, candidates=distinct(sequence.candidates))
     yield Progress("choice of frames", 0.2)
-    middle = depth_in(sequence.candidates[len(sequence.candidates) // 2].depth, sequence)
+    middle = depth_in(sequence.candidates[len(sequence.candidates) // 2], sequence)
     chosen = choose(sequence, frames, float(np.nanmedian(middle.depth.z_m)))
     written = []
     with new_folder(out) as folder_of_rig:
@@ -109,7 +113,7 @@ def iterate_import(
             node = _node_of(candidate, sequence, T_up_world)
             write_node(folder_of_rig / f"node_{done:02d}", node)
             written.append(ImportedFrame.of(node, done, candidate.time_s))
-    notes = [*sequence.notes, *middle.notes]
+    notes = [*sequence.notes, *middle.notes, *_same_view_notes(sequence, node)]
     if T_up_world is not None:
         notes.append("The world was turned so that z is up")
     if len(chosen) < min(frames, len(sequence.candidates)):
@@ -139,6 +143,13 @@ def _from_bag(
     return ImportReport("bag", str(path), bag.candidates, bag.units_per_metre, tuple(written), notes)
 
 
+def _same_view_notes(sequence: Sequence, node: NodeImages) -> tuple[str, ...]:
+    """Return a sentence if the depth camera is not the recording's own but the colour camera, resized."""
+    if sequence.depth_camera is not None or node.depth_camera is None:
+        return ()
+    return (same_view_note(node.camera, node.depth_camera),)
+
+
 def _scale_note(written: list[ImportedFrame], units_per_metre: float) -> str:
     """Return a sentence on the depth scale."""
     median_m = float(np.median([frame.median_depth_m for frame in written]))
@@ -147,15 +158,22 @@ def _scale_note(written: list[ImportedFrame], units_per_metre: float) -> str:
 
 def _node_of(candidate: Candidate, sequence: Sequence, T_up_world: FloatArray | None) -> NodeImages:
     T = candidate.T_world_camera
+    camera = candidate.camera or sequence.camera
+    rgb, depth = read_color(candidate.color), depth_in(candidate, sequence).depth
+    depth_camera, T_color_depth = sequence.depth_camera, sequence.T_color_depth
+    if depth_camera is None and rgb.shape[:2] == (camera.height_px, camera.width_px):
+        remedy = "try a recording whose depth shows the view of its colour images"
+        depth_camera = depth_camera_of(camera, depth.z_m.shape, candidate.depth, candidate.color, remedy)
+        T_color_depth = None if depth_camera is None else np.eye(4)
     return NodeImages(
         str(candidate.color),
         str(candidate.depth),
-        read_color(candidate.color),
-        depth_in(candidate.depth, sequence).depth,
-        sequence.camera,
+        rgb,
+        depth,
+        camera,
         T if T is None or T_up_world is None else T_up_world @ T,
-        sequence.depth_camera,
-        sequence.T_color_depth,
+        depth_camera,
+        T_color_depth,
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from packetmesh.errors import InputError
-from pipeline.importing import colmap, numbered, tum
+from pipeline.importing import arkit, associated, colmap, numbered, stray, tum
 from pipeline.importing.sequence import Sequence
 
 
@@ -19,7 +19,7 @@ class Kind:
     looks_like: str
     """Description of its folder for users."""
     recognised: Callable[[Path], bool]
-    """Returns whether a folder is of this kind, from the names of its files alone."""
+    """Returns whether a folder is of this kind, from its files."""
     read: Callable[[Path, Path | None], Sequence]
     """Reads the frames of a folder; the second argument is an intrinsics file given by the user."""
 
@@ -38,6 +38,17 @@ KINDS = (
         "sparse/{cameras,images,points3D}.txt with images/ and stereo/depth_maps/ or depth/",
         colmap.is_colmap,
         colmap.read_colmap,
+    ),
+    Kind(
+        "Stray Scanner", "rgb/, depth/, camera_matrix.csv and odometry.csv", stray.is_stray, stray.read_stray
+    ),
+    Kind("Polycam", "keyframes/ with images/, cameras/ and depth/", arkit.is_polycam, arkit.read_polycam),
+    Kind("Record3D", "metadata.json, rgb/ and depth/ of EXR images", arkit.is_record3d, arkit.read_record3d),
+    Kind(
+        "ICL-NUIM or ORB-SLAM",
+        "associations.txt with rgb/ and depth/",
+        associated.is_associated,
+        associated.read_associated,
     ),
     Kind("SUN RGB-D", "image/, depth_bfx/ and intrinsics.txt", numbered.is_sunrgbd, numbered.read_sunrgbd),
     Kind(
@@ -59,7 +70,10 @@ def recognise(path: Path) -> tuple[Kind, Path]:
     if not path.exists():
         raise InputError(f"{path} does not exist; check the path")
     if not path.is_dir():
-        raise InputError(f"{path} is a file but no bag; try the folder of an unpacked recording: {_known()}")
+        raise InputError(
+            f"{path} is a file not named .bag, .db3 or .mcap; try the folder of an unpacked recording: "
+            f"{_known()}"
+        )
     kind = kind_of(path)
     if kind is not None:
         return kind, path

@@ -64,12 +64,12 @@ def write_node(folder: Path, node: NodeImages) -> None:
     Raises:
         InputError: images and cameras differ in size, or the folder cannot be written.
     """
-    _check_size("intrinsics", (node.camera.height_px, node.camera.width_px), node.color_name, node.rgb.shape)
+    _check_size("camera", (node.camera.height_px, node.camera.width_px), node.color_name, node.rgb.shape)
     if node.depth_camera is None or node.T_color_depth is None:
         _check_size(f"depth {node.depth_name}", node.depth.z_m.shape, node.color_name, node.rgb.shape)
     else:
         shape = (node.depth_camera.height_px, node.depth_camera.width_px)
-        _check_size("depth camera's intrinsics", shape, node.depth_name, node.depth.z_m.shape)
+        _check_size("depth camera", shape, node.depth_name, node.depth.z_m.shape)
         write_intrinsics(folder / FILES["depth_intrinsics"], node.depth_camera)
         write_extrinsics(folder / FILES["extrinsics"], node.T_color_depth)
     write_color(folder / "color.png", node.rgb)
@@ -83,5 +83,5 @@ def _check_size(what: str, shape: tuple[int, ...], of_what: str, of_shape: tuple
     if shape != of_shape[:2]:
         raise InputError(
             f"The {what} has {shape[1]} x {shape[0]} pixels but {of_what} has {of_shape[1]} x {of_shape[0]}; "
-            "try a recording whose depth is registered to the colour images"
+            "try a recording whose images all have the size of their camera"
         )

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from packetmesh.errors import InputError
 from packetmesh.files import path_below
+from pipeline.importing.found_poses import FoundPoses
+from pipeline.io.poses import rounding_note
 from pipeline.kernels.geometry import rigid
 from pipeline.types import CameraIntrinsics, FloatArray
 
@@ -23,6 +25,10 @@ class Candidate:
     T_world_camera: FloatArray | None = None
     """(4, 4) pose of the colour camera, metres."""
     time_s: float | None = None
+    camera: CameraIntrinsics | None = None
+    """Colour camera of this moment, if it differs from moment to moment."""
+    confidence: Path | None = None
+    """Image of the depth image's size that is 0 where the sensor has low confidence in its depth."""
 
     def enlarged(self, factor: float) -> Candidate:
         """Return the candidate with its position multiplied by ``factor``."""
@@ -79,12 +85,41 @@ def named_inside(folder: Path, name: str, file: str) -> Path:
         raise InputError(f"{file} in {folder} names {name}, which is outside; check the file") from None
 
 
-def posed(candidates: list[Candidate], what: str) -> tuple[tuple[Candidate, ...], tuple[str, ...]]:
-    """Return the candidates with a pose and a note on those left out, or all if none has a pose."""
+def distinct(candidates: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
+    """Return the candidates without those whose colour or depth image an earlier one already has."""
+    seen: set[Path] = set()
+    found = []
+    for candidate in candidates:
+        if not seen & {candidate.color, candidate.depth}:
+            found.append(candidate)
+            seen |= {candidate.color, candidate.depth}
+    return tuple(found)
+
+
+def posed(
+    candidates: list[Candidate], what: str, poses: FoundPoses | None = None
+) -> tuple[tuple[Candidate, ...], tuple[str, ...]]:
+    """Return the candidates with a pose, or all if none has one, and notes on their poses.
+
+    Args:
+        candidates: the frames of a recording.
+        what: description of the missing pose, for the note.
+        poses: how the poses were read; None means that all that exist were usable.
+    """
+    refused, lost = (poses.refused, poses.lost) if poses else ((), 0)
     known = [candidate for candidate in candidates if candidate.T_world_camera is not None]
     if not known:
-        note = f"No {what}: poses are not known; reconstruct looks for them"
-        return tuple(candidates), (note,)
-    lost = len(candidates) - len(known)
-    note = f"{lost} of {len(candidates)} frames have no pose and were left out"
-    return tuple(known), (note,) if lost else ()
+        why = f"No {what}"
+        if refused:
+            why = f"{refused[0]}{f' (and {len(refused) - 1} more)' if len(refused) > 1 else ''}"
+        elif lost:
+            why = f"Every {what} holds numbers that are not finite, as where tracking was lost"
+        return tuple(candidates), (f"{why}: poses are not known; reconstruct looks for them",)
+    left_out = len(candidates) - len(known)
+    notes = []
+    if left_out:
+        why = f"; {refused[0]}" if refused else ""
+        notes.append(f"{left_out} of {len(candidates)} frames have no pose and were left out{why}")
+    if poses:
+        notes += rounding_note("The rotation of a pose", poses.departure)
+    return tuple(known), tuple(notes)

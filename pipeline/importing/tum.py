@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
-from packetmesh.files import MAX_TEXT_BYTES, read_bytes
+from packetmesh.files import MAX_TEXT_BYTES, read_bytes, text_in
 from pipeline.importing.cameras import PRIMESENSE, camera_of
 from pipeline.importing.sequence import Candidate, Sequence, named_inside, posed
 from pipeline.kernels.geometry import rigid
@@ -43,10 +43,11 @@ def read_tum(folder: Path, intrinsics: Path | None) -> Sequence:
     pairs = associate(rgb_s, depth_s)
     if not pairs:
         raise InputError(
-            f"No images in {folder} are less than {1000 * LARGEST_GAP_S:g} ms apart in rgb.txt and "
-            "depth.txt; check that both clocks are the same"
+            f"Of the {len(pictures)} images in {folder / 'rgb.txt'} and the {len(depths)} in depth.txt "
+            f"no two are less than {1000 * LARGEST_GAP_S:g} ms apart; check that their clocks agree"
         )
-    poses = _poses(folder / "groundtruth.txt", rgb_s)
+    truth = folder / "groundtruth.txt"
+    poses = poses_at(truth, rgb_s)
     candidates, notes = posed(
         [
             Candidate(
@@ -57,9 +58,9 @@ def read_tum(folder: Path, intrinsics: Path | None) -> Sequence:
             )
             for i, j in pairs
         ],
-        "pose in groundtruth.txt at the time of an image",
+        f"pose in {truth.name} at the time of an image" if truth.is_file() else truth.name,
     )
-    camera, assumed = camera_of(folder, candidates[0].color, intrinsics, *_known_camera(folder))
+    camera, assumed = camera_of(folder, candidates[0].color, intrinsics, *known_camera(folder))
     return Sequence(candidates, camera, UNITS_PER_METRE, notes=(*assumed, *notes))
 
 
@@ -90,14 +91,14 @@ def listed(file: Path) -> tuple[FloatArray, list[str]]:
     Raises:
         InputError: a line is not a time and a file.
     """
-    rows = _rows(file, "list of a TUM sequence", 1, "a time in seconds and a file")
+    rows = rows_in(file, "list of a TUM sequence", 1, "a time in seconds and a file")
     return np.array([time_s for time_s, _ in rows]), [words[0] for _, words in rows]
 
 
-def _rows(file: Path, what: str, least: int, form: str) -> list[tuple[float, list[str]]]:
+def rows_in(file: Path, what: str, least: int, form: str) -> list[tuple[float, list[str]]]:
     """Return time and words of each line, sorted by time."""
     rows = []
-    text = read_bytes(file, 100 * MAX_TEXT_BYTES, what).decode("utf-8", "replace")
+    text = text_in(read_bytes(file, 100 * MAX_TEXT_BYTES, what), "replace")
     for line in text.splitlines():
         if not line.strip() or line.startswith("#"):
             continue
@@ -113,11 +114,11 @@ def _rows(file: Path, what: str, least: int, form: str) -> list[tuple[float, lis
     return rows
 
 
-def _poses(file: Path, wanted_s: FloatArray) -> dict[int, FloatArray]:
+def poses_at(file: Path, wanted_s: FloatArray) -> dict[int, FloatArray]:
     """Return T_world_camera by the index of each of (N,) times that has a pose at most 20 ms away."""
     if not file.is_file():
         return {}
-    rows = _rows(file, "trajectory", 7, "a time, tx ty tz in metres and a quaternion qx qy qz qw")
+    rows = rows_in(file, "trajectory", 7, "a time, tx ty tz in metres and a quaternion qx qy qz qw")
     times_s = np.array([time_s for time_s, _ in rows])
     try:
         values = np.array([words[:7] for _, words in rows], dtype=np.float64).reshape(-1, 7)
@@ -133,7 +134,8 @@ def _poses(file: Path, wanted_s: FloatArray) -> dict[int, FloatArray]:
     return found
 
 
-def _known_camera(folder: Path) -> tuple[CameraIntrinsics, str]:
+def known_camera(folder: Path) -> tuple[CameraIntrinsics, str]:
+    """Return the camera of a TUM sequence by its folder's name, else a Kinect's, and what to call it."""
     series = re.search(r"(?:freiburg|fr)([123])(?!\d)", folder.resolve().name)
     if series is None:
         return PRIMESENSE, "a Kinect's from the factory"

@@ -15,12 +15,13 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path
+from pipeline.io.lenses import is_fisheye_name, ros_name
 from pipeline.types import AnyPath, CameraIntrinsics
 
 COLMAP_MIDDLE, MATLAB_MIDDLE = 0.5, 1.0
 """Coordinate of the first pixel's centre."""
-_COLMAP = re.compile(r"^\s*\d+\s+(PINHOLE|OPENCV|FULL_OPENCV)\s+(.*)$", re.MULTILINE)
-_COLMAP_NUMBERS = {"PINHOLE": 4, "OPENCV": 8, "FULL_OPENCV": 12}
+_COLMAP = re.compile(r"^\s*\d+\s+(PINHOLE|OPENCV|FULL_OPENCV|OPENCV_FISHEYE)\s+(.*)$", re.MULTILINE)
+_COLMAP_NUMBERS = {"PINHOLE": 4, "OPENCV": 8, "FULL_OPENCV": 12, "OPENCV_FISHEYE": 8}
 """Number of parameters after the image size."""
 _FISHEYE = re.compile(r"\bequidistant\b|\bOPENCV_FISHEYE\b|^fisheye_model:\s*1", re.MULTILINE)
 _KALIBR = re.compile(r"^\s+(intrinsics|distortion_coeffs|resolution):\s*\[([^\]]*)\]", re.MULTILINE)
@@ -31,13 +32,14 @@ _MATLAB = re.compile(
 
 
 def opencv_yaml(camera: CameraIntrinsics) -> str:
-    """Return the camera in the YAML of ``cv2.FileStorage``, which programs that use OpenCV read."""
+    """Return the camera in the YAML of ``cv2.FileStorage``, a fisheye marked as in its sample."""
     return "\n".join(
         (
             "%YAML:1.0",
             "---",
             f"image_width: {camera.width_px}",
             f"image_height: {camera.height_px}",
+            *(("fisheye_model: 1",) if camera.fisheye else ()),
             *opencv_matrix("camera_matrix", camera.matrix),
             *opencv_matrix("distortion_coefficients", camera.distortion[None]),
             "",
@@ -71,7 +73,7 @@ def camera_info(camera: CameraIntrinsics) -> str:
             f"image_height: {camera.height_px}",
             "camera_name: camera",
             *ros_matrix("camera_matrix", camera.matrix),
-            "distortion_model: plumb_bob",
+            f"distortion_model: {ros_name(camera)}",
             *ros_matrix("distortion_coefficients", camera.distortion[None]),
             *ros_matrix("rectification_matrix", np.eye(3)),
             *ros_matrix("projection_matrix", np.column_stack([camera.matrix, np.zeros(3)])),
@@ -86,7 +88,7 @@ def open3d_json(camera: CameraIntrinsics) -> str:
     Raises:
         InputError: the camera has distortion: its images must be undistorted first.
     """
-    _refuse(camera, camera.distortion, "Open3D's file", "undistort the images first")
+    _refuse(camera, camera.fisheye or camera.distortion, "Open3D's file", "undistort the images first")
     values = {
         "width": camera.width_px,
         "height": camera.height_px,
@@ -96,11 +98,17 @@ def open3d_json(camera: CameraIntrinsics) -> str:
 
 
 def colmap_text(camera: CameraIntrinsics) -> str:
-    """Return a cameras.txt with one camera: OPENCV, or FULL_OPENCV if k3 is not 0."""
+    """Return a cameras.txt with one camera: OPENCV, FULL_OPENCV with k3 or more, or OPENCV_FISHEYE.
+
+    Raises:
+        InputError: the lens has a thin prism or a tilted sensor.
+    """
+    _refuse(camera, camera.distortion[8:], "COLMAP's file", "calibrate with the lens 'rational'")
     places = (camera.fx_px, camera.fy_px, camera.cx_px + COLMAP_MIDDLE, camera.cy_px + COLMAP_MIDDLE)
-    whole = bool(camera.distortion[4])
-    model = "FULL_OPENCV" if whole else "OPENCV"
-    numbers = (*places, *camera.distortion[:4], *((camera.distortion[4], 0.0, 0.0, 0.0) if whole else ()))
+    whole = bool(np.any(camera.distortion[4:]))
+    lens = np.pad(camera.distortion, (0, 3))[: 8 if whole else 4]
+    model = "OPENCV_FISHEYE" if camera.fisheye else "FULL_OPENCV" if whole else "OPENCV"
+    numbers = (*places, *lens)
     return (
         "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n"
         f"1 {model} {camera.width_px} {camera.height_px} {listed(np.array(numbers), ' ')}\n"
@@ -108,7 +116,7 @@ def colmap_text(camera: CameraIntrinsics) -> str:
 
 
 def kalibr_yaml(camera: CameraIntrinsics) -> str:
-    """Return Kalibr's camchain of one camera with the distortion model radtan, which has no k3.
+    """Return Kalibr's camchain of one camera: equidistant if a fisheye, else radtan, which has no k3.
 
     Raises:
         InputError: the camera's k3 is not 0.
@@ -118,15 +126,22 @@ def kalibr_yaml(camera: CameraIntrinsics) -> str:
     return (
         "cam0:\n  camera_model: pinhole\n"
         f"  intrinsics: [{listed(places)}]\n"
-        "  distortion_model: radtan\n"
+        f"  distortion_model: {'equidistant' if camera.fisheye else 'radtan'}\n"
         f"  distortion_coeffs: [{listed(camera.distortion[:4])}]\n"
         f"  resolution: [{camera.width_px}, {camera.height_px}]\n"
     )
 
 
 def matlab_text(camera: CameraIntrinsics) -> str:
-    """Return the properties of MATLAB's cameraIntrinsics, one per line."""
-    k1, k2, p1, p2, k3 = camera.distortion
+    """Return the properties of MATLAB's cameraIntrinsics, one per line.
+
+    Raises:
+        InputError: the lens is rational or a fisheye.
+    """
+    _refuse(
+        camera, camera.fisheye or camera.distortion[5:], "MATLAB's file", "calibrate with the lens 'brown'"
+    )
+    k1, k2, p1, p2, k3 = camera.distortion[:5]
     middle = np.array([camera.cx_px, camera.cy_px]) + MATLAB_MIDDLE
     radial = (k1, k2, k3) if k3 else (k1, k2)
     return (
@@ -162,9 +177,9 @@ def write_camera(path: AnyPath, camera: CameraIntrinsics, kind: str) -> None:
         sibling.write_text(text)
 
 
-def is_fisheye(text: str) -> bool:
-    """Return whether a camera file describes a fisheye lens, which the reconstruction does not support."""
-    return _FISHEYE.search(text) is not None
+def is_fisheye(text: str, model: str) -> bool:
+    """Return whether a camera file, or the distortion model that it names, is that of a fisheye lens."""
+    return is_fisheye_name(model) or _FISHEYE.search(text) is not None
 
 
 def camera_in(text: str) -> CameraIntrinsics | None:
@@ -226,7 +241,9 @@ def listed(values: np.ndarray, between: str = ", ") -> str:
     return between.join(repr(float(value)) for value in values)
 
 
-def _refuse(camera: CameraIntrinsics, lens: np.ndarray, what: str, instead: str) -> None:
+def _refuse(camera: CameraIntrinsics, lens: np.ndarray | bool, what: str, instead: str) -> None:
     if np.any(lens):
         told = ", ".join(f"{value:.4g}" for value in camera.distortion)
-        raise InputError(f"{what} cannot hold k1, k2, p1, p2, k3 = {told}; {instead}")
+        names = "a fisheye of k1, k2, k3, k4" if camera.fisheye else "k1, k2, p1, p2, k3"
+        names += ", k4 and so on" if len(camera.distortion) > 5 else ""
+        raise InputError(f"{what} cannot hold {names} = {told}; {instead}")

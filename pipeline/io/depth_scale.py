@@ -106,11 +106,16 @@ def check_median(path: AnyPath, values: NDArray[Any], depth_scale: float) -> Non
 
 
 def likely_depth_scale(median_units: float) -> float:
-    """Return the common depth scale that brings the median nearest to 2 m, if possible within room size."""
+    """Return the common depth scale that brings the median nearest to 2 m, within room size.
+
+    If none does, it is the scale, to one digit, that makes the median about 2 m.
+    """
     nearest_m, farthest_m = ROOM_M
     rooms = [scale for scale in COMMON_DEPTH_SCALES if nearest_m <= median_units / scale <= farthest_m]
     typical_scale = median_units / _TYPICAL_DEPTH_M
-    return min(rooms or COMMON_DEPTH_SCALES, key=lambda scale: abs(np.log(scale / typical_scale)))
+    if not rooms:
+        return float(f"{typical_scale:.0e}")
+    return min(rooms, key=lambda scale: abs(np.log(scale / typical_scale)))
 
 
 def _try(median_units: float) -> str:

@@ -12,17 +12,21 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, json_object, read_text
 from pipeline.io.camera_files import camera_in, is_fisheye
+from pipeline.io.lenses import FISHEYE, KNOWN, is_known, lens_of
 from pipeline.types import AnyPath, CameraIntrinsics, FloatArray
 
-_BROWN_CONRADY = {"", "plumb_bob", "rational_polynomial"}
-"""Distortion models whose first five coefficients are k1, k2, p1, p2, k3."""
 FOCAL_LENGTHS = (0.05, 100.0)
 """Least and largest focal length in image widths or heights: angles of view of 169 and half a degree."""
 MOST_DISTORTION = 1e4
 _YAML_ENTRY = re.compile(r"^([ \t]*)(\w+):(.*(?:\n(?![ \t]*\w+:).*)*)", re.MULTILINE)
+_MODEL = re.compile(r"^[ \t]+distortion_model:\s*[\"']?(\w+)", re.MULTILINE)
+"""Kalibr's distortion model, which is that of one of several cameras."""
+_SIZES = {"width", "height", "image_width", "image_height"}
 _LIST = re.compile(r"\[[^\]]*\]")
 _WORDS = re.compile(r"\s*[^\s#%.-]")
 """A line that is neither empty nor a comment, a list item or the end of a document."""
+_BETWEEN = re.compile(r"[,;\[\]()]")
+"""Marks between the numbers of a bare matrix."""
 _NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?(?![\w.])")
 
 
@@ -32,11 +36,11 @@ def read_intrinsics(path: AnyPath, size_px: tuple[int, int] | None = None) -> Ca
     Formats: ``width height fx fy cx cy [distortion]``; Open3D's column-major ``intrinsic_matrix``;
     ROS's camera_info (``K``, ``D``) or the calibration file of OpenCV and ROS (``camera_matrix``,
     ``distortion_coefficients``); files of COLMAP, Kalibr and MATLAB (``pipeline.io.camera_files``); or a
-    bare matrix, 3 x 3 or 4 x 4 numbers, if the image size is known.
+    bare matrix, 3 x 3 or 4 x 4 numbers, if the image size is known. Lenses: all of ``CameraIntrinsics``.
 
     Args:
         path: the file.
-        size_px: width and height of the images, needed for a bare matrix.
+        size_px: width and height of the images, for a bare matrix or a file without a size.
 
     Raises:
         InputError: the file is unreadable, of no known format, or has impossible values.
@@ -45,29 +49,45 @@ def read_intrinsics(path: AnyPath, size_px: tuple[int, int] | None = None) -> Ca
     numbers = _bare_numbers(text)
     if numbers is not None and numbers.size in (9, 16):
         return _in_matrix(path, numbers, size_px)
-    if is_fisheye(text):
-        raise InputError(
-            f"The intrinsics file {path} has the distortion model equidistant, that of a fisheye lens; try a "
-            "calibration with plumb_bob, which has five coefficients, or undistort the images first"
-        )
     is_json = text.lstrip().startswith("{")
     try:
         values = json_object(text, path, "intrinsics file") if is_json else _parse_yaml(text)
-        camera = _from_keys(values) or camera_in(text)
+        camera = _from_keys(values, size_px) or camera_in(text)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError):
         camera = None
     if camera is None:
         raise InputError(
             f"The intrinsics file {path} is of no known style; try JSON with width, height, fx, fy, cx and cy"
         )
-    _check(path, camera, str(values.get("distortion_model", "")))
-    return replace(camera, distortion=camera.distortion[:5])
+    camera = _with_lens(path, camera, text, str(values.get("distortion_model", "")))
+    check_camera(f"The intrinsics file {path}", camera)
+    return camera
+
+
+def _with_lens(path: AnyPath, camera: CameraIntrinsics, text: str, model: str) -> CameraIntrinsics:
+    """Return the camera with the lens that its file names, or that its number of coefficients tells.
+
+    Raises:
+        InputError: the lens is not supported.
+    """
+    named = _MODEL.search(text)
+    model = FISHEYE if is_fisheye(text, model) else model or (named[1] if named else "")
+    lens = lens_of(model, camera.distortion)
+    if lens is None:
+        count = f"of {len(camera.distortion)} coefficients" if is_known(model) else ""
+        what = " ".join(word for word in ("the distortion model", model, count) if word)
+        raise InputError(f"The intrinsics file {path} has {what}; try a calibration with {KNOWN}")
+    return replace(camera, distortion=lens, fisheye=model == FISHEYE)
 
 
 def _bare_numbers(text: str) -> FloatArray | None:
-    """Return the (N,) numbers of a text that has only numbers, separated by blanks or commas; else None."""
+    """Return the (N,) numbers of a text that has only numbers and comments; else None.
+
+    The numbers are separated by blanks, commas, semicolons or brackets.
+    """
+    lines = (line.split("#")[0] for line in text.splitlines())
     try:
-        return np.array(text.replace(",", " ").split(), dtype=np.float64)
+        return np.array(_BETWEEN.sub(" ", " ".join(lines)).split(), dtype=np.float64)
     except ValueError:
         return None
 
@@ -77,8 +97,10 @@ def _in_matrix(path: AnyPath, numbers: FloatArray, size_px: tuple[int, int] | No
     side = 3 if numbers.size == 9 else 4
     matrix = numbers.reshape(side, side)[:3, :3]
     if not (np.isfinite(matrix).all() and matrix[0, 0] > 0 and matrix[1, 1] > 0 and matrix[2, 2] == 1):
+        rows = "; ".join(" ".join(f"{value:g}" for value in row) for row in matrix)
         raise InputError(
-            f"The intrinsics file {path} holds no camera matrix; try fx 0 cx, 0 fy cy, 0 0 1 in pixels"
+            f"The intrinsics file {path} holds the matrix {rows}, no camera matrix; try fx 0 cx, "
+            "0 fy cy, 0 0 1 in pixels, fx and fy positive"
         )
     if size_px is None:
         raise InputError(
@@ -87,17 +109,17 @@ def _in_matrix(path: AnyPath, numbers: FloatArray, size_px: tuple[int, int] | No
         )
     fx, fy, cx, cy = matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
     camera = CameraIntrinsics.pinhole(fx, fy, cx, cy, *size_px)
-    _check(path, camera, "")
+    check_camera(f"The intrinsics file {path}", camera)
     return camera
 
 
 def write_intrinsics(path: AnyPath, intrinsics: CameraIntrinsics) -> None:
-    """Write ``width height fx fy cx cy distortion`` as JSON, exact to the last bit.
+    """Write ``width height fx fy cx cy distortion`` as JSON, exact to the last bit; a fisheye is named.
 
     Raises:
         InputError: the folder cannot be written.
     """
-    values = {
+    values: dict[str, Any] = {
         "width": intrinsics.width_px,
         "height": intrinsics.height_px,
         "fx": intrinsics.fx_px,
@@ -106,6 +128,8 @@ def write_intrinsics(path: AnyPath, intrinsics: CameraIntrinsics) -> None:
         "cy": intrinsics.cy_px,
         "distortion": intrinsics.distortion.tolist(),
     }
+    if intrinsics.fisheye:
+        values["distortion_model"] = FISHEYE
     with atomic_path(path) as sibling:
         sibling.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n")
 
@@ -134,8 +158,10 @@ def _parse_yaml(text: str) -> dict[str, Any]:
     return values
 
 
-def _from_keys(values: dict[str, Any]) -> CameraIntrinsics | None:
+def _from_keys(values: dict[str, Any], size_px: tuple[int, int] | None) -> CameraIntrinsics | None:
     """Return the camera with all its distortion coefficients, at least five; None for an unknown format.
+
+    Its images have the size ``size_px`` if the file does not give one.
 
     Raises:
         KeyError, TypeError, ValueError, OverflowError: a value is missing or invalid.
@@ -155,7 +181,10 @@ def _from_keys(values: dict[str, Any]) -> CameraIntrinsics | None:
         return None
     coefficients = np.array([] if distortion is None else _data(distortion), dtype=np.float64).reshape(-1)
     coefficients = np.pad(coefficients, (0, max(0, 5 - len(coefficients))))
-    width, height = (values.get(f"image_{key}") or values[key] for key in ("width", "height"))
+    if size_px is not None and not _SIZES & values.keys():
+        width, height = size_px
+    else:
+        width, height = (values.get(f"image_{key}") or values[key] for key in ("width", "height"))
     return CameraIntrinsics(matrix, coefficients, int(width), int(height))
 
 
@@ -173,18 +202,13 @@ def _data(value: Any) -> Any:
     return numbers
 
 
-def _check(path: AnyPath, camera: CameraIntrinsics, distortion_model: str) -> None:
-    """Raise an InputError for impossible values."""
+def check_camera(name: str, camera: CameraIntrinsics) -> None:
+    """Raise an InputError, which begins with ``name``, for impossible values."""
 
     def wrong(what: str, hint: str) -> InputError:
-        return InputError(f"The intrinsics file {path} has {what}; try {hint}")
+        return InputError(f"{name} has {what}; try {hint}")
 
     matrix = camera.matrix
-    if distortion_model not in _BROWN_CONRADY or np.any(camera.distortion[5:]):
-        model = distortion_model or f"of {len(camera.distortion)} coefficients"
-        raise wrong(
-            f"the distortion model {model}", "a calibration with plumb_bob, which has five coefficients"
-        )
     if not (np.isfinite(matrix).all() and np.isfinite(camera.distortion).all()):
         raise wrong("values that are not finite numbers", "to calibrate again")
     if camera.width_px < 1 or camera.height_px < 1:

@@ -2,47 +2,121 @@
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, read_text
+from pipeline.kernels.geometry import rigid
 from pipeline.types import AnyPath, FloatArray
 
-_RIGID_TOLERANCE = 1e-4
+_log = logging.getLogger(__name__)
+EXACT, NOTED, LARGEST = 1e-4, 1e-3, 1e-2
+"""Departure from a rotation (``departure``) up to which a matrix is kept as it is, is replaced by the nearest
+rotation without a note, and is replaced with a note. Recordings are orthonormal to about 5e-4."""
 
 
 def read_pose(path: AnyPath) -> FloatArray:
-    """Read a (4, 4) rigid transform from a text file.
+    """Read a (4, 4) rigid transform as ``read_pose_noted`` does, and log the note."""
+    T, notes = read_pose_noted(path)
+    for note in notes:
+        _log.warning("%s", note)
+    return T
+
+
+def read_pose_noted(path: AnyPath) -> tuple[FloatArray, tuple[str, ...]]:
+    """Read a (4, 4) rigid transform from a text file of 16 numbers, row by row, and a note on its rotation.
+
+    A matrix that is not quite a rotation is replaced by the nearest rotation (``nearest_rigid``).
 
     Raises:
         InputError: the file does not contain sixteen numbers that form a rotation and a translation.
     """
+    T = _matrix_in(path)
+    if not np.isfinite(T).all():
+        raise InputError(
+            f"The pose file {path} holds 4 x 4 numbers that are not all finite; try a pose with finite "
+            "numbers, or remove the file if the pose is not known"
+        )
+    nearest = nearest_rigid(T)
+    if nearest is None:
+        raise InputError(
+            f"The pose file {path} is not a rigid transform: {why_not_rigid(T)}; try a rotation and a "
+            "translation in metres, with 0 0 0 1 as the last line"
+        )
+    return nearest, rounding_note(f"The rotation in {path}", departure(T))
+
+
+def _matrix_in(path: AnyPath) -> FloatArray:
     rows = [
         line.split("#")[0].replace(",", " ").split() for line in read_text(path, "pose file").splitlines()
     ]
+    filled = [row for row in rows if row]
     try:
-        T = np.array([row for row in rows if row], dtype=np.float64)
+        if len(filled) == 1:
+            return np.array(filled[0], dtype=np.float64).reshape(4, 4)
+        T = np.array(filled, dtype=np.float64)
     except ValueError:
         T = np.empty(0)
-    if T.shape != (4, 4) or not np.isfinite(T).all():
-        raise InputError(f"The pose file {path} does not hold 4 x 4 numbers; try four lines of four numbers")
-    if rigid_or_none(T) is None:
+    if T.shape != (4, 4):
+        counts = ", ".join(str(len(row)) for row in filled[:6]) or "0"
         raise InputError(
-            f"The pose file {path} is not a rigid transform; try a rotation and a translation in metres, "
-            "with 0 0 0 1 as the last line"
+            f"The pose file {path} does not hold 4 x 4 numbers but lines of {counts} words; try four lines "
+            "of four numbers"
         )
     return T
 
 
-def rigid_or_none(T: FloatArray) -> FloatArray | None:
-    """Return ``T`` if it is a (4, 4) rotation and translation, else None."""
-    if T.shape != (4, 4) or not np.isfinite(T).all():
+def departure(T: FloatArray) -> float:
+    """Return how far the rotation of a (4, 4) transform is from orthonormal: the largest entry of
+    |R R^T - 1|."""
+    rotation = T[:3, :3]
+    return float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+
+
+def nearest_rigid(T: FloatArray) -> FloatArray | None:
+    """Return a (4, 4) transform with the nearest rotation, in the Frobenius norm, in place of its 3 x 3 part.
+
+    A rotation that is orthonormal to ``EXACT`` is kept to the last bit. Returns None if the matrix departs
+    from orthonormal by more than ``LARGEST``, mirrors, is not finite, or does not end in 0 0 0 1.
+    """
+    if T.shape != (4, 4) or not np.isfinite(T).all() or not np.allclose(T[3], (0, 0, 0, 1), atol=1e-6):
         return None
     rotation = T[:3, :3]
-    orthonormal = np.allclose(rotation @ rotation.T, np.eye(3), atol=_RIGID_TOLERANCE)
-    if not orthonormal or np.linalg.det(rotation) < 0 or not np.allclose(T[3], (0, 0, 0, 1)):
+    if np.linalg.det(rotation) < 0:
         return None
-    return T
+    if np.allclose(rotation @ rotation.T, np.eye(3), atol=EXACT):
+        return T
+    if departure(T) > LARGEST:
+        return None
+    left, _, right = np.linalg.svd(rotation)
+    return rigid(left @ right, T[:3, 3])
+
+
+def rounding_note(what: str, off: float) -> tuple[str, ...]:
+    """Return a note on a rotation that departs from orthonormal by more than ``NOTED``, else nothing."""
+    if off <= NOTED:
+        return ()
+    return (f"{what} is orthonormal only to {off:.1g}; the nearest rotation was taken",)
+
+
+def why_not_rigid(T: FloatArray) -> str:
+    """Return in words what keeps a finite (4, 4) matrix from being a rigid transform."""
+    if not np.allclose(T[3], (0, 0, 0, 1), atol=1e-6):
+        last = " ".join(f"{value:g}" for value in T[3])
+        transposed = np.allclose(T[:, 3], (0, 0, 0, 1), atol=1e-6)
+        return f"its last line is {last}" + (", as if it were transposed" if transposed else "")
+    if np.linalg.det(T[:3, :3]) < 0:
+        return "it mirrors (its determinant is negative)"
+    scale = float(np.cbrt(np.linalg.det(T[:3, :3])))
+    if scale > 0 and departure(_unscaled(T, scale)) <= LARGEST:
+        return f"it enlarges by {scale:.4g}"
+    return f"its 3 x 3 part is orthonormal only to {departure(T):.2g}, not to {LARGEST:g}"
+
+
+def _unscaled(T: FloatArray, scale: float) -> FloatArray:
+    return rigid(T[:3, :3] / scale, T[:3, 3])
 
 
 def write_pose(path: AnyPath, T: FloatArray) -> None:

@@ -42,6 +42,10 @@ def raw_values(path: AnyPath, data: bytes, what: str) -> np.ndarray:
         raise InputError(
             f"Reading the {what} {path} needs OpenEXR; try pip install 'packetmesh[exr]', or TIFF"
         ) from None
+    except _OtherChannels as error:
+        raise InputError(
+            f"The {what} {path} has the channels {error}; try one channel, one named Z, Y or V, or R, G, B"
+        ) from None
     except _TooLarge as error:
         raise InputError(
             f"The {what} {path} has {error} pixels, more than the {MAX_IMAGE_PIXELS / 1e6:g} million that "
@@ -49,15 +53,23 @@ def raw_values(path: AnyPath, data: bytes, what: str) -> np.ndarray:
         ) from None
     except Exception:  # decoders fail on damaged data in more ways than can be listed
         raise InputError(
-            f"The {what} {path} is truncated or damaged; try to copy or export it again"
+            f"The {what} {path} is truncated or damaged, or stored in a way that is not read; try to copy it "
+            "again, or to export it as PNG"
         ) from None
     if values.ndim not in (2, 3) or not values.size or values.dtype.kind not in "fiu":
-        raise InputError(f"The {what} {path} is {values.dtype} of shape {values.shape}, which is no image")
+        raise InputError(
+            f"The {what} {path} is {values.dtype} of shape {values.shape}, which is no image; try numbers of "
+            "shape (height, width), or (height, width, 3) of colour"
+        )
     return values
 
 
 class _TooLarge(Exception):
     """The image exceeds the largest number of pixels; the error's text is the image size."""
+
+
+class _OtherChannels(Exception):
+    """An OpenEXR file has no channel that is read; the error's text is the names of its channels."""
 
 
 def _check(height_px: int, width_px: int) -> None:
@@ -90,8 +102,10 @@ def _exr(data: bytes) -> np.ndarray:
         channels = {name: channel.pixels for name, channel in file.channels().items()}
     if {"R", "G", "B"} <= channels.keys():
         return np.stack([channels[name] for name in "RGB"], axis=-1)
-    (only,) = list(channels) if len(channels) == 1 else [name for name in _EXR_DEPTH if name in channels][:1]
-    return channels[only].astype(np.float32)
+    known = list(channels) if len(channels) == 1 else [name for name in _EXR_DEPTH if name in channels]
+    if not known:
+        raise _OtherChannels(", ".join(channels))
+    return channels[known[0]].astype(np.float32)
 
 
 def _pfm(data: bytes) -> np.ndarray:

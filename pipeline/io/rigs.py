@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from packetmesh.errors import InputError
 from pipeline.io.calibrations import FILES, NodeFiles, calibration_files, node_files
 from pipeline.io.depth_correction import (
@@ -17,10 +19,11 @@ from pipeline.io.depth_correction import (
     write_depth_correction,
 )
 from pipeline.io.depth_to_color import register_depth
-from pipeline.io.extrinsics import read_extrinsics
+from pipeline.io.extrinsics import read_extrinsics_noted
 from pipeline.io.images import read_color, read_depth_noted, write_color, write_depth_mm
 from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
-from pipeline.io.poses import read_pose, write_pose
+from pipeline.io.poses import read_pose_noted, write_pose
+from pipeline.io.same_view import depth_camera_of, same_view_note
 from pipeline.io.truth import read_truth, write_truth
 from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.types import MAX_NODES, AnyPath, CameraIntrinsics, DepthMap, RgbdFrame, Rig
@@ -44,7 +47,8 @@ def load_frame(
 
     Args:
         color: (H, W) image.
-        depth: (H, W) image, 0 where the depth is unknown; its size may differ if it is not registered.
+        depth: (H, W) image, 0 where the depth is unknown. It may show the same view in another number of
+            pixels, in proportion; its size may be any if it is not registered.
         intrinsics: JSON with fx, fy, cx and cy, Open3D JSON, ROS camera_info or a bare matrix, pixels.
         depth_scale: depth units per metre; by default whole numbers are millimetres and floating-point
             numbers metres.
@@ -71,16 +75,30 @@ def load_frame(
     if depth_correction is not None:
         correction = read_depth_correction(depth_correction)
         sensed, noise = correction.apply(sensed), correction.noise
+    _check_size(camera, intrinsics, "colour image", color, rgb.shape)
     if depth_intrinsics is None and extrinsics is None:
-        _check_size("depth image", depth, sensed.z_m.shape, "colour image", color, rgb.shape)
+        sensed, notes = _same_view(sensed, depth, camera, color)
     else:
-        sensed = _registered(sensed, depth, camera, depth_intrinsics, extrinsics)
-    shape = (camera.height_px, camera.width_px)
-    _check_size("intrinsics file", intrinsics, shape, "colour image", color, rgb.shape)
-    T_world_camera = LEVEL_POSE.copy() if pose is None else read_pose(pose)
+        sensed, notes = _registered(sensed, depth, camera, depth_intrinsics, extrinsics)
+    T_world_camera, pose_notes = (LEVEL_POSE.copy(), ()) if pose is None else read_pose_noted(pose)
+    notes = (*read.notes, *notes, *pose_notes)
     return RgbdFrame(
-        name, rgb, sensed, camera, T_world_camera, noise=noise, pose_known=pose is not None, notes=read.notes
+        name, rgb, sensed, camera, T_world_camera, noise=noise, pose_known=pose is not None, notes=notes
     )
+
+
+def _same_view(
+    sensed: DepthMap, depth: AnyPath, camera: CameraIntrinsics, color: AnyPath
+) -> tuple[DepthMap, tuple[str, ...]]:
+    """Return depth of the colour camera's view on its pixel grid, and a note if it was resized."""
+    remedy = (
+        "try files of one size, depth of the same view in fewer pixels, or the depth camera's own intrinsics "
+        "and extrinsics"
+    )
+    depth_camera = depth_camera_of(camera, sensed.z_m.shape, depth, color, remedy)
+    if depth_camera is None:
+        return sensed, ()
+    return register_depth(sensed, depth_camera, camera, np.eye(4)), (same_view_note(camera, depth_camera),)
 
 
 def _registered(
@@ -89,40 +107,36 @@ def _registered(
     color_camera: CameraIntrinsics,
     depth_intrinsics: AnyPath | None,
     extrinsics: AnyPath | None,
-) -> DepthMap:
+) -> tuple[DepthMap, tuple[str, ...]]:
+    """Return depth of a separate camera on the colour camera's pixel grid, and notes on its pose."""
     if depth_intrinsics is None or extrinsics is None:
         given, missing = "extrinsics", "depth intrinsics"
         if extrinsics is None:
             given, missing = missing, given
         raise InputError(
-            f"The depth image {depth} comes with {given} but without {missing}; give both if it is not "
-            "registered to the colour image, none if it is"
+            f"The depth image {depth} comes with {given} but without {missing}; try both if it is not "
+            "registered to the colour image, and none if it is"
         )
     depth_camera = read_intrinsics(depth_intrinsics, sensed.z_m.shape[::-1])
-    shape = (depth_camera.height_px, depth_camera.width_px)
-    _check_size("intrinsics file", depth_intrinsics, shape, "depth image", depth, sensed.z_m.shape)
-    seen = register_depth(sensed, depth_camera, color_camera, read_extrinsics(extrinsics))
+    _check_size(depth_camera, depth_intrinsics, "depth image", depth, sensed.z_m.shape)
+    T_color_depth, notes = read_extrinsics_noted(extrinsics)
+    seen = register_depth(sensed, depth_camera, color_camera, T_color_depth)
     if not seen.valid.any():
         raise InputError(
             f"The colour camera sees nothing of the depth image {depth}; check that {extrinsics} is in "
             "metres and leads from the depth camera's frame to the colour camera's"
         )
-    return seen
+    return seen, notes
 
 
 def _check_size(
-    what: str,
-    path: AnyPath,
-    shape: tuple[int, ...],
-    of_what: str,
-    of_path: AnyPath,
-    of_shape: tuple[int, ...],
+    camera: CameraIntrinsics, intrinsics: AnyPath, what: str, image: AnyPath, shape: tuple[int, ...]
 ) -> None:
-    (height, width), (of_height, of_width) = shape, of_shape[:2]
-    if (height, width) != (of_height, of_width):
+    """Raise an InputError if a camera is for images of another size."""
+    if (camera.height_px, camera.width_px) != shape[:2]:
         raise InputError(
-            f"The {what} {path} is for {width} x {height} pixels but the {of_what} {of_path} has {of_width} "
-            f"x {of_height}; try files of one size, registered to one camera"
+            f"The intrinsics file {intrinsics} is for {camera.width_px} x {camera.height_px} pixels but the "
+            f"{what} {image} has {shape[1]} x {shape[0]}; try the intrinsics of images of that size"
         )
 
 
@@ -222,19 +236,25 @@ def _node_folders(directory: Path) -> list[Path]:
 
 def _load_node(folder: Path, over: NodeFiles, depth_scale: float | None) -> RgbdFrame:
     files: NodeFiles = {"intrinsics": _intrinsics_in(folder), **node_files(folder), **over}
+    for stem in ("color", "depth"):
+        names = [file.name for file in _images_in(folder, stem)]
+        if len(names) > 1 and f"{stem}.png" not in names:
+            raise InputError(f"The node {folder} has several images, {', '.join(names)}; try to keep one")
     color, depth = (_image_in(folder, stem) for stem in ("color", "depth"))
     return load_frame(color, depth, depth_scale=depth_scale, name=folder.name, **files)
 
 
 def _intrinsics_in(folder: Path) -> Path:
-    """Return the path of intrinsics.json, or of intrinsics.txt if only that exists."""
-    intrinsics = folder / "intrinsics.json"
-    text = intrinsics.with_suffix(".txt")
-    return text if text.exists() and not intrinsics.exists() else intrinsics
+    """Return the path of intrinsics.json, or of the text or YAML file if it does not exist."""
+    paths = [folder / f"intrinsics{suffix}" for suffix in (".json", ".txt", ".yaml", ".yml")]
+    return next((path for path in paths if path.exists()), paths[0])
 
 
 def _image_in(folder: Path, stem: str) -> Path:
     """Return the PNG with this stem, or the only image with another suffix if there is no PNG."""
-    usual = folder / f"{stem}.png"
-    others = [file for file in sorted(folder.glob(f"{stem}.*")) if file.suffix.lower() in IMAGE_SUFFIXES]
+    usual, others = folder / f"{stem}.png", _images_in(folder, stem)
     return others[0] if len(others) == 1 and not usual.exists() else usual
+
+
+def _images_in(folder: Path, stem: str) -> list[Path]:
+    return [file for file in sorted(folder.glob(f"{stem}.*")) if file.suffix.lower() in IMAGE_SUFFIXES]

@@ -15,6 +15,7 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
 
+from pipeline.io.lenses import ros_name
 from pipeline.types import RgbdFrame, Rig
 
 
@@ -200,7 +201,7 @@ def _camera_info(bag: BagWriter, frame: RgbdFrame, header: Any) -> Any:
     P = np.hstack([K.matrix, np.zeros((3, 1))]).reshape(-1)
     values = K.distortion, K.matrix.reshape(-1), np.eye(3).reshape(-1), P
     size = K.height_px, K.width_px
-    return bag.make("sensor_msgs/msg/CameraInfo", header, *size, "plumb_bob", *values, 0, 0, region)
+    return bag.make("sensor_msgs/msg/CameraInfo", header, *size, ros_name(K), *values, 0, 0, region)
 
 
 def _millimetres(frame: RgbdFrame) -> np.ndarray:

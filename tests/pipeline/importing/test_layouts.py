@@ -154,7 +154,7 @@ def clocks_disagree(folder):
 def other_size(folder):
     write_tum(folder, orbit(2))
     for path in (folder / "depth").iterdir():
-        cv2.imwrite(str(path), np.full((15, 20), 9000, np.uint16))
+        cv2.imwrite(str(path), np.full((15, 24), 9000, np.uint16))
 
 
 def camera_of_other_size(folder):
@@ -190,7 +190,7 @@ def all_unknown(folder):
         (lambda folder: folder.write_text("a letter"), "is a file"),
         (no_depth, "frame-000000.depth.png"),
         (clocks_disagree, "20 ms"),
-        (other_size, "20 x 15 pixels"),
+        (other_size, "24 x 15 pixels but .* 40 x 30, whose sides"),
         (camera_of_other_size, "--intrinsics"),
         (damaged_trajectory, "Redwood's format"),
         (bad_list, "noon"),
@@ -238,7 +238,7 @@ def test_a_mean_pose_of_look_at_has_z_up():
 
 
 def test_frames_that_were_not_looked_at_and_extrinsics_that_are_missing_are_said(tmp_path, monkeypatch):
-    monkeypatch.setattr("pipeline.importing.numbered.MOST_CANDIDATES", 4)
+    monkeypatch.setattr("pipeline.importing.pairing.MOST_CANDIDATES", 4)
     written = orbit(10)
     write_scannet(tmp_path / "recording", written)
     report, _ = imported(tmp_path)

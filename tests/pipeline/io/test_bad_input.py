@@ -9,7 +9,7 @@ import pytest
 
 from packetmesh.errors import InputError
 from pipeline.io.clouds import read_cloud, write_cloud
-from pipeline.io.images import read_color, read_depth, write_color, write_depth_mm
+from pipeline.io.images import read_color, read_depth, write_depth_mm
 from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.meshes import read_mesh, write_mesh
 from pipeline.io.poses import read_pose
@@ -121,15 +121,15 @@ BAD_FILES = {
         json.dumps({"width": 16, "height": 12, "intrinsic_matrix": K9}).encode(),
         "skew or in the wrong order",
     ),
-    "intrinsics: fisheye": (
+    "intrinsics: another lens": (
         read_intrinsics,
-        json.dumps({"width": 16, "height": 12, "K": K9, "distortion_model": "equidistant"}).encode(),
-        "distortion model equidistant",
+        json.dumps({"width": 16, "height": 12, "K": K9, "distortion_model": "omnidirectional"}).encode(),
+        "distortion model omnidirectional",
     ),
-    "intrinsics: rational": (
+    "intrinsics: seven coefficients": (
         read_intrinsics,
-        json.dumps({"width": 16, "height": 12, "K": K9, "D": [0.1] * 8}).encode(),
-        "distortion model of 8 coefficients",
+        json.dumps({"width": 16, "height": 12, "K": K9, "D": [0.1] * 7}).encode(),
+        "distortion model of 7 coefficients",
     ),
     "pose: three lines": (read_pose, pose(EYE[:3]), "4 x 4 numbers"),
     "pose: words": (read_pose, b"a b c d\n" * 4, "4 x 4 numbers"),
@@ -253,9 +253,9 @@ def rig_folder(tmp_path):
 
 
 def test_sizes_that_do_not_match_are_named(rig_folder):
-    write_color(rig_folder / "node_01" / "color.png", np.zeros((10, 16, 3), np.uint8))
+    write_depth_mm(rig_folder / "node_01" / "depth.png", DepthMap(np.ones((10, 16), np.float32)))
     with pytest.raises(
-        InputError, match=r"depth.png is for 16 x 12 pixels but .*color.png has 16 x 10"
+        InputError, match=r"depth.png is for 16 x 10 pixels but .*color.png has 16 x 12"
     ) as error:
         load_rig(rig_folder)
     assert_one_sentence(error.value, "node_01")

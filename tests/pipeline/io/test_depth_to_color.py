@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 from pipeline.io.depth_to_color import register_depth
-from pipeline.kernels.geometry import inverse, project, rigid, rotation_exp
+from pipeline.kernels.geometry import inverse, pixel_rays, rigid, rotation_exp
 from pipeline.kernels.rays import Camera, hit_depths
 from pipeline.types import CameraIntrinsics, DepthMap
+from tests.pipeline.lenses import camera
 
 DEPTH = CameraIntrinsics(
     np.array([[183.0, 0.0, 128.0], [0.0, 183.0, 106.0], [0.0, 0.0, 1.0]]),
@@ -115,8 +116,35 @@ def test_points_behind_the_camera_or_far_beside_it_are_not_seen():
     beside = rigid(rotation_exp(np.radians([0.0, 64.5, 0.0])), np.zeros(3))
     z_m = np.full((DEPTH.height_px, DEPTH.width_px), np.nan, np.float32)
     z_m[100:112, 122:134] = 1.0
-    assert 0 < project(fold, beside[:3, 2][None])[0, 0] < 640  # which is why it must be kept out
+    folded, _ = cv2.projectPoints(beside[:3, 2][None], np.zeros(3), np.zeros(3), fold.matrix, fold.distortion)
+    assert 0 < folded[0, 0, 0] < 640  # which is why it must be kept out
     assert not register_depth(DepthMap(z_m), DEPTH, fold, beside).valid.any()
     behind = rigid(rotation_exp(np.array([0.0, np.pi, 0.0])), np.zeros(3))
     assert not register_depth(DepthMap(z_m), DEPTH, COLOR, behind).valid.any()
     assert register_depth(DepthMap(z_m), DEPTH, COLOR, np.eye(4)).valid.any()
+
+
+@pytest.mark.parametrize("kind", ["rational", "fisheye"])
+def test_depth_of_one_lens_lands_on_the_pixels_of_another(kind):
+    """A tilted plane through the depth camera's lens, seen by a colour camera 5 cm to its right."""
+    lens, color = camera(kind), camera("fisheye" if kind == "rational" else "rational")
+    normal = np.array([0.1, -0.2, 1.0])
+    z_m = 1.5 / (pixel_rays(lens) @ normal)
+    z_m[(z_m < 0.0) | (z_m > 4.0)] = np.nan
+    T_color_depth = rigid(np.eye(3), np.array([-0.05, 0.0, 0.0]))
+    found = register_depth(DepthMap(z_m.astype(np.float32)), lens, color, T_color_depth)
+    expected = (1.5 + 0.05 * -normal[0]) / (pixel_rays(color) @ normal)
+    assert found.coverage > 0.5
+    seen = found.valid & (np.abs(pixel_rays(color)[..., :2]).max(axis=-1) < 0.8)
+    assert seen.sum() > 5000
+    np.testing.assert_allclose(found.z_m[seen], expected[seen], atol=0.002)
+
+
+def test_a_colour_camera_whose_corners_have_no_rays_sees_the_depth():
+    """A fisheye that sees 90 degrees at 100 pixels from the middle of its image."""
+    focal_px = 100.0 / (0.5 * np.pi)
+    matrix = np.array([[focal_px, 0.0, 159.5], [0.0, focal_px, 119.5], [0.0, 0.0, 1.0]])
+    color = CameraIntrinsics(matrix, np.zeros(4), 320, 240, fisheye=True)
+    found = register_depth(DepthMap(np.full((240, 320), 1.5, np.float32)), camera("brown"), color, np.eye(4))
+    assert found.valid[100:140, 140:180].all()
+    np.testing.assert_allclose(found.z_m[found.valid], 1.5, atol=1e-5)

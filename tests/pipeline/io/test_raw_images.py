@@ -103,7 +103,9 @@ def test_a_rig_takes_the_only_image_of_a_name(tmp_path):
     np.testing.assert_array_equal(frame.rgb, RGB)
     np.testing.assert_array_equal(frame.depth.z_m, METRES)
     (node / "color.tif").write_bytes(tiff(RGB))
-    with pytest.raises(InputError, match=r"color\.png does not exist"):  # which of the two is meant
+    with pytest.raises(
+        InputError, match=r"has several images, color\.ppm, color\.tif; try to keep one"
+    ):  # which of the two is meant
         load_rig(tmp_path / "rig")
 
 
@@ -118,7 +120,7 @@ BAD = {
     "cut.tif": (tiff(MM)[:200], "truncated"),
     "cut.pfm": (opencv(METRES, ".pfm")[:-9], "truncated"),
     "cut.exr": (exr(Z=METRES)[:-90], "truncated or damaged"),
-    "nameless.exr": (exr(a=METRES, b=METRES), "truncated or damaged"),
+    "nameless.exr": (exr(a=METRES, b=METRES), "has the channels a, b; try one channel"),
     "colours.exr": (exr(R=METRES, G=METRES, B=METRES), r"3 channel\(s\)"),
     "bomb.npy": (header_only((200_000, 200_000)), "truncated or damaged"),
     "bomb.pfm": (b"Pf\n200000 200000\n-1.0\n", "200000 x 200000 pixels"),

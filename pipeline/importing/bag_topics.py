@@ -1,0 +1,130 @@
+"""Image topics of a bag: their cameras and times, and which depth belongs to which colour."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress
+from pipeline.importing.bag_cameras import FoundCamera, camera_of_topic, common_parts, sdk_stream
+from pipeline.importing.bag_messages import is_depth, size_of, stamp_s
+from pipeline.types import MAX_NODES, CameraIntrinsics, FloatArray
+
+PROGRESS_EVERY = 20
+"""Number of images between progress reports."""
+_IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """An image topic with its camera and the times of its images."""
+
+    connection: Any
+    frame: str
+    found: FoundCamera
+    stamps_s: FloatArray
+    """(N,) time of each image, from its header."""
+    recorded_ns: list[int]
+    """(N,) time at which each image came into the bag, which locates it there."""
+
+    @property
+    def name(self) -> str:
+        return str(self.connection.topic)
+
+    @property
+    def camera(self) -> CameraIntrinsics:
+        """The camera, of a topic that has one."""
+        assert self.found.camera is not None
+        return self.found.camera
+
+
+def image_topics(reader: Any) -> Generator[Progress, None, tuple[list[Topic], list[Topic]]]:
+    """Return the colour topics and the depth topics, sorted by name."""
+    found: tuple[list[Topic], list[Topic]] = ([], [])
+    connections = [own for own in reader.connections if own.msgtype in _IMAGES]
+    images, seen = max(1, sum(connection.msgcount for connection in connections)), 0
+    for connection in sorted(connections, key=lambda connection: connection.topic):
+        first, stamps_s, recorded_ns = None, [], []
+        for _, at_ns, raw in reader.messages([connection]):
+            if seen % PROGRESS_EVERY == 0:
+                yield Progress(f"images of {connection.topic}", min(1.0, seen / images))
+            seen += 1
+            first = reader.deserialize(raw, connection.msgtype) if first is None else first
+            stamps_s.append(stamp_s(raw, reader.is2))
+            recorded_ns.append(at_ns)
+        if first is not None:
+            frame = first.header.frame_id.lstrip("/")
+            camera = camera_of_topic(reader, connection.topic, frame, size_of(first, connection.topic))
+            topic = Topic(connection, frame, camera, np.array(stamps_s), recorded_ns)
+            found[is_depth(first)].append(topic)
+    return found
+
+
+def pairs_of(
+    path: Path, reader: Any, colors: list[Topic], depths: list[Topic]
+) -> tuple[list[tuple[Topic, Topic]], list[str]]:
+    """Pair each depth topic with the colour topic of its frame, or else of the most similar name.
+
+    Every colour topic is used once. Also returns a sentence for each topic that is left out.
+
+    Raises:
+        InputError: there is no colour, no depth, or no camera of the colour images.
+    """
+    for topics, what in ((colors, "colour"), (depths, "depth")):
+        if not topics:
+            known = [topic.name for topic in [*colors, *depths]]
+            others = sorted({f"{own.topic} ({own.msgtype})" for own in reader.connections})[:8]
+            has = (
+                f"but {', '.join(known)}"
+                if known
+                else f"and no images at all but {', '.join(others) or 'nothing'}"
+            )
+            raise InputError(f"The bag {path} has no {what} images {has}; try to record both")
+    usable = [color for color in colors if color.found.camera is not None]
+    if not usable:
+        why = colors[0].found.why_not
+        raise InputError(f"The colour images of the bag {path} have no camera that can be used: {why}")
+    best: dict[str, tuple[tuple[bool, bool, int], Topic, Topic]] = {}
+    for depth in depths:
+        score, color = max(((_fit(color, depth), color) for color in usable), key=lambda pair: pair[0])
+        if color.name not in best or score > best[color.name][0]:
+            best[color.name] = score, color, depth
+    pairs = [best[name][1:] for name in sorted(best)]
+    used = {depth.name for _, depth in pairs}
+    notes = [
+        f"{color.name} is left out: {color.found.why_not}" for color in colors if color.found.camera is None
+    ]
+    notes += [f"{own.name} is left out: no depth belongs to it" for own in usable if own.name not in best]
+    notes += [
+        f"{own.name} is left out: it has no colour of its own" for own in depths if own.name not in used
+    ]
+    notes += [
+        f"{color.name} is left out: a rig has at most {MAX_NODES} nodes" for color, _ in pairs[MAX_NODES:]
+    ]
+    return pairs[:MAX_NODES], notes
+
+
+def message_of(reader: Any, topic: Topic, index: int) -> Any:
+    """Return the message of a topic with an index, in the order of recording."""
+    at_ns = topic.recorded_ns[index]
+    before = topic.recorded_ns[:index].count(at_ns)
+    for connection, _, raw in reader.messages([topic.connection], start=at_ns, stop=at_ns + 1):
+        if not before:
+            return reader.deserialize(raw, connection.msgtype)
+        before -= 1
+    raise InputError(f"The bag has lost an image of {topic.name}; try to record again")
+
+
+def _fit(color: Topic, depth: Topic) -> tuple[bool, bool, int]:
+    """Return how well a depth topic fits to a colour topic, larger being better.
+
+    All images of the RealSense SDK have one frame; there, a colour stream fits better than an infrared one.
+    """
+    stream = sdk_stream(color.name)
+    same_frame = color.frame == depth.frame and stream is None
+    return same_frame, stream is not None and "/Color_" in stream, common_parts(color.name, depth.name)

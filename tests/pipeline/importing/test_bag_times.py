@@ -1,0 +1,104 @@
+"""Moments of a bag: headers without times, and never the same moment twice."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from packetmesh.errors import InputError
+from packetmesh.progress import drain
+from pipeline.importing import iterate_import
+from pipeline.importing.bag_times import moments_of
+from pipeline.io.rigs import load_rig
+from tests.pipeline.importing.bag_parts import Images, Info, colors, wall, write_parts
+
+COLOR, DEPTH, INFO = "/zed/left/image_rect_color", "/zed/depth/depth_registered", "/zed/left/camera_info"
+
+
+def imported(tmp_path, color, depth, frames=3, kind="ros2"):
+    path = write_parts(
+        tmp_path / ("a.bag" if kind == "ros1" else "a"), {COLOR: color, DEPTH: depth}, {INFO: Info()}, kind
+    )
+    report = drain(iterate_import(path, tmp_path / "rig", frames))
+    return report, load_rig(tmp_path / "rig").frames
+
+
+def order_of(frames, written):
+    """Indices of the written moments in the nodes, by colour and by depth."""
+    by_color = [
+        next(k for k, one in enumerate(written) if np.array_equal(one, frame.rgb)) for frame in frames
+    ]
+    return by_color, [round(1000 * float(frame.depth.z_m[5, 5])) - 2000 for frame in frames]
+
+
+@pytest.mark.parametrize("kind", ["ros1", "ros2", "mcap"])
+@pytest.mark.parametrize("stamp", [lambda _: 0.0, lambda _: 77.25])
+@pytest.mark.parametrize("only", ["both", "colour", "depth"])
+def test_headers_without_times_leave_the_times_of_the_bag(tmp_path, kind, stamp, only):
+    written = colors(3)
+    color = Images(written, **({"stamp_s": stamp} if only != "depth" else {}))
+    depth = Images(wall(3), late_s=0.004, **({"stamp_s": stamp} if only != "colour" else {}))
+    report, frames = imported(tmp_path, color, depth, kind=kind)
+    assert order_of(frames, written) == ([0, 1, 2], [0, 1, 2])
+    assert [frame.time_s for frame in report.frames] == pytest.approx([100.0, 100.5, 101.0])
+    assert any("came into the bag are used" in note for note in report.notes)
+
+
+def test_good_headers_are_used_though_the_bag_is_late(tmp_path):
+    """The depth comes 0.3 s late into the bag, but its header has the time of the colour image."""
+    written = colors(3)
+    depth = Images(wall(3), late_s=0.3, stamp_s=lambda time_s: time_s - 0.3)
+    report, frames = imported(tmp_path, Images(written), depth)
+    assert order_of(frames, written) == ([0, 1, 2], [0, 1, 2])
+    assert not any("came into the bag" in note for note in report.notes)
+
+
+def test_a_time_that_two_headers_have_is_one_moment(tmp_path):
+    """The second of four headers repeats the first."""
+    repeated = {100.5: 100.0}
+    stamp = {"stamp_s": lambda time_s: repeated.get(time_s, time_s)}
+    _, frames = imported(tmp_path, Images(colors(4), **stamp), Images(wall(4), **stamp), frames=6)
+    by_color, by_depth = order_of(frames, colors(4))
+    assert by_color == [0, 2, 3]
+    assert by_depth == [0, 2, 3]
+
+
+def test_a_depth_image_is_in_one_moment_only():
+    """Colour every 20 ms and depth every 40 ms, 4 ms late: of two colour images the nearer one counts."""
+    color_s, depth_s = np.arange(6) * 0.02, np.arange(3) * 0.04 + 0.004
+    moments = moments_of(Path("a.bag"), [color_s, depth_s], 6, one_camera=True)
+    np.testing.assert_array_equal(moments, [[0, 0], [2, 1], [4, 2]])
+
+
+def test_all_messages_at_one_time_are_one_moment(tmp_path):
+    times_s = [np.zeros(5), np.zeros(5)]
+    assert len(moments_of(Path("a.bag"), times_s, 3, one_camera=True)) == 1
+
+
+def test_messages_that_came_at_the_same_time_are_told_apart(tmp_path):
+    """Two cameras' worth of messages in one topic: the headers differ, the times in the bag do not."""
+    from tests.pipeline.importing.bags import BagWriter
+
+    written, walls = colors(2), wall(2)
+    bag = BagWriter(tmp_path / "a.bag", "ros1")
+    with bag.writer:
+        bag.write(INFO, Info().message(bag, 100.0), 100.0)
+        for topic, values in ((COLOR, written), (DEPTH, walls)):
+            for moment in range(2):
+                message = Images(values).message(bag, 100.0 + moment, moment)
+                bag.write(topic, message, 105.0)
+    drain(iterate_import(tmp_path / "a.bag", tmp_path / "rig"))
+    assert order_of(load_rig(tmp_path / "rig").frames, written) == ([0, 1], [0, 1])
+
+
+def test_images_that_repeat_are_said(tmp_path):
+    """Three times, and the same bytes: a recording that stood still."""
+    repeated = Images(np.repeat(colors(1), 3, axis=0)), Images(np.repeat(wall(1), 3, axis=0))
+    report, _ = imported(tmp_path, *repeated)
+    assert "2 other nodes have the very same images as node_00" in report.notes
+
+
+def test_clocks_that_disagree_are_refused(tmp_path):
+    depth = Images(wall(3), stamp_s=lambda time_s: time_s + 7.0)
+    with pytest.raises(InputError, match="never less than 6 s apart"):
+        imported(tmp_path, Images(colors(3)), depth)
