@@ -87,7 +87,7 @@ def residuals_figure(calibration: Calibration) -> go.Figure:
     residuals_px = np.concatenate([view.residuals_px for view in calibration.views])
     median_px = float(np.median(np.linalg.norm(residuals_px, axis=1)))
     times = _round_number(ARROW_SHARE * calibration.size_px[0] / max(median_px, 1e-6))
-    figure = image_figure(f"What the lens leaves, drawn {times:g} times as long", calibration.size_px)
+    figure = image_figure(f"Residuals, drawn {times:g} times as long", calibration.size_px)
     every = max(1, -(-len(points_px) // MOST_ARROWS))
     begin_px = (points_px - residuals_px)[::every]
     end_px = begin_px + times * residuals_px[::every]
@@ -107,7 +107,7 @@ def residuals_figure(calibration: Calibration) -> go.Figure:
         y=lines[..., 1].ravel(),
         mode="lines",
         line={"color": css(SOURCE), "width": 1},
-        name="towards where it was seen",
+        name="towards the detected point",
         hoverinfo="skip",
     )
     return figure
@@ -116,7 +116,7 @@ def residuals_figure(calibration: Calibration) -> go.Figure:
 def radial_residuals_figure(residuals: RadialResiduals) -> go.Figure:
     """Plot residuals along the radius with the mean of each band; a wave means a wrong lens model."""
     figure = titled_figure(
-        "What is left along the radius", "distance from the principal point, px", "outward, px"
+        "Residuals along the radius", "distance from the principal point, px", "outward, px"
     )
     figure.add_scatter(
         x=residuals.radius_px,
@@ -140,7 +140,7 @@ def radial_residuals_figure(residuals: RadialResiduals) -> go.Figure:
 
 def uncertainty_figure(sd: ErrorMap, size_px: tuple[int, int], most_mm: float | None = None) -> go.Figure:
     """Draw a map of the standard deviation of a point at ``sd.range_m``, in millimetres across the ray."""
-    title = f"Uncertainty at {sd.range_m:g} m, one sd"
+    title = f"Uncertainty at {sd.range_m:g} m, one standard deviation"
     return _map_figure(sd, 1000.0 * sd.error_m, title, size_px, most_mm)
 
 
@@ -155,7 +155,7 @@ def difference_figure(
 
 def verdict_figure(judged: Verdict, sd: ErrorMap, size_px: tuple[int, int]) -> go.Figure:
     """Draw a map of the 95 % error, with the line inside which a point is accurate enough."""
-    title = f"Error at {judged.range_m:g} m (95 %), asked for {1000.0 * judged.accuracy_m:g} mm"
+    title = f"Error at {judged.range_m:g} m (95 %), required: {1000.0 * judged.accuracy_m:g} mm"
     figure = _map_figure(sd, 1000.0 * judged.error_m, title, size_px, 2000.0 * judged.accuracy_m)
     figure.add_contour(
         x=sd.columns_px,

@@ -64,7 +64,7 @@ def bias_figure(curve: BiasCurve) -> go.Figure:
     """Plot measured minus true depth over the distance: each view before and after the correction, the terms
     with their 95 % band, and the noise of a pixel.
     """
-    figure = titled_figure("What the sensor is off by", "measured depth, m", "measured less true, mm")
+    figure = titled_figure("Bias of the depth sensor", "measured depth, m", "measured minus true, mm")
     z_m, off_m, sd_m = curve.z_m, curve.off_m, curve.sd_m
     figure.add_scatter(
         x=np.concatenate([z_m, z_m[::-1]]),
@@ -118,7 +118,7 @@ def _add_noise(figure: go.Figure, z_m: FloatArray, noise_m: FloatArray) -> None:
             y=1000.0 * side * noise_m,
             mode="lines",
             line={"color": css(NEUTRAL), "dash": "dot", "width": 1},
-            name="noise of a pixel, 95 %",
+            name="noise of one pixel, 95 %",
             showlegend=side > 0.0,
             hoverinfo="skip",
         )
@@ -127,7 +127,7 @@ def _add_noise(figure: go.Figure, z_m: FloatArray, noise_m: FloatArray) -> None:
 def bias_map_figure(fit: DepthFit, at_m: float = 1.5) -> go.Figure:
     """Draw a map of measured minus true depth over the image at ``at_m`` measured depth, in millimetres."""
     width, height = fit.correction.size_px
-    figure = image_figure(f"What the sensor is off by at {at_m:g} m", (width, height))
+    figure = image_figure(f"Bias of the depth sensor at {at_m:g} m", (width, height))
     u, v = np.arange(0, width, MAP_EVERY), np.arange(0, height, MAP_EVERY)
     pixels = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
     true_m = fit.correction.corrected_m(np.full(len(pixels), at_m), pixels)
@@ -173,7 +173,7 @@ def noise_figure(fit: DepthFit) -> go.Figure:
                 x=z_m,
                 y=1000.0 * law.sd_m(z_m, float(np.cos(np.radians(tilt_deg)))),
                 line={"color": css(TARGET), "dash": dash},
-                name=f"law at {tilt_deg:.0f}°",
+                name=f"model at {tilt_deg:.0f}°",
                 hovertemplate="%{x:.2f} m: %{y:.2f} mm<extra>%{fullData.name}</extra>",
             )
     figure.update_layout(yaxis={"rangemode": "tozero"})

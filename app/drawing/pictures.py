@@ -33,7 +33,7 @@ def depth_picture(depth: DepthMap, range_m: tuple[float, float], what: str = "")
     rgb[~depth.valid] = HOLE
     stops = cividis(np.linspace(0, 255, BAR_STOPS).astype(np.uint8)[None])[0]
     labels = tuple(f"{value_m:.2f} m" for value_m in np.linspace(nearest_m, farthest_m, 3))
-    meaning = f"dark {nearest_m:.1f} m to bright {farthest_m:.1f} m, magenta where there is none"
+    meaning = f"dark {nearest_m:.1f} m to bright {farthest_m:.1f} m, magenta: no depth"
     return Picture(
         rgb,
         f"{what}: {meaning}" if what else meaning,
@@ -49,8 +49,8 @@ def difference_picture(inferred: DepthMap, sensor: DepthMap, most_m: float = FAR
     centimetres = most_m * 100
     return Picture(
         rgb,
-        f"Inferred minus sensor: blue {centimetres:.0f} cm nearer, white equal, orange {centimetres:.0f} cm "
-        "farther, grey where one is missing",
+        f"Inferred minus sensor: blue {centimetres:.0f} cm nearer, white equal, orange {centimetres:.0f} "
+        "cm farther, grey: one is missing",
         ColorBar((NEARER, EQUAL, FARTHER), (f"−{centimetres:.0f} cm", "0 cm", f"+{centimetres:.0f} cm")),
     )
 
@@ -69,8 +69,8 @@ def confidence_picture(confidence: FloatArray, flying: BoolArray, out_of_reach: 
     rgb[flying] = HOLE
     return Picture(
         rgb,
-        "Confidence in the inferred depth: dark unsure, bright sure; magenta pixels fly at an edge, grey "
-        "ones are out of reach",
+        "Confidence in the inferred depth: dark low, bright high; magenta: flying pixels at an edge, "
+        "grey: out of reach",
         ColorBar(CONFIDENCE_STOPS, ("0 %", "50 %", "100 %")),
     )
 

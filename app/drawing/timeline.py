@@ -98,7 +98,7 @@ class FramesLane:
     veil = 0.0
     legend: Sequence[tuple[str, Color]] = (
         ("frames on the air", TARGET),
-        ("lost; from afar, the share lost", LOSS),
+        ("lost (zoomed out: share of frames lost)", LOSS),
     )
     ticks: Sequence[Label] = ()
 

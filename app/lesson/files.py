@@ -141,14 +141,14 @@ def read_lesson(
     for stop, name in FIELD.findall(text):
         if name not in numbers or (stop and not 1 <= int(stop) <= len(sections)):
             raise InputError(
-                f"The lesson {path.name} has the field {stop and f'{stop}:'}{name}, no number of its "
-                f"screen; try one of {', '.join(numbers) or 'none'}."
+                f"The lesson {path.name} has the field {stop and f'{stop}:'}{name}, which is not a number "
+                f"of its screen; try one of {', '.join(numbers) or 'none'}."
             )
     for stop, name in FIELD.findall(CLAUSE.sub("", text)):
         if stop:
             raise InputError(
-                f"The lesson {path.name} has the field {stop}:{name} outside of double braces; put all that "
-                f"says it inside, for those who were not at stop {stop}."
+                f"The lesson {path.name} has the field {stop}:{name} outside of double braces; put the "
+                f"whole clause inside, because a reader may have skipped stop {stop}."
             )
     stops = tuple(_stop(section, path.name, settings, default) for section in sections)
     choices = [choice for stop in stops if stop.question for choice in stop.question.choices]
@@ -177,9 +177,9 @@ def _stop(section: str, file: str, settings: Mapping[str, Setting[Look]], look: 
             except ValueError as error:
                 raise InputError(f"{where} cannot set {name} = {value}: {error}.") from None
     if "" in opens:
-        raise InputError(f"{where} opens nothing; name a folder or a tab behind 'open:'.")
+        raise InputError(f"{where} opens nothing; name a folder or a tab after 'open:'.")
     if "" in sees:
-        raise InputError(f"{where} shows nothing; name a control or a number behind 'see:'.")
+        raise InputError(f"{where} shows nothing; name a control or a number after 'see:'.")
     return Stop(title.strip(), text.strip(), look, opens, sees, _question(parts, where) if parts else None)
 
 
@@ -210,7 +210,7 @@ def _question(parts: list[str], where: str) -> Question:
     for mark, one in zip(marks, found, strict=True):
         if (mark == "x") == bool(one.reason):
             fault = "is right but has a reason why not" if one.reason else "has no reason why it is wrong"
-            raise InputError(f"{where} choice '{one.text}' {fault}; a reason stands behind ' | '.")
+            raise InputError(f"{where} choice '{one.text}' {fault}; write a reason after ' | '.")
     return Question(question, found, reveal)
 
 

@@ -18,16 +18,17 @@ OFF, BEGIN = "not now", Markdown("Choose a stop, or press **Next**.")
 SKIP, SKIPPED = "Skip", -1
 GUESS = f"Take a guess: 1, 2 or 3. Or press **{SKIP}**."
 FIRST = "**Guess before you go on: 1, 2 or 3.** A wrong guess costs nothing. Or press **Skip**."
-VOTING = f"The class votes: 1, 2 or 3. A guess of the teacher's, or **{SKIP}**, shows the answer."
-COMPUTING = "The answer depends on the scene: it comes when the numbers of this stop are computed."
+VOTING = f"The class votes: 1, 2 or 3. The teacher's guess, or **{SKIP}**, shows the answer."
+COMPUTING = "The answer depends on the scene: it appears when the numbers of this stop are computed."
 FIRST_OF_ALL = -1.0
 """Order of the lesson's folder in its screen's panel: it comes first."""
 BAR = 12
 """Length of the bar for all votes, blocks."""
 KEYS = Markup(
-    "<span class='keys'><span><b>→</b> or <b>space</b> next, <b>←</b> back, <b>1 2 3</b> guess, "
-    "<b>S</b> skip.<span class='docked'> Click the dock, and the keys are the dock's.</span></span>"
-    "<span>The keys are the dock's now; <b>Esc</b> gives them back to the lesson.</span></span>"
+    "<span class='keys'><span><b>→</b> or <b>space</b> next, <b>←</b> back, <b>1 2 3</b> guess, <b>S</b> "
+    "skip.<span class='docked'> After a click on the dock, the keys control the "
+    "dock.</span></span><span>The keys control the dock now; <b>Esc</b> returns them to the "
+    "lesson.</span></span>"
 )
 """The page's line about the keys, while they belong to the lesson and while they belong to the dock."""
 TO_COME = "…"
@@ -67,13 +68,13 @@ class LessonFolder(Generic[Look]):
             self._stop = ui.gui.add_dropdown(
                 "Stop",
                 [OFF, *self._names],
-                hint="Shows what to look at and sets the controls below; change them as you like.",
+                hint="Explains what to look at and sets the controls below; you may change them.",
             )
             ui.when_changed(self._stop, self._picked)
             self._large = ui.gui.add_checkbox(
                 "Large",
                 ui.lecture is not None,
-                hint="Shows less text, and that large, for a room to read.",
+                hint="Shows less text in large type, readable across a room.",
             )
             ui.when_changed(self._large, self._point_out)
             self._text = ui.gui.add_markdown(BEGIN)
@@ -81,13 +82,13 @@ class LessonFolder(Generic[Look]):
             self._guess = ui.buttons(
                 "Your guess",
                 {**guesses, SKIP: partial(self._take, SKIPPED)},
-                "Which answer do you expect? You are told why it is right or not.",
+                "The answer that you expect. The lesson then explains why it is right or wrong.",
                 visible=False,
             )
             ui.buttons(
                 "Go",
                 {"Back": lambda: self._go(-1), "Next": lambda: self._go(1), "End": self._end},
-                "To the stop before or after, or out of the lesson.",
+                "Back, Next: previous or next stop. End: leave the lesson.",
             )
             self._mark = ui.gui.add_html(Markup(""))
         self._marked = 0

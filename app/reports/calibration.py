@@ -29,7 +29,7 @@ def write_calibration_report(report: CameraReport, trust: Trust, path: Path) -> 
         InputError: the folder cannot be written.
     """
     found = report.calibration
-    mark, judged = ("reproduced", "pass") if trust.verdict.passed else ("not-reproduced", "fail")
+    mark, judged = "reproduced" if trust.verdict.passed else "not-reproduced", trust.verdict.word
     body = Markup(
         '<h1>Calibration of a camera: <span class="{}">{}</span></h1>'
         '<p class="lead">{}</p><p class="note">{}</p>'
@@ -43,7 +43,7 @@ def write_calibration_report(report: CameraReport, trust: Trust, path: Path) -> 
     body += table(("parameter", "value", "standard error", "95 % interval"), rows)
     if trust.outliers:
         proposed = Markup("").join(Markup("<li>{}</li>").format(one.reason) for one in trust.outliers)
-        body += Markup("<h2>Images that one may leave out</h2><ul>{}</ul>").format(proposed)
+        body += Markup("<h2>Images to consider leaving out</h2><ul>{}</ul>").format(proposed)
     figures = _all_figures(report, trust)
     body += Markup("<h2>Pictures</h2>") + _places(len(figures))
     missing = [(name, one.reason) for name, one in report.detections.items() if not one.found]
@@ -56,7 +56,7 @@ def write_calibration_report(report: CameraReport, trust: Trust, path: Path) -> 
 def _made_of(report: CameraReport) -> str:
     found, unseen = report.calibration, report.held_out_rms_px
     width, height = found.size_px
-    beside = "" if unseen is None else f", {unseen:.3f} px in images that it has not seen"
+    beside = "" if unseen is None else f", {unseen:.3f} px in held-out images"
     return (
         f"{len(found.views)} images of {width} x {height} pixels; {report.board.title}; lens {found.lens}; "
         f"RMS {found.rms_px:.3f} px{beside}."

@@ -93,7 +93,7 @@ class Player {
     this.unpacked = new Map();
     this.addLegend();
     this.addControls();
-    if (!this.stage.gl) find("about").textContent = "This browser has no WebGL2: the numbers and the timeline play, the picture does not.";
+    if (!this.stage.gl) find("about").textContent = "This browser has no WebGL2: the numbers and the timeline work, the picture does not.";
     this.seek(this.record.end_s);
   }
 

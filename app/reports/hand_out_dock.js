@@ -125,7 +125,7 @@ class Dock {
     this.paintCurves(this.rows + 8);
     this.paintAxis(height - AXIS_PX);
     this.paintNow(height - AXIS_PX);
-    this.scaleText?.(near ? "one box a frame; a lost one says why" :
+    this.scaleText?.(near ? "one box per frame; lost frames show the cause" :
       `full row: green ${percent(this.shares.air)} of the time on the air, ` +
       `red ${percent(this.shares.lost)} of the frames lost`);
   }

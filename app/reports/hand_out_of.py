@@ -41,8 +41,8 @@ def hand_out_of(delivery: Delivery) -> HandOut:
     rig, poses = sending.rig, delivery.lossless.placement.T_world_camera
     return HandOut(
         title=f"{rig.name}: from packets to a surface",
-        sentence=f"{_cameras(len(rig.frames))} colour and depth images ({sending.coding.title}); "
-        f"the surface is rebuilt from what has arrived. Here {summary(delivery)}.",
+        sentence=f"{_cameras(len(rig.frames))} colour and depth images ({sending.coding.title}); the "
+        f"surface is rebuilt from the data that have arrived. Result: {summary(delivery)}.",
         nodes=tuple(
             HandOutNode(frame.name, frame.intrinsics, pose)
             for frame, pose in zip(rig.frames, poses, strict=True)

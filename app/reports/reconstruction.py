@@ -24,7 +24,7 @@ QUALITY_ROWS = (
         "measured pixels whose ray meets the surface within 2 % of the measurement (%)",
         100.0,
     ),
-    ("within_5pct_share", "the same within 5 % (%)", 100.0),
+    ("within_5pct_share", "the same within 5 % of the measurement (%)", 100.0),
     ("hole_area_m2", "area of the holes inside the surface (m²)", 1.0),
     ("boundary_loops", "boundary loops", None),
     ("boundary_length_m", "length of the boundary (m)", 1.0),
@@ -46,7 +46,7 @@ def _sections(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[Marku
     before, after = metrics["surface_before"], metrics["surface_after"]
     yield Markup("<h1>{}</h1>").format(metrics["scene"])
     yield Markup(
-        '<p class="lead">Preset <code>{}</code>. Of all camera rays, <b>{:.1%}</b> find no surface before '
+        '<p class="lead">Preset <code>{}</code>. Of all camera rays, <b>{:.1%}</b> miss the surface before '
         "fusion and <b>{:.1%}</b> after it.{}{}</p>"
     ).format(
         metrics["preset"],
@@ -73,10 +73,10 @@ def _sections(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[Marku
 def _use_sentences(measured: dict[str, float]) -> Markup:
     """Return two sentences on the use of the measurements."""
     return Markup(
-        " Of the measured pixels, the outlier filter keeps <b>{kept_share:.2%}</b>; the surface lies within "
-        "2 % of what was measured at <b>{within_2pct_before:.1%}</b> of them before and at "
-        "<b>{within_2pct_after:.1%}</b> after fusion. Afterwards measurements close "
-        "<b>{measured_ray_share:.1%}</b> of all rays and guesses <b>{guessed_ray_share:.1%}</b>."
+        " Of the measured pixels, the outlier filter keeps <b>{kept_share:.2%}</b>; the surface agrees "
+        "with the measurement within 2 % at <b>{within_2pct_before:.1%}</b> of them before and at "
+        "<b>{within_2pct_after:.1%}</b> after fusion. After fusion <b>{measured_ray_share:.1%}</b> of "
+        "all rays meet measured surface and <b>{guessed_ray_share:.1%}</b> inferred surface."
     ).format(**measured)
 
 
@@ -85,7 +85,9 @@ def _agreeing(measured: dict[str, float]) -> Markup:
     share = measured["agreement_between_nodes"]
     if not math.isfinite(share):
         return Markup("")
-    return Markup(" Of what two cameras both measured, <b>{:.1%}</b> is within 2 %.").format(share)
+    return Markup(
+        " Where two cameras measured the same surface, <b>{:.1%}</b> of the points agree within 2 %."
+    ).format(share)
 
 
 def _doubts(metrics: dict[str, Any]) -> Iterator[Markup]:
@@ -103,8 +105,9 @@ def _surfaces(result: Reconstruction, before: dict[str, Any], after: dict[str, A
     yield Markup("<h2>The surface before and after fusion</h2>")
     radii = ", ".join(f"{1000 * radius:.1f}" for radius in before["radii_m"])
     yield Markup(
-        '<p class="note">Ball radii {} mm on both. Magenta: a ray that hits nothing. '
-        "First in photographs, from beside the first camera; then from each node's camera.</p>"
+        '<p class="note">Ball radii {} mm for both. Magenta: a ray that misses the surface. '
+        "First with the photographs' colours, from a place next to the first camera; then from each node's "
+        "camera.</p>"
     ).format(radii)
     frames, placed = result.placement.placed(result.rig.frames), cameras_of(result.rig, result.placement)
     view = beside(placed[0], result.after)
@@ -143,8 +146,9 @@ def _truth(metrics: dict[str, Any]) -> Iterator[Markup]:
     before, after = metrics["truth"]["surface_before"], metrics["truth"]["surface_after"]
     yield Markup(
         "<h2>Against the ground truth</h2>"
-        '<p class="note">Of what the cameras can see. Coverage: share of the true surface with a mesh point '
-        "so near; accuracy: share of the mesh with a true surface so near; F-score: their harmonic mean.</p>"
+        '<p class="note">Only surface that the cameras can see counts. Coverage: share of the true surface '
+        "with a mesh point within the distance; accuracy: share of the mesh with true surface within it; "
+        "F-score: their harmonic mean.</p>"
     )
     rows = ((_truth_label(key), *_in_units(key, before, after)) for key in before or after)
     yield table(("", "before", "after"), rows)
@@ -167,7 +171,7 @@ def _in_units(key: str, *records: dict[str, float] | None) -> tuple[float | None
 
 
 def _nodes(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[Markup]:
-    yield Markup("<h2>What the nodes saw, and what the network inferred</h2>")
+    yield Markup("<h2>Measured and inferred depth of the nodes</h2>")
     for frame, node in zip(result.rig.frames, result.nodes, strict=True):
         range_m = depth_range_m(frame.depth)
         sensor = depth_picture(frame.depth, range_m, f"sensor depth ({frame.depth.coverage:.0%} known)")
@@ -205,8 +209,8 @@ def _nodes(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[Markup]:
 def _registrations(metrics: dict[str, Any]) -> Iterator[Markup]:
     if not metrics["registration"]:
         return
-    yield Markup("<h2>How the nodes found each other</h2>")
-    head = ("node", "onto", "method", "iterations", "stopped because")
+    yield Markup("<h2>Registration of the nodes</h2>")
+    head = ("node", "onto", "method", "iterations", "reason of the stop")
     rows = (
         (
             *(item[key] for key in ("source", "target", "method", "iterations", "stop_reason")),
@@ -218,5 +222,5 @@ def _registrations(metrics: dict[str, Any]) -> Iterator[Markup]:
         for item in metrics["registration"]
     )
     yield table(
-        (*head, "weighted RMSE (mm)", "loop error (mm)", "both measured within 2 % (%)", "used"), rows
+        (*head, "weighted RMSE (mm)", "loop error (mm)", "points that agree within 2 % (%)", "used"), rows
     )

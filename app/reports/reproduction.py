@@ -23,13 +23,13 @@ def write_reproduction_report(verdicts: Sequence[Verdict], path: Path) -> None:
     ours = [verdict for verdict in verdicts if verdict.beyond]
     thesis = [verdict for verdict in verdicts if not verdict.beyond]
     body = Markup(
-        '<h1>The thesis, computed again</h1><p class="lead">{}</p>'
+        '<h1>The claims of the thesis, computed again</h1><p class="lead">{}</p>'
         '<p class="note">Shares run from 0 to 1, lengths are in metres; intervals are 95 %: by '
         "bootstrap, of the mean over frames or of the median over rooms, and by Student's t over independent "
         "runs of the network.</p>{}"
     ).format(_verdict_counts(thesis), Markup("").join(map(_section, thesis)))
     if ours:
-        body += Markup('<h1>Ours, beyond the thesis</h1><p class="lead">{}</p>{}').format(
+        body += Markup('<h1>Our claims beyond the thesis</h1><p class="lead">{}</p>{}').format(
             _verdict_counts(ours), Markup("").join(map(_section, ours))
         )
     write_page(path, "PacketMesh: the thesis, computed again", body)
@@ -44,7 +44,7 @@ def _verdict_counts(verdicts: Sequence[Verdict]) -> str:
 
 def _section(verdict: Verdict) -> Markup:
     mark = MARKS.get(verdict.verdict, "")
-    judged = "It holds if" if verdict.beyond else f"The thesis: {verdict.thesis}. What tests it"
+    judged = "It holds if" if verdict.beyond else f"The thesis: {verdict.thesis}. Test"
     rows = []
     for name, value in verdict.ours.items():
         low, high = verdict.ci95.get(name, (None, None))

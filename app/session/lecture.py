@@ -32,8 +32,8 @@ from pipeline.types import ByteArray
 STUDENT_MESSAGE = re.compile(r"\d+ (?:(follow)|(roam)|vote ([123]))")
 """A message of a student's page: its number, which makes equal messages differ, and its content."""
 UNREACHED = Markup(
-    "<b>No other machine reaches this address.</b> Stop the lecture and start it again with "
-    "<code>--host 0.0.0.0</code>; then it is one that the class can open."
+    "<b>No other machine reaches this address.</b> Stop the lecture and start it again with <code>--host "
+    "0.0.0.0</code>; then the class can open its address."
 )
 """Warning for an address that only this machine can reach."""
 
@@ -166,11 +166,13 @@ class Lecture:
             steer = client.gui.add_checkbox(
                 "The class may steer",
                 self._all_steer,
-                hint="Whether the controls of the class do something, too. Without it they vote and look "
-                "around, each on their own.",
+                hint="Lets the students' controls change the session. Without it, students only vote and "
+                "turn their own view.",
             )
             steer.on_update(lambda _: self._post(self._let_steer, steer.value))
-            show = client.gui.add_button("Address of the class", hint="As a text and as a QR code.")
+            show = client.gui.add_button(
+                "Address of the class", hint="Shows the address as text and as a QR code."
+            )
             show.on_click(lambda _: self._post(self._show_address, client))
 
     def _show_address(self, client: viser.ClientHandle) -> None:

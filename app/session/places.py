@@ -78,7 +78,7 @@ class Places:
         wrong += self._take(dict(place.added), place.spec)
         if wrong:
             more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
-            session.notify("Not all of the address can be followed", f"{wrong[0].rstrip('.')}{more}.")
+            session.notify("Part of the address was ignored", f"{wrong[0].rstrip('.')}{more}.")
 
     def _take(self, added: Mapping[str, str], spec: Spec) -> list[str]:
         """Apply lesson stops first, then the parts that differ from them. Returns the error sentences."""

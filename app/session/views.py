@@ -86,7 +86,9 @@ class Views:
                 turn(self._client, self._framed[1], self._framed[0])
             return
         if view.shape != (6,) or not np.all(np.abs(view) < FARTHEST_M) or np.allclose(view[:3], view[3:]):
-            raise InputError("The address has a camera that is not two places, x,y,z,x,y,z in metres")
+            raise InputError(
+                "The address has an invalid camera; give its position and target, x,y,z,x,y,z in metres"
+            )
         self._requested = view.reshape(2, 3)
         turn(self._client, self._requested[1], self._requested[0])
 

@@ -45,7 +45,7 @@ class CompareArea:
                 side,
                 list(self._names),
                 initial_value=labels[name],
-                hint=f"What is shown {side.lower()} of the line.",
+                hint=f"Picture to the {side.lower()} of the line.",
                 visible=visible,
             )
             for side, name in (("Left", left), ("Right", right))
@@ -56,7 +56,7 @@ class CompareArea:
             100.0,
             1.0,
             50.0,
-            hint="Where the line is, in % of the picture's width; 0 shows only the right picture.",
+            hint="Position of the line, in % of the picture's width; 0 shows only the right picture.",
             visible=visible,
         )
         self._image = ui.gui.add_image(EMPTY, format="jpeg", jpeg_quality=QUALITY, visible=visible)
@@ -138,8 +138,8 @@ def place_of(text: str, start: tuple[str, str, float]) -> tuple[str, str, float]
 def no_pictures(text: str, start: tuple[str, str, float]) -> InputError:
     """Return the error for an address that does not name two pictures."""
     return InputError(
-        f"The address has pictures={text[:40]}; try two pictures and where the line is in %, such as "
-        f"{place_text(*start)}"
+        f"The address has pictures={text[:40]}; try two pictures and the position of the line in %, such "
+        f"as {place_text(*start)}"
     )
 
 

@@ -33,8 +33,9 @@ class Header:
         actions = gui.add_button_group(
             "All steps",
             ("Cancel", "Retry", "Reset", "Copy as command"),
-            hint="Cancel stops what is computing; Retry runs a cancelled or failed step again; Reset takes "
-            "settings, race, network and lessons back to the start; Copy as command shows the command line.",
+            hint="Cancel stops the computation; Retry runs a cancelled or failed step again; Reset "
+            "restores settings, race, network and lessons; Copy as command shows the equivalent "
+            "command.",
         )
         actions.on_click(lambda event: on_action(event.target.value))
 

@@ -124,4 +124,4 @@ def tell_unknown(name: str, names: Collection[str]) -> None:
     Raises:
         InputError: always; the session shows it.
     """
-    raise InputError(f"The address has {name[:40]}, which is not here; try one of {', '.join(names)}")
+    raise InputError(f"The address has {name[:40]}, which does not exist here; try one of {', '.join(names)}")

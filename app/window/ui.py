@@ -87,7 +87,9 @@ class Ui:
     def show_command(self, command: str) -> None:
         """Show a command line in a modal window."""
         with self.gui.add_modal("The same from the command line") as modal:
-            self.gui.add_markdown(Markdown("This computes and writes what the app shows now:"))
+            self.gui.add_markdown(
+                Markdown("This command computes and writes the results that the app shows now:")
+            )
             self.gui.add_html(command_html(plain(command)))
             self.gui.add_button("Close").on_click(lambda _: modal.close())
 

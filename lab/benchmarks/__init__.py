@@ -41,11 +41,11 @@ def run_benchmarks(
     Raises:
         InputError: a name is neither a case nor a group.
     """
-    wanted = set(only)
+    requested = set(only)
     named = {case: {case, case.partition(":")[0]} for case in cases}
     known = {name: None for names in named.values() for name in sorted(names)}
-    for name in sorted(wanted - set(known)):
+    for name in sorted(requested - set(known)):
         raise InputError(f"There is no benchmark '{name}'; known are {', '.join(known)}")
     for case, names in named.items():
-        if not wanted or names & wanted:
+        if not requested or names & requested:
             yield case, run_alone(cases[case])

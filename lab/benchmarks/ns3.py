@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from network_sim.config import MacConfig, MacKind, NetworkConfig, NodesConfig
+from network_sim.config import LEAST_CAPTURE_DB, MacConfig, MacKind, NetworkConfig, NodesConfig, RadioConfig
 from network_sim.mac import dcf, ieee802154
 from network_sim.mac.saturation import saturation
 from packetmesh.errors import PacketMeshError
@@ -38,7 +38,9 @@ Counts = Mapping[MacKind, tuple[int, ...]]
 NODES: Counts = {"ieee802154": (1, 2, 3, 4, 5), "ieee80211b": (1, 2, 3, 5, 10, 20, 50)}
 CONFIGS: dict[MacKind, NetworkConfig] = {
     "ieee802154": NetworkConfig(
-        mac=MacConfig(kind="ieee802154"), nodes=NodesConfig(payload_bytes=116, spacing_m=RADIUS_M)
+        mac=MacConfig(kind="ieee802154"),
+        nodes=NodesConfig(payload_bytes=116, spacing_m=RADIUS_M),
+        radio=RadioConfig(capture_db=LEAST_CAPTURE_DB),  # overlapping frames as in ns-3 (SPEC 6.3)
     ),
     "ieee80211b": NetworkConfig(
         mac=MacConfig(kind="ieee80211b"),

@@ -129,7 +129,7 @@ def solve(problem: Problem) -> list[dict[str, Any]]:
     known["error_before"] = scaled_displacement(problem.T_moved, source.points_m)
     started = time.perf_counter()
     try:
-        pair = prepared_pair(moved, target, RegistrationConfig(seed=0))
+        pair = prepared_pair(moved, target, RegistrationConfig(seed=0), units_known=True)
         config = with_gate(pair, RegistrationConfig(seed=0))
         result = register(pair.source, pair.target, config, pair.T_init)
     except PacketMeshError as error:

@@ -56,13 +56,13 @@ def run_claims(
     Raises:
         InputError: a name is not a claim, the folder cannot be written, or there is no such scheduler.
     """
-    wanted = list(only) or list(CLAIMS)
-    unknown = [name for name in wanted if name not in CLAIMS]
+    names = list(only) or list(CLAIMS)
+    unknown = [name for name in names if name not in CLAIMS]
     if unknown:
         raise InputError(f"There is no claim {', '.join(unknown)}; known are {', '.join(CLAIMS)}")
     with tempfile.TemporaryDirectory() as temporary:
         prepared: dict[Any, Any] = {}
-        for name in wanted:
+        for name in names:
             claim = CLAIMS[name]
             prepare = (full and claim.prepare_full) or claim.prepare
             if prepare is None:

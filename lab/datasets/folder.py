@@ -26,19 +26,19 @@ def find(root: Path) -> list[Load]:
 
 def _pairs(folder: Path) -> list[tuple[Path, Path]]:
     """Return image and depth of each pair in this folder."""
-    wanted = []
+    candidates = []
     for picture in _pictures(folder):
         stem, _, ending = picture.stem.rpartition("_")
         if picture.stem == "color":
-            wanted.append((picture, folder / "depth.png"))
+            candidates.append((picture, folder / "depth.png"))
         elif ending in ("rgb", "color"):
-            wanted.append((picture, folder / f"{stem}_depth.png"))
+            candidates.append((picture, folder / f"{stem}_depth.png"))
     if (folder / "depth").is_dir():
         pictures = [picture for color in COLOR_FOLDERS for picture in _pictures(folder / color)]
-        wanted += [(picture, folder / "depth" / f"{picture.stem}.png") for picture in pictures]
-    pairs = [(picture, depth) for picture, depth in wanted if depth.is_file()]
-    if len(pairs) < len(wanted):
-        log.warning("%d pictures in %s have no depth and are left out", len(wanted) - len(pairs), folder)
+        candidates += [(picture, folder / "depth" / f"{picture.stem}.png") for picture in pictures]
+    pairs = [(picture, depth) for picture, depth in candidates if depth.is_file()]
+    if len(pairs) < len(candidates):
+        log.warning("%d pictures in %s have no depth and are left out", len(candidates) - len(pairs), folder)
     return pairs
 
 

@@ -66,9 +66,9 @@ def _rows(places, keys, neighbours):  # type: ignore[no-untyped-def]
             i, j, m = x + neighbours[k, 0], y + neighbours[k, 1], z + neighbours[k, 2]
             if min(i, j, m) < 0 or max(i, j, m) >= _SIDE:
                 continue
-            wanted = (i * _SIDE + j) * _SIDE + m
-            row = np.searchsorted(keys, wanted)
-            if row < len(keys) and keys[row] == wanted:
+            key = (i * _SIDE + j) * _SIDE + m
+            row = np.searchsorted(keys, key)
+            if row < len(keys) and keys[row] == key:
                 rows[n] = row
                 break
     return rows

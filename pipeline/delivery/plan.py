@@ -53,6 +53,23 @@ def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> 
     return replace(network, nodes=nodes, run=replace(network.run, keep="all", warmup_s=0.0))
 
 
+def replaced_settings(network: NetworkConfig) -> dict[str, str]:
+    """Return the reason for each setting of a network that ``network_of`` replaces."""
+    image = "in a delivery every node of the rig sends its own image, once"
+    own = (
+        "nodes.images",
+        "nodes.interval_s",
+        "nodes.image_bytes",
+        "nodes.depth_bytes",
+        "nodes.bytes_by_node",
+    )
+    reasons = dict.fromkeys(own, image)
+    reasons |= dict.fromkeys(("run.keep", "run.warmup_s"), "a delivery needs every event from the start")
+    if not network.nodes.places_m:
+        reasons["nodes.count"] = "the rig has the nodes"
+    return reasons
+
+
 def places_of(rig: Rig, spacing_m: float) -> tuple[float, ...]:
     """Return x and y in metres of every camera and, last, of the sink."""
     cameras_m: FloatArray = np.array([frame.T_world_camera[:2, 3] for frame in rig.frames])

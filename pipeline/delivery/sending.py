@@ -116,8 +116,8 @@ def moment_times_ns(came: Arrivals, trace: NetworkTrace, count: int) -> NDArray[
     if not len(came.t_ns):
         return np.array([trace.horizon_ns])
     total = np.cumsum(came.byte_count, dtype=np.int64)
-    wanted = np.ceil(total[-1] * np.arange(1, count + 1) / count)
-    return np.unique(came.t_ns[np.searchsorted(total, wanted)])
+    thresholds = np.ceil(total[-1] * np.arange(1, count + 1) / count)
+    return np.unique(came.t_ns[np.searchsorted(total, thresholds)])
 
 
 def arrived_bytes(sending: Sending, t_ns: int) -> list[BoolArray]:

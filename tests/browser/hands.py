@@ -18,11 +18,11 @@ STEPS = ("Scene", "Calibrate", "Depth", "Fuse", "Surface", "Network", "Export")
 TEXTS = {
     "Scene": "Each camera node delivers",
     "Calibrate": "Photographs of a board of known size",
-    "Depth": "points the sensor measured",
-    "Fuse": "Each lane moves the same cloud",
+    "Depth": "points that the sensor measured",
+    "Fuse": "Each lane registers the same cloud",
     "Surface": "A ball rolls over the points",
     "Network": "by radio, packet by packet",
-    "Export": "Take it along",
+    "Export": "Download the results",
 }
 
 

@@ -103,7 +103,7 @@ def test_a_wrong_upload_is_a_sentence_and_the_session_goes_on(page):
         [("color.png", b"not a picture"), ("depth.png", b"nor this"), ("k.json", b"{}")]
     ):
         files.nth(index).set_input_files({"name": name, "mimeType": "image/png", "buffer": content})
-    page.get_by_text("All there: press the button.").wait_for()
+    page.get_by_text("All three are there: press the button.").wait_for()
     page.get_by_role("button", name="Reconstruct this pair").click()
     page.get_by_text("Scene failed").wait_for()
     page.get_by_text("Stopped").wait_for()

@@ -62,7 +62,7 @@ def test_a_dropped_view_is_left_out_and_comes_back(calibrated):
 
 def test_the_pictures_and_the_stage_follow_the_lists(calibrated):
     pick(calibrated, "Compare", HALVES)
-    calibrated.get_by_text("Two halves of the views put a point").wait_for()
+    calibrated.get_by_text("Difference of the two halves for a point").wait_for()
     for around in list(AROUND)[1:]:
         begin = canvas(calibrated)
         pick(calibrated, "In space", around)
@@ -107,7 +107,7 @@ def test_a_stop_of_the_lesson_unfolds_what_it_speaks_of(calibrated):
     expect(sliders).to_have_count(0)
     pick(calibrated, "Stop", "4. Sure of what, and where?")
     expect(sliders).to_have_count(1)
-    pick(calibrated, "Stop", "3. Ask those it has not seen")
+    pick(calibrated, "Stop", "3. Test on views left out")
     calibrated.get_by_text("(3 of 7)").locator("visible=true").first.wait_for()
     pick(calibrated, "Stop", "4. Sure of what, and where?")
     calibrated.wait_for_timeout(600)

@@ -81,7 +81,7 @@ def test_the_residuals_say_what_was_fitted(depth):
 
 
 def test_a_shorter_reach_lets_in_less(depth):
-    unfold(depth, "How far to believe it")
+    unfold(depth, "Confidence of inferred depth")
     row = depth.get_by_role("row", name="Out of reach")
     row.wait_for()
     handle = slider(depth, "Reach (% of the diagonal)")
@@ -125,7 +125,7 @@ def test_a_file_that_is_no_network_is_a_sentence_and_changes_nothing(depth):
         {"name": "mine.onnx", "mimeType": "application/octet-stream", "buffer": b"not a network"}
     )
     depth.get_by_text("is not a readable ONNX network").wait_for()
-    depth.get_by_text("The network before is kept.").wait_for()
+    depth.get_by_text("The previous network stays in use.").wait_for()
     expect(visible(depth, "Network file")).to_have_value("mine.onnx")
     depth.get_by_text("Up to date").wait_for()
     assert differing(canvas(depth), begin) <= ALIKE

@@ -161,7 +161,7 @@ def test_far_off_starts_farther_away_and_aligned_at_the_truth(fuse):
 
 def test_noise_changes_the_end_and_not_the_start(fuse):
     start, before = numbers(fuse, "Start error"), numbers(fuse, "End error")
-    unfold(fuse, "Make the moving cloud worse")
+    unfold(fuse, "Degrade the moving cloud")
     handle = slider(fuse, "Noise (cm)")
     handle.focus()
     handle.press("End")

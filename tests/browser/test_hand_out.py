@@ -106,7 +106,7 @@ def test_a_click_on_the_timeline_seeks_and_the_wheel_zooms_around_it(page):
     before = page.locator("#timeline").screenshot()
     for _ in range(16):
         page.mouse.wheel(0, -300)
-    page.get_by_text("one box a frame").wait_for()
+    page.get_by_text("one box per frame").wait_for()
     assert page.locator("#timeline").screenshot() != before
     page.mouse.click(x + 100, box["y"] + 20)
     page.wait_for_timeout(300)

@@ -21,7 +21,7 @@ def test_a_number_is_explained_by_a_click_on_its_name(page, note):
     go(page, "Surface")
     page.get_by_text("Up to date").wait_for()
     page.get_by_role("button", name="Area of holes").click()
-    expect(note).to_contain_text("as seen by the cameras")
+    expect(note).to_contain_text("holes that the cameras see")
     page.keyboard.press("Escape")
     expect(note).to_have_count(0)
 

@@ -127,7 +127,7 @@ def test_votes_are_counted_by_keys_and_by_buttons_and_stay_with_the_answer(teach
     student.keyboard.press("2")
     other.locator(".choice").nth(1).click()
     for page in (student, other):
-        expect(page.locator(".choice[aria-pressed=true]")).to_contain_text("beside the camera")
+        expect(page.locator(".choice[aria-pressed=true]")).to_contain_text("one side of the camera")
     bar = "████████████ 2"
     for page in (teacher, student, other):
         expect(page.locator(".packetmesh-lesson-card")).to_contain_text(bar)

@@ -84,7 +84,7 @@ def test_the_dock_has_the_keys_after_a_click_on_it_until_escape(page):
     go(page, "Fuse")
     begin(page, "ICP against CEICP", 10)
     page.locator(".packetmesh-dock-time").click()
-    seen(page, "The keys are the dock's now").wait_for()
+    seen(page, "The keys control the dock now").wait_for()
     seen(page, "Up to date").wait_for()
     page.keyboard.press("Home")
     expect(page.locator(".packetmesh-dock-time")).to_have_text(re.compile("^iteration 0 of"))
@@ -92,7 +92,7 @@ def test_the_dock_has_the_keys_after_a_click_on_it_until_escape(page):
     expect(page.locator(".packetmesh-dock-time")).to_have_text(re.compile("^iteration 1 of"))
     assert page.get_by_text(FIRST).locator("visible=true").count() == 0
     page.keyboard.press("Escape")
-    seen(page, "and the keys are the dock's").wait_for()
+    seen(page, "the keys control the dock.").wait_for()
     page.keyboard.press("ArrowRight")
     seen(page, FIRST).wait_for()
     unfold(page, "Lesson: ICP against CEICP")

@@ -143,7 +143,7 @@ def test_a_hand_drags_a_radio_by_its_arrow_and_it_is_sent_again(network):
     press(network, "Copy as command")
     assert "nodes.places_m=" in network.locator("pre").first.inner_text()
     press(network, "Close")
-    pick(network, "Move radio of", "nobody")
+    pick(network, "Move radio of", "none")
     network.get_by_text("Up to date").wait_for()
 
 

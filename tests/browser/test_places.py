@@ -70,7 +70,7 @@ def test_a_reload_and_back_give_back_screen_setting_and_what_the_screen_adds(pag
         page.get_by_text(SEEN.get(screen, TEXTS[screen.capitalize()])).locator(
             "visible=true"
         ).first.wait_for()
-        expect(page.get_by_text("Not all of the address")).to_have_count(0)
+        expect(page.get_by_text("Part of the address")).to_have_count(0)
         if way == page.go_back:
             other = "Depth" if screen == "scene" else "Scene"
             go(page, other)
@@ -95,7 +95,7 @@ def test_an_upload_opens_in_a_second_tab_with_the_first_one_closed(page, app):
             page.get_by_role("button", name=label).last.click()
         chooser.value.set_files(SCENES / "box-on-table" / "node_00" / name)
         page.wait_for_timeout(STEP_MS)
-    page.get_by_text("All there").wait_for()
+    page.get_by_text("All three are there").wait_for()
     press(page, "Reconstruct this pair")
     page.wait_for_url(re.compile("scene=upload-"))
     upload = {"scene": said(page)["scene"]}

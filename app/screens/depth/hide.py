@@ -18,14 +18,14 @@ from app.window.ui import Ui
 from pipeline.types import FloatArray
 
 TEXT = Markdown(
-    """Where the sensor is blind, nobody can tell how good a guess is. So **hide a part of what it did
-measure**, have it filled without that knowledge, and compare. **Tick the brush and click points in the
+    """Where the sensor measured nothing, the error of filled depth is unknown. So **hide a part of the
+measured depth**, fill it without that part, and compare. **Tick the brush and click points in the
 picture**, or place discs with the sliders."""
 )
 BUTTON = "Hide and fill"
 WAITING = Markdown("Filling …")
-SILENT = Markdown("No answer came. Press the button again.")
-BESIDE = Markdown("No measured point there. Click a point of the node that is chosen above.")
+SILENT = Markdown("There is no result. Press the button again.")
+BESIDE = Markdown("There is no measured point. Click a point of the node that is chosen above.")
 
 
 class HideFolder:
@@ -55,18 +55,33 @@ class HideFolder:
             "Brush", False, hint="Each click on a measured point in the 3-D scene hides a disc around it."
         )
         self._size = gui.add_slider(
-            "Diameter (%)", 4.0, 60.0, 1.0, 20.0, hint="Of the next disc, in % of the image's width."
+            "Diameter (%)",
+            4.0,
+            60.0,
+            1.0,
+            20.0,
+            hint="Diameter of the next disc, in % of the image's width.",
         )
         self._x = gui.add_slider(
-            "Centre x (%)", 0.0, 100.0, 1.0, 50.0, hint="Of the disc that Add puts, from the left."
+            "Centre x (%)",
+            0.0,
+            100.0,
+            1.0,
+            50.0,
+            hint="Centre of the next disc, in % of the image's width from the left.",
         )
         self._y = gui.add_slider(
-            "Centre y (%)", 0.0, 100.0, 1.0, 50.0, hint="Of the disc that Add puts, from the top."
+            "Centre y (%)",
+            0.0,
+            100.0,
+            1.0,
+            50.0,
+            hint="Centre of the next disc, in % of the image's height from the top.",
         )
         ui.buttons(
             "Discs",
             {"Add": self._add, "Undo": self._undo, "Clear": self.clear},
-            "Add: a disc where the sliders say. Undo: takes the last one away. Clear: all of them.",
+            "Add: add a disc with the sliders' values. Undo: remove the last disc. Clear: remove all discs.",
         )
 
     def show(self, cloud: SeenSample, T_world_camera: FloatArray) -> None:
@@ -153,8 +168,9 @@ def painted_line(discs: tuple[Disc, ...]) -> Markdown:
 def fills_table(view: HiddenView) -> Markup:
     """Return a table in HTML with a row per fill method: AbsRel, share within 5 %, share filled, time."""
     hint = (
-        "AbsRel: mean of |filled - measured| / measured over the hidden pixels that were filled. Within 5 %: "
-        "share of all hidden pixels. Filled: share that got a depth at all. Time without the network's own."
+        "AbsRel: mean of |filled - measured| / measured over the hidden pixels that were filled. Within "
+        "5 %: share of all hidden pixels. Filled: share of them that got a depth. Time: without the "
+        "colour network's inference."
     )
     rows = [
         (

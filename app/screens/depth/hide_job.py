@@ -37,7 +37,9 @@ def hide_job(store: Store, spec: Spec, request: HideRequest) -> Generator[Progre
     """
     rig, nodes = yield from store.stages(spec, "rig", "nodes")
     if not 0 <= request.node < len(rig.frames):
-        raise InputError(f"There is no node {request.node}, only {len(rig.frames)} of them; choose one anew.")
+        raise InputError(
+            f"There is no node {request.node} among the {len(rig.frames)} nodes; choose another node."
+        )
     frame, node = rig.frames[request.node], nodes[request.node]
     hidden = hidden_pixels(frame.depth, request.discs)
     rest = DepthMap(np.where(hidden, np.float32(np.nan), frame.depth.z_m))
@@ -51,7 +53,7 @@ def hide_job(store: Store, spec: Spec, request: HideRequest) -> Generator[Progre
     }
     rows, maps = [], {"measured": frame.depth, "hidden": rest}
     for index, (name, fill) in enumerate(ways.items()):
-        yield Progress(f"filling what is hidden: {name}", (index + 1) / (len(ways) + 1))
+        yield Progress(f"filling the hidden depth: {name}", (index + 1) / (len(ways) + 1))
         started = time.perf_counter()
         filled_m = fill().z_m
         elapsed_s = time.perf_counter() - started
@@ -73,8 +75,8 @@ def hidden_pixels(sensor: DepthMap, discs: Sequence[Disc]) -> BoolArray:
     hidden = covered(discs, x, y, columns, rows) & sensor.valid
     if hidden.sum() < LEAST_HIDDEN_PX:
         raise InputError(
-            f"Only {hidden.sum()} pixels under the brush are measured, and the test takes {LEAST_HIDDEN_PX}: "
-            "move it off the holes, make it larger or paint more."
+            f"Only {hidden.sum()} pixels under the brush are measured, and the test needs "
+            f"{LEAST_HIDDEN_PX}: move it off the holes, make it larger or paint more."
         )
     return hidden
 

@@ -85,7 +85,7 @@ def _pictures(frame: RgbdFrame, clouds: NodeClouds, judged: JudgedDepth) -> dict
     pictures = {
         "photo": Picture(frame.rgb, f"Colour image of {frame.name}"),
         "sensor": depth_picture(frame.depth, range_m, "Sensor depth"),
-        "inferred": depth_picture(aligned, range_m, "Inferred depth, made metric"),
+        "inferred": depth_picture(aligned, range_m, "Inferred depth, aligned"),
         "difference": difference_picture(aligned, frame.depth),
         "confidence": confidence_picture(judged.confidence, judged.flying, judged.out_of_reach),
     }

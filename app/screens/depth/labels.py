@@ -23,7 +23,7 @@ COLORINGS: dict[str, PointColoring] = {
 }
 """Colourings of the points."""
 ALIGNMENTS: dict[str, str] = {
-    "none": "none (as the network says)",
+    "none": "none (the network's values)",
     "median": "one scale",
     "affine_depth": "scale and shift",
     "affine_inverse": "scale and shift of 1/depth",
@@ -36,7 +36,7 @@ DRAWN = (HOLES, EVERYWHERE, UNSEEN)
 FILLS = {
     "measured": "as measured",
     "hidden": "hidden",
-    "ours": "as the settings fill it",
+    "ours": "with these settings",
     "network": "colour network, aligned",
     "nearest": "nearest fill",
     "inpaint-telea": "OpenCV inpainting, Telea",
@@ -44,7 +44,7 @@ FILLS = {
     "joint-bilateral": "joint bilateral fill",
 }
 """The hidden part: as measured, hidden, and filled by each method."""
-AS_IN_FILE = "as the file says"
+AS_IN_FILE = "from the file"
 
 
 def _choices(literal: object) -> dict[str, Any]:

@@ -40,7 +40,7 @@ def _hide(look: DepthLook, text: str) -> DepthLook:
         return replace(look, hide=None)
     found = re.fullmatch(rf"{NUMBER} ?% wide at {NUMBER} ?% {NUMBER} ?%", text)
     if found is None or any(float(value) > 100.0 for value in found.groups()):
-        raise ValueError("try 'nothing' or such as '20 % wide at 50 % 40 %', from the left and the top")
+        raise ValueError("try 'nothing' or for example '20 % wide at 50 % 40 %', from the left and the top")
     size, x, y = (float(value) / 100.0 for value in found.groups())
     return replace(look, hide=HideRequest(0, (Disc(x, y, size),)))
 

@@ -18,16 +18,16 @@ from pipeline.config import DepthConfig, ModelKind
 SHIPPED = "the network that ships"
 LIMIT_BYTES = 128 << 20
 TEXT = Markdown(
-    """Any ONNX network that makes depth of one picture will do. What it expects and what it answers
-(metric, relative or inverse depth, size, colours) is read from the file, or taken from a preset."""
+    """Any ONNX network that infers depth from one image can be used. The app reads its input (size,
+colours) and its output (metric, relative or inverse depth) from the file, or takes them from a preset."""
 )
 ADVICE: dict[ModelKind, Markdown] = {
-    "metric": Markdown("It gives metres: the alignments *none* and *one scale* are worth a look."),
+    "metric": Markdown("Its output is in metres: try the alignments *none* and *one scale*."),
     "relative": Markdown(""),
-    "inverse": Markdown("It gives 1/depth: the smooth correction starts from a line of 1/depth then."),
+    "inverse": Markdown("Its output is 1/depth: the smooth correction starts from a linear fit of 1/depth."),
 }
 TRYING = Markdown("Trying the network …")
-KEPT = Markdown("The network before is kept. Say what this one expects, or choose another.")
+KEPT = Markdown("The previous network stays in use. Set the input of this one, or choose another.")
 
 
 class ModelFolder:
@@ -40,17 +40,17 @@ class ModelFolder:
         gui = ui.gui
         with gui.add_folder("Neural network", expand_by_default=False):
             gui.add_markdown(TEXT)
-            self._model = gui.add_dropdown("Network file", [SHIPPED], hint="Which network infers the depth.")
+            self._model = gui.add_dropdown("Network file", [SHIPPED], hint="Network that infers the depth.")
             self._preset = gui.add_dropdown(
                 "Preset",
                 list(NETWORK_PRESETS),
-                hint="How to feed a network whose file does not say so: size, colours, kind of output.",
+                hint="Input size, colours and kind of output, for a network whose file does not state them.",
             )
             self._kind = gui.add_dropdown(
-                "Gives",
+                "Output",
                 list(NETWORK_KINDS),
-                hint="What the network's numbers mean: metric: metres; relative: depth up to a scale; "
-                "inverse: 1/depth up to scale and shift, as MiDaS and Depth Anything have it.",
+                hint="Meaning of the network's output. metric: metres; relative: depth up to a scale; "
+                "inverse: 1/depth up to scale and shift, as of MiDaS and Depth Anything.",
             )
             ui.when_changed(self._model, self._picked)
             for handle in (self._preset, self._kind):
@@ -73,15 +73,14 @@ class ModelFolder:
                 (0.0, 0.0),
                 min=(0.0, 0.0),
                 step=1.0,
-                hint="Width and height of the images it gets, where its file leaves them free; 0 and 0: as "
-                "the file says.",
+                hint="Width and height of its input, if the file leaves them open; 0 and 0: from the file.",
             )
             self._normalisation = gui.add_dropdown(
                 "Pixel values",
                 list(NORMALISATIONS),
                 hint="imagenet: with ImageNet's mean and deviation; unit: from 0 to 1; bytes: from 0 to 255.",
             )
-            gui.add_button("Use this input", icon=viser.Icon.CHECK, hint="Tries the network again.").on_click(
+            gui.add_button("Use this input", icon=viser.Icon.CHECK, hint="Runs the network again.").on_click(
                 lambda _: ui.post(self._chosen)
             )
 
@@ -144,10 +143,14 @@ class ModelFolder:
 def model_table(view: ModelView) -> Markup:
     """Return a table in HTML with the results of the trial and the metadata of the file."""
     rows = [
-        ("Answers", "What its numbers mean.", f"{view.kind} depth"),
+        ("Output", "Meaning of its output.", f"{view.kind} depth"),
         ("Provider", "The execution provider that onnxruntime really used.", view.provider),
-        ("First picture", "The first takes longer.", number(view.inference_s, 0, "ms", 1000.0)),
-        ("File", "Its size.", number(view.size_bytes, 1, "MB", 1e-6)),
+        (
+            "First picture",
+            "Computing time of the first picture; later ones are faster.",
+            number(view.inference_s, 0, "ms", 1000.0),
+        ),
+        ("File", "Size of the file.", number(view.size_bytes, 1, "MB", 1e-6)),
     ]
     rows += [(key, "From the file's own metadata.", text) for key, text in view.description.items()]
     return table(rows)

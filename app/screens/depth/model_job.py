@@ -27,7 +27,7 @@ def model_job(store: Store, spec: Spec, choice: ModelChoice) -> Generator[Progre
     """
     yield Progress("loading the network", 0.3)
     network = DepthNetwork.of(choice.put_into(DepthConfig()))
-    yield Progress("asking the network", 0.6)
+    yield Progress("running the network", 0.6)
     started = time.perf_counter()
     network.infer(TEST_IMAGE)
     return ModelView(

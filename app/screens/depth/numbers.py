@@ -36,7 +36,7 @@ def depth_table(node: DepthNode) -> Markup:
     share = rejected / max(1, kept + rejected)
     return table(
         [
-            ("Network", "The depth network's file. It sees the colours alone.", node.network),
+            ("Network", "File of the depth network. Its only input is the colour image.", node.network),
             (
                 "Network ran on",
                 "The execution provider that onnxruntime really used, and its time for this image.",
@@ -44,7 +44,7 @@ def depth_table(node: DepthNode) -> Markup:
             ),
             (
                 "Holes filled by",
-                "The file of the network whose depth is taken where the sensor is blind.",
+                "File of the network whose depth fills the sensor's holes.",
                 f"{node.completion} (colours and depth)" if node.completion else f"{node.network} (aligned)",
             ),
             ("Alignment", "How inferred depth was made metric.", ALIGNMENTS[node.alignment_mode]),
@@ -60,7 +60,7 @@ def depth_table(node: DepthNode) -> Markup:
             ),
             (
                 "Error in holes",
-                "Median error of the inferred depth where the sensor is blind, against the truth.",
+                "Median error of the inferred depth in the sensor's holes, against the truth.",
                 number(node.truth_error_m, 1, "cm", 100),
             ),
             (
@@ -86,7 +86,7 @@ def residual_table(node: DepthNode) -> Markup:
             ),
             (
                 "Median",
-                "Half of the pixels have a larger aligned minus sensor depth; far from 0 is a bias.",
+                "Median of aligned minus sensor depth; a value far from 0 is a bias.",
                 number(node.residuals.median_m, 2, "cm", 100),
             ),
             (
@@ -96,7 +96,7 @@ def residual_table(node: DepthNode) -> Markup:
             ),
             (
                 "Pixels compared",
-                "Those with sensor depth and inferred depth.",
+                "Pixels that have both sensor depth and inferred depth.",
                 f"{int(node.residuals.counts.sum()):,}",
             ),
         ]
@@ -109,18 +109,19 @@ def confidence_table(node: DepthNode) -> Markup:
     return table(
         [
             (
-                "Let in",
+                "Accepted",
                 "Share of the inferred pixels without sensor depth that fusion may use.",
                 number(judged.kept_share, 1, "%", 100),
             ),
             (
                 "Flying",
-                "Share of them that hang between two surfaces at a depth step; they are left out.",
+                "Share of these pixels that float between two surfaces at a depth step; they are left out.",
                 number(judged.flying_share, 1, "%", 100),
             ),
             (
                 "Out of reach",
-                "Share of them that are farther from any measured pixel than the reach; left out, too.",
+                "Share of these pixels that are farther than the reach from any measured pixel; they are "
+                "left out.",
                 number(judged.out_of_reach_share, 1, "%", 100),
             ),
         ]

@@ -28,13 +28,13 @@ from app.window.in_address import STOP, Awaited, Picked
 from app.window.panel import Panel
 
 TEXT = Markdown(
-    """**What you see.** Blue: points the sensor measured. Violet: points that are inferred: from the
-colour image, made metric where the sensor knows a depth too; in its holes from colours and measured depth
-together. Red: points the outlier filter rejects. Fusion takes violet points only where the sensor measured
-nothing. Go on with **Fuse**."""
+    """**What you see.** Blue: points that the sensor measured. Violet: inferred points. Where the sensor
+measured depth, they come from the colour image and are aligned with it; in its holes they come from colours
+and measured depth together. Red: points that the outlier filter rejects. Fusion takes violet points only
+where the sensor measured nothing. Go on with **Fuse**."""
 )
 CONFIDENCE_TEXT = Markdown(
-    "Inferred depth that flies, lies too far from anything measured or is hardly believed is left out."
+    "Inferred depth is left out at flying pixels, too far from measured pixels, and where confidence is low."
 )
 
 WORTH = Path(assets.__file__).parent / "depth" / "worth.md"
@@ -56,7 +56,7 @@ class DepthPanel(Panel):
         gui.add_markdown(TEXT)
         lesson = read_lesson(SHIPPED, SETTINGS, DepthLook(), NUMBERS)
         self._lesson = LessonFolder(self.ui, lesson, self._take_look, self._lesson_numbers)
-        nodes = gui.add_dropdown("Node", ["node_00"], hint="Whose images and numbers are shown below.")
+        nodes = gui.add_dropdown("Node", ["node_00"], hint="Node whose images and numbers are shown below.")
         self._node = Awaited(self.ui, nodes, self._picked_node)
         self._area = CompareArea(self.ui, PICTURES, "photo", "sensor")
         self._controls = [self._fields(FIRST)]
@@ -77,7 +77,7 @@ class DepthPanel(Panel):
             self._histogram = gui.add_plotly(
                 residual_figure(None), aspect=0.62, config={"displayModeBar": False}
             )
-        with gui.add_folder("How far to believe it", expand_by_default=False):
+        with gui.add_folder("Confidence of inferred depth", expand_by_default=False):
             gui.add_markdown(CONFIDENCE_TEXT)
             gui.add_markdown(shipped_markdown(WORTH.read_text("utf-8")))
             self._controls.append(self._fields(CONFIDENCE_CONTROLS))
@@ -89,7 +89,7 @@ class DepthPanel(Panel):
                 "Inferred points", list(DRAWN), hint="Which of the inferred (violet) points are drawn."
             )
             self._rejected = gui.add_checkbox(
-                "Outliers", True, hint="Draw the points the filter rejects, in red."
+                "Outliers", True, hint="Draw the points that the filter rejects, in red."
             )
             for handle in (self._drawn, self._rejected):
                 self.ui.when_changed(handle, self._draw)

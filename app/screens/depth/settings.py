@@ -15,14 +15,14 @@ FIRST = (
         "Alignment",
         "depth.alignment",
         ALIGNMENTS,
-        hint="How inferred depth is made metric, by what the sensor measured: one factor; a factor "
-        "and an offset; or these and a correction C of the rest that changes smoothly over the picture.",
+        hint="How inferred depth is aligned with the sensor's: by one factor; by a factor and an offset; "
+        "or by these and a correction C that varies smoothly over the image.",
     ),
     Choice(
         "Holes filled by",
         "depth.fill",
         {
-            "auto": "completion (a network of your own: it)",
+            "auto": "automatic: completion, or your own network",
             "completion": "completion: colours and depth",
             "network": "the colour network, aligned",
         },
@@ -36,7 +36,8 @@ CONFIDENCE_CONTROLS = (
         100.0,
         1.0,
         per_unit=100.0,
-        hint="How far from measured pixels inferred depth is let in, in % of the image's diagonal.",
+        hint="Largest distance from a measured pixel at which inferred depth is used, in % of the "
+        "image's diagonal.",
     ),
     Number(
         "Least confidence (%)",
@@ -45,7 +46,7 @@ CONFIDENCE_CONTROLS = (
         100.0,
         1.0,
         per_unit=100.0,
-        hint="Inferred depth that is believed less than this is left out; 0 leaves out nothing.",
+        hint="Inferred depth with a lower confidence is left out; 0 leaves out nothing.",
     ),
 )
 ADVANCED = (

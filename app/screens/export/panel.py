@@ -17,9 +17,9 @@ from packetmesh.errors import InputError
 from pipeline.types import ByteArray
 
 TEXT = Markdown(
-    """**Take it along.** Files hold metres, Z up. Pages need no server: they open in any browser, offline.
-The run folder is what `packetmesh reconstruct` writes: configuration, metrics, clouds, surfaces and the
-report."""
+    """**Download the results.** Coordinates are in metres, Z up. Pages need no server: they open in any
+browser, offline. The run folder has what `packetmesh reconstruct` writes: configuration, metrics, clouds,
+surfaces and the report."""
 )
 SURFACES: dict[Shown, str] = {
     "after": "the surface after fusion",
@@ -59,7 +59,7 @@ class ExportPanel(Panel):
 
     def on_spec(self, spec: Spec) -> None:
         """Show which surface is exported, and the files that are available."""
-        self._surface.content = Markdown("Surface and page hold **{}**, as the Surface screen shows.").format(
+        self._surface.content = Markdown("Surface and page contain **{}**, as on the Surface screen.").format(
             SURFACES[spec.shown]
         )
         self._arrange()
@@ -90,8 +90,10 @@ class ExportPanel(Panel):
                 plain(spec.command()),
                 Markdown("`{}` in its folder is {}.").format(FILES[spec.shown], SURFACES[spec.shown]),
             ),
-            Offers("Clouds", "Points of all nodes in the world frame, as the ball meets them; PLY.", clouds),
-            Offers("Numbers", "Everything measured and set, as JSON; or a ZIP of the whole run.", numbers),
+            Offers(
+                "Clouds", "Points of all nodes in the world frame, over which the ball rolls; PLY.", clouds
+            ),
+            Offers("Numbers", "All metrics and settings as JSON, or the whole run as a ZIP.", numbers),
         )
 
     def _arrange(self) -> None:

@@ -99,7 +99,7 @@ def scale(reference: Reference) -> dict[str, Any]:
         "stops": [css(stop) for stop in DISTANCE_STOPS],
         "ends": ("0", f"{100.0 * MOST_DISTANCE_M:.0f} cm and more"),
         "target": "the cloud that stays",
-        "pairs": "pairs; dark ones count most",
+        "pairs": "pairs; dark: large weight",
     }
 
 

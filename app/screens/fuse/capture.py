@@ -14,10 +14,10 @@ from app.window.ui import Ui
 REACHED, MISSED = "#bfe6d6", "#f3cdc8"
 COMPUTE, STOP = "Compute the map", "Stop the map"
 TEXT = Markdown(
-    """Which starts does a method come home from? 25 of them, on 2000 points of each cloud, with the
-methods, clouds and damage chosen above."""
+    """From which start poses does a method find the right pose? The map tries 25 of them, on 2000 points of
+each cloud, with the methods, clouds and degradations chosen above."""
 )
-COMPUTING = Markdown("Computing; the bar at the top shows how far.")
+COMPUTING = Markdown("Computing; the bar at the top shows the progress.")
 
 
 class CaptureFolder:
@@ -35,18 +35,20 @@ class CaptureFolder:
         gui = ui.gui
         with gui.add_folder("Capture range", expand_by_default=False):
             gui.add_markdown(TEXT)
-            ui.buttons("Map", {COMPUTE: on_compute, STOP: on_stop}, "It takes seconds; Stop ends it.")
+            ui.buttons(
+                "Map", {COMPUTE: on_compute, STOP: on_stop}, "The map takes some seconds; Stop cancels it."
+            )
             self._status = gui.add_markdown(Markdown(""))
             self._lane = gui.add_dropdown("Map of", [f"{MARKS[0]} first"], hint="Method whose map is shown.")
             ui.when_changed(self._lane, self._show)
             self._map = gui.add_html(Markup(""))
-            with gui.add_folder("The cells as buttons", expand_by_default=False):
+            with gui.add_folder("Starts as buttons", expand_by_default=False):
                 for turn_deg in CAPTURE_TURNS_DEG:
                     cells = {
                         cell_name(turn_deg, shift_m): functools.partial(on_cell, turn_deg, shift_m)
                         for shift_m in CAPTURE_SHIFTS_M
                     }
-                    ui.buttons(f"Turn {turn_deg:.0f}°", cells, "Start so far from aligned, and race.")
+                    ui.buttons(f"Turn {turn_deg:.0f}°", cells, "Race from this start.")
         self.forget()
 
     def forget(self) -> None:
@@ -95,10 +97,9 @@ def capture_html(view: CaptureView, lane: int) -> Markup:
         )
         lines.append(Markup("<tr><th>{:.0f}°</th>{}</tr>").format(turn_deg, cells))
     return Markup(
-        "<div style='padding: 0 0.8em 0.5em; font-size: 12px'>"
-        "{} Cells of <b>{}</b>: end error in cm; press one to race "
-        "from there."
-        "<table style='width: 100%; border-spacing: 2px; table-layout: fixed'>{}</table></div>"
+        "<div style='padding: 0 0.8em 0.5em; font-size: 12px'>{} Cells of <b>{}</b>: end error in cm; "
+        "press a cell to race from its start.<table style='width: 100%; border-spacing: 2px; "
+        "table-layout: fixed'>{}</table></div>"
     ).format(capture_sentence(view), view.labels[lane], Markup("").join(lines))
 
 
@@ -107,7 +108,7 @@ def capture_sentence(view: CaptureView) -> str:
     counts = (view.errors_m < SUCCESS_M).sum(axis=(1, 2))
     starts = view.errors_m[0].size
     reached = ", ".join(f"{label} {count}" for label, count in zip(view.labels, counts, strict=True))
-    return f"Of {starts} starts, so many end within {100 * SUCCESS_M:.0f} cm: {reached}."
+    return f"Starts that end within {100 * SUCCESS_M:.0f} cm, of {starts}: {reached}."
 
 
 def _cell(name: str, error_m: float) -> Markup:
@@ -118,5 +119,5 @@ def _cell(name: str, error_m: float) -> Markup:
     )
     text = f"{'✓' if arrived else '✗'} {number(error_m, 1 if error_m < 0.1 else 0, scale=100.0)}"
     return Markup(
-        '<td><button data-packetmesh-press="{}" title="{}: ends {} off" style="{}">{}</button></td>'
+        '<td><button data-packetmesh-press="{}" title="{}: final error {}" style="{}">{}</button></td>'
     ).format(name, name, number(error_m, 1, "cm", 100.0), look, text)

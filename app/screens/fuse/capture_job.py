@@ -30,7 +30,7 @@ def capture_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, Non
         contest = contest_of(rig, nodes, race)
         if contest.T_home is None:
             raise InputError(
-                "The truth of this scene is not known, so nothing tells which starts arrive; "
+                "The true poses of this scene are not known, so the capture range cannot be computed; "
                 "show the race inferred on sensor instead."
             )
         config = replace(spec.config.node_registration, max_points=MAP_POINTS)

@@ -6,10 +6,10 @@ from app.screens.fuse.view import Race
 from app.web.markup import Markdown
 from app.window.panel import Offer, Offers
 
-HINT = """The race as it is set up on the Fuse screen, with the error of every method: a page that plays it,
-offline, and a moving picture for slides."""
+HINT = """The race as it is set up on the Fuse screen, with the error of every method: an offline page that
+plays it, and an animation for slides."""
 NOTE = Markdown(
-    "No command plays a race; `packetmesh register` moves one cloud onto another by any of these methods."
+    "No command runs a race; `packetmesh register` registers one cloud with another by any of these methods."
 )
 
 

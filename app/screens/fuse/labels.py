@@ -11,13 +11,13 @@ from pipeline.config import Direction, Method, Metric
 
 MODES: dict[str, RaceMode] = {"node on node": "nodes", "inferred on sensor": "inferred"}
 DIRECTIONS: dict[str, Direction] = {
-    "source asks target": "q2p",
-    "target asks source": "p2q",
+    "from source to target": "q2p",
+    "from target to source": "p2q",
     "both": "both",
 }
 OFF_FROM: dict[Reference, str] = {
     "truth": "from the truth",
-    "pixels": "from where its own pixels are",
+    "pixels": "from the measured points of its pixels",
     "cloud": "to the nearest point",
 }
 """Meaning of the distance that a race shows."""
@@ -43,11 +43,23 @@ COMPARISONS: dict[str, tuple[Rival, ...]] = {
 """Comparisons of weights, of metrics, and of both."""
 NOBODY = "none"
 DEGRADATIONS: dict[str, tuple[str, float, float, float, str]] = {
-    "noise_m": ("Noise (cm)", 10.0, 0.5, 100.0, "More noise along the view rays: its standard deviation."),
-    "outlier_share": ("Outliers (%)", 60.0, 5.0, 100.0, "Points thrown anywhere into the cloud's box."),
-    "hole_share": ("Holes (%)", 80.0, 5.0, 100.0, "Points removed in round patches of the view."),
-    "crop_share": ("Cut off (%)", 80.0, 5.0, 100.0, "Points removed at one side, so that less overlaps."),
-    "depth_bias": ("Bias (%)", 15.0, 0.5, 100.0, "Smooth relative error of the depth: its RMS."),
+    "noise_m": ("Noise (cm)", 10.0, 0.5, 100.0, "Standard deviation of noise added along the view rays."),
+    "outlier_share": (
+        "Outliers (%)",
+        60.0,
+        5.0,
+        100.0,
+        "Share of random points added in the cloud's bounding box.",
+    ),
+    "hole_share": ("Holes (%)", 80.0, 5.0, 100.0, "Share of points removed in round patches of the view."),
+    "crop_share": (
+        "Cut off (%)",
+        80.0,
+        5.0,
+        100.0,
+        "Share of points removed at one side; reduces the overlap.",
+    ),
+    "depth_bias": ("Bias (%)", 15.0, 0.5, 100.0, "RMS of a smooth relative error of the depth."),
 }
 """By field of ``Race``: label, maximum, step, shown units per unit of the field, hint."""
 MOST_LANES = 4
@@ -55,16 +67,15 @@ MOST_SEED = 20
 MARKS = "①②③④"
 """Marks of the lanes."""
 TEXT = Markdown(
-    """**What you see.** Each lane moves the same cloud onto the grey one, from the same start; its colours
-are how far off every point is. **Play** below (space), then compare what made the
-difference."""
+    """**What you see.** Each lane registers the same cloud with the grey one, from the same start; colours
+show the error of every point. Press **Play** below (space), and compare the methods."""
 )
 SINGLE = Markdown(
-    """This scene has a single node: no other node to find its place beside. What races here is its
-inferred cloud, onto what its sensor measured."""
+    """This scene has a single node, so there is no other cloud to register it with. Here its inferred cloud
+races onto its measured cloud."""
 )
 MS = "ms"
-RUNNING = Markdown("Who comes nearer? At the end of the race its numbers are here.")
+RUNNING = Markdown("Which method ends nearer? The numbers appear here at the end of the race.")
 RACES = {f"race: {name}": mode for name, mode in MODES.items()}
 RACE_NAMES = {mode: name for name, mode in RACES.items()}
 RESULT, BEFORE = "result", "before registration"

@@ -52,7 +52,7 @@ def _start(text: str) -> Start:
     if found is not None:
         return Start.towards(float(found[1]), float(found[2]), seed=0)
     if text not in names:
-        raise ValueError(f"try one of {', '.join(names)} or such as '10 deg 20 cm'")
+        raise ValueError(f"try one of {', '.join(names)} or for example '10 deg 20 cm'")
     return Start.towards(*names[text], seed=0)
 
 

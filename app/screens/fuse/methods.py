@@ -39,43 +39,43 @@ METHODS: dict[str, About] = {
     ),
     "trimmed-icp": About(
         (170, 68, 153),
-        "Only a fixed share of the closest pairs counts, all of them the same. The share has to be known "
-        "beforehand.",
+        "Only a fixed share of the closest pairs counts, all of them the same. The share must be known "
+        "in advance.",
         "Chetverikov, Svirko, Stepanov, Krsek, ICPR 2002",
     ),
     "picp": About(
         (82, 60, 168),
-        "From few points to many, it keeps the closest of all pairs that share a point. Pairs far above the "
-        "usual distance are left out.",
+        "It works from few points to many and keeps only the closest of all pairs that share a point. "
+        "Pairs with a distance far above the usual one are left out.",
         "Zinsser, Schmidt, Niemann, ICIP 2003",
     ),
     "ricp": About(
         (150, 92, 20),
-        "Motions of small random sets of pairs compete, and the one with the least median residual wins. The "
-        "pairs that agree with it count the same, the others not at all.",
+        "Motions of small random sets of pairs compete, and the one with the least median residual wins. "
+        "The pairs that agree with it have equal weights, the others none.",
         "Trucco, Fusiello, Roberto, Pattern Recognition Letters 1999",
     ),
     "mricp": About(
         (184, 134, 11),
-        "Plain ICP on few points of both clouds, then on ever more. That is quick, and less easily caught by "
-        "small detail.",
+        "Plain ICP on few points of both clouds, then on more and more. This is fast, and small details "
+        "mislead it less.",
         "Jost, Hügli, 3DIM 2003",
     ),
     "ficp": About(
         (204, 85, 110),
-        "It chooses the share of the closest pairs anew at every matching, by a residual that rewards "
-        "keeping many. Those count the same, the others not at all.",
+        "At every matching it chooses the share of the closest pairs again, by a residual that rewards "
+        "keeping many. These have equal weights, the others none.",
         "Phillips, Liu, Tomasi, 3DIM 2007",
     ),
     "hicp": About(
         (210, 105, 50),
-        "Nearest means near in place and in hue. Of these pairs the closest share counts.",
+        "Pairs are nearest in position and hue together. Of these pairs only the closest share counts.",
         "Men, Gebre, Pochiraju, ICRA 2011",
     ),
     "ceicp-literal": About(
         (136, 34, 85),
-        "Pairs weigh −f log f, with f a Gaussian density fitted to their distances, as the thesis prints it. "
-        "A density has a unit, so the weights depend on whether one measures in millimetres or metres.",
+        "Pairs weigh −f log f, with f a Gaussian density fitted to their distances, as printed in the "
+        "thesis. A density has a unit, so the weights depend on the unit of length.",
         _THESIS,
     ),
     "ceicp-n": About(
@@ -92,25 +92,25 @@ METHODS: dict[str, About] = {
     ),
     "ceicp-r": About(
         (128, 138, 40),
-        "Pairs weigh −p log p, on a scale that follows the median of their distances. It never grows again.",
+        "Pairs weigh −p log p, on a scale that follows the median of their distances. The scale never grows.",
         f"{_THESIS}, made free of units; the robust scale is ours (SPEC 4.4)",
     ),
     "ceicp-ml": About(
         (50, 145, 195),
-        "Each point of the cloud that stays shares itself out among its five nearest counterparts. That "
-        "minimises the cross-entropy of the two clouds itself.",
+        "Each point of the fixed cloud spreads its weight over its five nearest counterparts. This "
+        "minimises the cross-entropy of the two clouds directly.",
         "Granger, Pennec, ECCV 2002; Myronenko, Song, TPAMI 2010",
     ),
     "kernel-correlation": About(
         (150, 110, 205),
-        "Every point pulls on its ten nearest counterparts, the nearer the stronger. The scale shrinks at "
-        "every iteration.",
+        "Every point attracts its ten nearest counterparts, nearer ones more strongly. The scale shrinks "
+        "at every iteration.",
         "Tsin, Kanade, ECCV 2004",
     ),
     "fast-robust-icp": About(
         (35, 85, 195),
-        "Pairs weigh less and less with their distance, on a scale that halves whenever the cloud has come "
-        "to rest. Steps are extrapolated; of all published methods it is the nearest to CEICP-A.",
+        "Weights fall with the pairs' distance, on a scale that halves whenever the cloud has stopped "
+        "moving. Steps are extrapolated; of all published methods it is the most similar to CEICP-A.",
         "Zhang, Yao, Deng, TPAMI 2021",
     ),
 }

@@ -14,9 +14,9 @@ from app.window.tables import Row, number, table
 
 STOPS = {"max_iterations": "limit"}
 _OFF: dict[Reference, tuple[str, str]] = {
-    "truth": ("error", "RMS distance of the moved points from where they truly are"),
-    "pixels": ("error", "RMS distance of the moved points from where the pixels are that they belong to"),
-    "cloud": ("gap", "Median distance of the drawn points to the nearest of the other cloud"),
+    "truth": ("error", "RMS distance of the moved points from their true places"),
+    "pixels": ("error", "RMS distance of the moved points from the measured points of the same pixels"),
+    "cloud": ("gap", "Median distance of the drawn points to the nearest point of the other cloud"),
 }
 
 
@@ -24,12 +24,12 @@ def verdict(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markdown:
     """Return a sentence on which method ends nearest to the reference position."""
     if reference == "cloud":
         return Markdown(
-            "The truth of this scene is not known. RMSE alone does not tell which is better: each method "
-            "pairs and weighs other points."
+            "The truth of this scene is not known. RMSE alone does not show which method is better, "
+            "because the methods pair and weight points differently."
         )
     ranking = sorted(((lane.steps[-1].point_error_m or 0.0), lane.label) for lane in lanes)
     (best_m, best), worst_m = ranking[0], ranking[-1][0]
-    missed = f" Nobody arrives within {100 * SUCCESS_M:.0f} cm." if best_m >= SUCCESS_M else ""
+    missed = f" No method ends within {100 * SUCCESS_M:.0f} cm." if best_m >= SUCCESS_M else ""
     if len(ranking) == 1:
         return Markdown("**{}** ends {} {}.{}").format(best, _cm(best_m), OFF_FROM[reference], missed)
     if _alike(best_m, worst_m):
@@ -71,8 +71,9 @@ def race_table(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markup:
         row("Iterations", "Matchings and pose updates until it stopped.", lambda x: str(x.iterations)),
         row(
             "Stopped",
-            "converged: it moves less than 0.1 mm and 0.1 mrad; stalled: no change of the error; limit: the "
-            "most iterations allowed; degenerate: too few pairs to go on; lost: no pair within the gate.",
+            "converged: it moves less than 0.1 mm and 0.1 mrad; stalled: no change of the error; limit: "
+            "all allowed iterations done; degenerate: too few pairs to go on; lost: no pair within the "
+            "gate.",
             lambda x: _stop_word(x.stop_reason),
         ),
         row(
@@ -82,13 +83,13 @@ def race_table(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markup:
         ),
         row(
             f"End {word}",
-            "The same at the end." + (" Below 2 cm counts as success." if word == "error" else ""),
+            "The same measure at the end." + (" Below 2 cm counts as success." if word == "error" else ""),
             lambda x: number(x.steps[-1].off_m, OFF_DIGITS, "cm", 100),
         ),
         row(
             "AHD",
-            "Average Hausdorff distance of the clouds at the end: mean distance to the nearest point, both "
-            "ways. It hardly tells methods apart where one cloud has holes.",
+            "Average Hausdorff distance of the clouds at the end: mean distance to the nearest point, "
+            "both ways. It hardly separates the methods if one cloud has holes.",
             lambda x: number(x.average_hausdorff_m, 2, "cm", 100),
         ),
         row(
@@ -98,7 +99,8 @@ def race_table(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markup:
         ),
         row(
             "Eff. pairs",
-            "Effective pairs of the last matching, (Σw)² / Σw²: as many equal weights would count as much.",
+            "Effective pairs of the last matching, (Σw)² / Σw²: this number of equal weights would have "
+            "the same effect.",
             lambda x: f"{x.effective_pairs:,.0f}",
         ),
         row(
@@ -131,7 +133,10 @@ def _agreeing(view: FuseView) -> str:
     """Return a sentence on the cameras' agreement; empty if no two measured the same place."""
     if not np.isfinite(view.agreement_share):
         return ""
-    return f" Of what two cameras both measured, {view.agreement_share:.1%} is within 2 %."
+    return (
+        f" Where two cameras measured the same surface, {view.agreement_share:.1%} of the points agree "
+        "within 2 %."
+    )
 
 
 def _place_row(row: RegistrationRow) -> Row:
@@ -148,7 +153,7 @@ def _place_row(row: RegistrationRow) -> Row:
 def _loop(row: RegistrationRow) -> str:
     """Return a sentence on how well the other registrations agree with this one."""
     if not row.used:
-        return "Not used: it degenerated, or the other registrations or both measurements contradict it."
+        return "Not used: it was degenerate, or the other registrations or the measured depth contradict it."
     if not np.isfinite(row.loop_error_m):
-        return "No loop checks it."
-    return f"The way round by the other nodes ends {number(row.loop_error_m, 1, 'cm', 100)} from it."
+        return "There is no loop to check it."
+    return f"The loop over the other nodes differs from it by {number(row.loop_error_m, 1, 'cm', 100)}."

@@ -80,7 +80,7 @@ class FusePanel(Panel):
         self._single = gui.add_markdown(SINGLE, visible=False)
         lesson = read_lesson(SHIPPED, SETTINGS, RaceLook(), NUMBERS)
         self._lesson = LessonFolder(self.ui, lesson, self._take_stop, self._lesson_numbers)
-        self._shown = gui.add_dropdown("Show", [*RACES, RESULT, BEFORE], hint="What the 3-D view shows.")
+        self._shown = gui.add_dropdown("Show", [*RACES, RESULT, BEFORE], hint="Contents of the 3-D view.")
         self.ui.when_changed(self._shown, self._picked_shown)
         self._setup = RaceSetup(self.ui, self._start)
         self._setup.add_comparisons()
@@ -106,11 +106,11 @@ class FusePanel(Panel):
             self._dragging = gui.add_checkbox(
                 "Drag",
                 False,
-                hint="Arrows and rings in the first lane move the start of all lanes.",
+                hint="Arrows and rings in the first lane change the start of all lanes.",
             )
             self.ui.when_changed(self._dragging, self._place_gizmo)
             self._setup.add_numbers()
-        with gui.add_folder("Make the moving cloud worse", expand_by_default=False):
+        with gui.add_folder("Degrade the moving cloud", expand_by_default=False):
             self._setup.add_degradations()
         self._capture = CaptureFolder(self.ui, self._map, session.cancel_side_job, self._picked_cell)
         with gui.add_folder("Chain", expand_by_default=False):

@@ -37,8 +37,8 @@ class RacePlayer:
         self._axis = self._ui.gui.add_dropdown(
             "Axis",
             list(CLOCKS),
-            hint="Whether the clock and the curves count iterations, or the milliseconds each method took "
-            "in this app's computing process, its preparation included.",
+            hint="Unit of the clock and the curves: iterations, or milliseconds of each method in this "
+            "app's computing process, preparation included.",
         )
         self._ui.when_changed(self._axis, lambda: self.load(self._lanes, self._reference))
 

@@ -47,7 +47,7 @@ class RaceSetup:
         self._ui.buttons(
             "Compare",
             actions,
-            "Other weights with the same metric; another metric with the same weights; or all of them.",
+            "Two weightings with one metric; two metrics with one weighting; or all four combinations.",
         )
 
     def add_methods(self, labels: Sequence[str]) -> None:
@@ -69,8 +69,8 @@ class RaceSetup:
             "Start",
             [*STARTS, BY_HAND],
             initial_value=SLIGHTLY,
-            hint="How far from aligned the moving cloud starts. Aligned is the truth where it is known, "
-            "otherwise what the nodes believe; an inferred cloud is aligned where its own pixels are.",
+            hint="Start error of the moving cloud, from its true pose or, if that is unknown, from the "
+            "nodes' own poses. An inferred cloud's true pose is that of its own pixels.",
         )
         self._ui.when_changed(self._preset, self._picked_preset)
 
@@ -82,7 +82,9 @@ class RaceSetup:
         )
         self._target = gui.add_dropdown("onto", names, hint="Node whose cloud stays (grey).")
         self._direction = gui.add_dropdown(
-            "Pairs", list(DIRECTIONS), hint="Whose points look for their nearest counterpart."
+            "Pairs",
+            list(DIRECTIONS),
+            hint="Cloud whose points are paired with their nearest points in the other cloud.",
         )
         for handle in (self._source, self._target, self._direction):
             self._ui.when_changed(handle, self._picked)
@@ -94,10 +96,11 @@ class RaceSetup:
             "Turn (°)",
             start.turn_deg,
             step=0.5,
-            hint="Rotation vector about the cloud's centre along the axes of the camera that stays, degrees.",
+            hint="Rotation vector about the cloud's centre, along the axes of the fixed node's camera, "
+            "in degrees.",
         )
         self._shift = gui.add_vector3(
-            "Shift (cm)", start.shift_cm, step=0.5, hint="Translation along the same axes, centimetres."
+            "Shift (cm)", start.shift_cm, step=0.5, hint="Translation along the same axes, in centimetres."
         )
         for handle in (self._turn, self._shift):
             self._ui.when_changed(handle, self._picked_numbers)
@@ -107,7 +110,7 @@ class RaceSetup:
             MOST_SEED,
             1,
             0,
-            hint="Draws the directions of the start error and what is done to the cloud.",
+            hint="Seed of the start error's directions and of the cloud's degradation.",
         )
         self._ui.when_changed(self._seed, self._picked_preset)
 

@@ -19,12 +19,14 @@ from network_sim.types import Cause
 from packetmesh.settings import differences
 
 REASONS = {
-    Cause.COLLISION: "Two cameras sent at once. It happens on every shared radio, even if the slider loses "
-    "nothing; WLAN sends such frames again.",
+    Cause.COLLISION: (
+        "Two cameras sent at the same time. This happens on every shared channel, even with "
+        "the loss slider at 0; WLAN sends such frames again."
+    ),
     Cause.NOISE: "The signal was too weak for all bits to be read.",
     Cause.RANGE: "The receiver was too far away, or behind a wall.",
-    Cause.LINK: "Lost as the slider above asks for.",
-    Cause.ACK_LOST: "The frame came, but the sender never heard so.",
+    Cause.LINK: "Lost at the rate that the slider above sets.",
+    Cause.ACK_LOST: "The frame arrived, but its acknowledgement did not.",
 }
 """Explanation of each cause of a loss."""
 BYTES_MB = 1e-6
@@ -42,14 +44,14 @@ def moment_table(view: DeliveryView, now: MomentView | None, now_ns: int) -> Mar
     rows: list[Row] = [
         (
             "Bytes at the sink",
-            "Of the encoded images of all cameras, each counted once.",
+            "Bytes of all cameras' encoded images, each counted once.",
             _megabytes(None if now is None else now.delivered_bytes),
             _megabytes(None if last is None else last.delivered_bytes),
             _megabytes(view.total_bytes),
         ),
         (
             "Frames lost",
-            "Attempts that failed until then; most are sent again.",
+            "Transmissions that failed until the column's time; most are sent again.",
             _count(None if now is None else now.packets_lost),
             _count(None if last is None else last.packets_lost),
             "0",
@@ -57,14 +59,14 @@ def moment_table(view: DeliveryView, now: MomentView | None, now_ns: int) -> Mar
         *_by_cause(view, now, last),
         (
             "Energy",
-            "Radios, computers and cameras of all nodes until then.",
+            "Energy of all nodes' radios, computers and cameras until the column's time.",
             number(None if now is None else now.energy_j, 1, "J"),
             number(None if last is None else last.energy_j, 1, "J"),
             "–",
         ),
         (
             "Rays without surface",
-            "Of the rays through all cameras' pixels, those that meet no triangle: the holes.",
+            "Share of the rays through all cameras' pixels that meet no triangle: the holes.",
             *_shares(
                 None if now is None else now.no_hit_share,
                 None if last is None else last.no_hit_share,
@@ -78,7 +80,7 @@ def moment_table(view: DeliveryView, now: MomentView | None, now_ns: int) -> Mar
         rows.append(
             (
                 "F-score at 5 cm",
-                "Harmonic mean of how much of the surface is right and how much of the truth is there.",
+                "Harmonic mean of the surface's accuracy and its coverage of the true surface.",
                 *_shares(
                     None if now is None else now.f_score,
                     None if last is None else last.f_score,
@@ -123,15 +125,21 @@ def more_rows(view: DeliveryView, now: MomentView | None) -> Markup:
     rows = [
         (
             node.name,
-            "Depth, of its measured pixels; colour and coarse depth, of all its pixels.",
+            "Depth: share of the measured pixels; colour and coarse depth: share of all pixels.",
             _percent(one.depth_share),
             _percent(one.color_share),
             _percent(one.coarse_share),
         )
         for node, one in zip(view.nodes, now.nodes, strict=True)
     ]
-    energy = ("Radios alone", "Of all nodes until then.", number(now.radio_j, 2, "J"), "", "")
-    sent = ("Sent on the air", "With headers and repeats.", _megabytes(now.sent_bytes), "", "")
+    energy = (
+        "Radios alone",
+        "Energy of all nodes' radios until the clock's time.",
+        number(now.radio_j, 2, "J"),
+        "",
+        "",
+    )
+    sent = ("Sent on the air", "Bytes with headers and retransmissions.", _megabytes(now.sent_bytes), "", "")
     return table([*rows, sent, energy], ("depth", "colour", "coarse"))
 
 
@@ -145,9 +153,9 @@ def summary(view: DeliveryView) -> Markdown:
         view.run.elapsed_s,
     )
     if not view.run.series or not len(view.run.pieces):
-        sentence += " Nothing happened in that time."
+        sentence += " No frame was sent in that time."
     if computed < planned:
-        sentence += f" Rebuilding the room: {computed} of {planned} moments."
+        sentence += f" Rebuilding the surface: {computed} of {planned} moments."
     elif not any(one.triangles for one in view.moments):
         sentence += " Too little arrived for a surface."
     return sentence
@@ -222,14 +230,14 @@ def legend(view: DeliveryView) -> Sequence[tuple[str, Number]]:
         some.append(("camera down", DOWN))
     pieces = view.run.pieces
     flying = [
-        (f"{name} on its way", PACKET_COLORS[kind])
+        (f"{name} on the air", PACKET_COLORS[kind])
         for kind, name in PACKET_NAMES.items()
         if np.any((pieces.what == What.AIR) & (pieces.carries == kind))
     ]
     if np.any(pieces.what == What.ACK):
-        flying.append(("acknowledgement on its way", ANSWER))
-    most = "empty battery" if view.sent.network.energy.battery_j else "most energy used here"
-    return [*some, *flying, ("lost here", LOSS), (f"ball: from little to {most}", EMPTY)]
+        flying.append(("acknowledgement on the air", ANSWER))
+    most = "an empty battery" if view.sent.network.energy.battery_j else "the most of any node"
+    return [*some, *flying, ("lost here", LOSS), (f"ball: energy used, from none to {most}", EMPTY)]
 
 
 def most_j(view: DeliveryView) -> float:

@@ -23,10 +23,10 @@ def delivery_offers(view: DeliveryView, now_ns: int, command: str) -> Offers:
             Offer(f"Mesh at {at}", "moment.glb", f"{JOB}:mesh_job", (index, "moment.glb")),
             Offer(f"Clouds at {at}", "moment.ply", f"{JOB}:cloud_job", (index,)),
         ]
-    hint = f"""A page that plays the delivery, offline, and a moving picture of it; mesh and measured points
-of what has arrived by the moment that the Network screen's clock shows ({at})."""
+    hint = f"""An offline page and an animation that play the delivery; mesh and measured points of the data
+that have arrived by the time on the Network screen's clock ({at})."""
     note = Markdown(
-        "`delivery.html` and `delivery.gif` in its folder are page and GIF; its mesh is that of the end."
+        "The command writes the page and the GIF as `delivery.html` and `delivery.gif`, and the final mesh."
     )
     return Offers("Delivery", hint, tuple(files), command, note)
 
@@ -42,6 +42,6 @@ def network_offers(labels: tuple[str, ...], commands: str) -> Offers:
         return Offers("Network", hint, files, note=Markdown("The command of the delivery writes no trace."))
     lines = [f"{line} --out runs/network-{row + 1}" for row, line in enumerate(commands.splitlines())]
     note = Markdown(
-        "`trace.ndjson` and `trace.csv` in its folder are the trace; no command draws the timeline."
+        "The command writes the trace as `trace.ndjson` and `trace.csv`; no command draws the timeline."
     )
     return Offers("Network", hint, files, "\n".join(lines), note)

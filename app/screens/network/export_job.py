@@ -68,7 +68,9 @@ def mesh_job(store: Store, spec: Spec, index: int, file: str) -> Content:
     moment = yield from moment_of(store, spec, Rebuilder(sending), index, 0)
     surface = moment.surface
     if surface is None or not len(surface.triangles):
-        raise InputError(f"At {moment.t_s:.3g} s there is no surface yet; move the Network screen's clock on")
+        raise InputError(
+            f"At {moment.t_s:.3g} s there is no surface yet; move the Network screen's clock to a later time"
+        )
     return _written(file, lambda path: write_mesh(path, surface))
 
 
@@ -89,7 +91,9 @@ def cloud_job(store: Store, spec: Spec, index: int) -> Content:
         colors.append(grey if cloud.colors is None or not got.rgb_known.any() else cloud.colors)
     whole = PointCloud(np.vstack(places), np.vstack(colors))
     if not len(whole):
-        raise InputError(f"At {moment.t_s:.3g} s no point is there yet; move the Network screen's clock on")
+        raise InputError(
+            f"At {moment.t_s:.3g} s no point has arrived yet; move the Network screen's clock to a later time"
+        )
     return _written("cloud.ply", lambda path: write_cloud(path, whole))
 
 

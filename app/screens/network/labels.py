@@ -32,8 +32,8 @@ NETWORKS: Mapping[str, Preset] = MappingProxyType(
     {
         "office": Preset(
             "Office: WLAN to one access point",
-            "IEEE 802.11b at 11 Mbit/s, the sink 8 m away, an uplink to the cloud; what is not there after "
-            "10 seconds is too late.",
+            "IEEE 802.11b at 11 Mbit/s, the sink 8 m away, an uplink to the cloud; the deadline is 10 "
+            "seconds.",
         ),
         "thesis-link": Preset(
             "Thesis: 250 kbit/s to one sink",
@@ -41,13 +41,13 @@ NETWORKS: Mapping[str, Preset] = MappingProxyType(
         ),
         "greenhouse": Preset(
             "Greenhouse: many hops, lossy radio",
-            "IEEE 802.15.4 that fades, radios that sleep three quarters of the time; what is not there after "
-            "five minutes is too late.",
+            "IEEE 802.15.4 with fading, radios that sleep three quarters of the time; the deadline is "
+            "five minutes.",
         ),
         "street-grid": Preset(
             "Street grid: vehicles and access points",
-            "Vehicles offer their images to four access points in passing; ten minutes are shown after a "
-            "warm-up of ten.",
+            "Vehicles that pass four access points offer them their images; the run is ten minutes after "
+            "ten of warm-up.",
             ("run.horizon_s=1200", "run.warmup_s=600", "run.keep=all"),
             street=True,
         ),
@@ -74,7 +74,7 @@ SCHEMES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "BASELINE: everything": ("scheme.name=baseline",),
         "GREEDY: what adds coverage": ("scheme.name=greedy",),
-        "GREEDY, at most 5 a request": ("scheme.name=greedy", "scheme.k=5"),
+        "GREEDY, at most 5 per request": ("scheme.name=greedy", "scheme.k=5"),
         "PDC: by chance, as offered": ("scheme.name=pdc",),
         "PDC: by chance, as received": ("scheme.name=pdc-received",),
     }
@@ -93,9 +93,9 @@ ACCESS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "IEEE 802.15.4 without ACK": ("mac.kind=ieee802154", "mac.ack=false", *CC2420_POWER),
         "IEEE 802.11b": ("mac.kind=ieee80211b", *WAVELAN_POWER),
         "IEEE 802.11b with RTS/CTS": ("mac.kind=ieee80211b", "mac.rts=true", *WAVELAN_POWER),
-        "a link of its own, 250 kbit/s": ("mac.kind=ideal", "mac.link_bps=250000"),
-        "a link of its own, 1 Mbit/s": ("mac.kind=ideal", "mac.link_bps=1000000"),
-        "a link of its own, 10 Mbit/s": ("mac.kind=ideal", "mac.link_bps=10000000"),
+        "a separate link for each node, 250 kbit/s": ("mac.kind=ideal", "mac.link_bps=250000"),
+        "a separate link for each node, 1 Mbit/s": ("mac.kind=ideal", "mac.link_bps=1000000"),
+        "a separate link for each node, 10 Mbit/s": ("mac.kind=ideal", "mac.link_bps=10000000"),
         "serial line, 57,600 baud": ("mac.kind=serial", "mac.link_bps=57600"),
     }
 )
@@ -159,12 +159,12 @@ TEXT = Markdown(
 **Play** below, and watch the mesh grow from what has arrived."""
 )
 STREET_TEXT = Markdown(
-    """Vehicles with cameras drive on a grid of streets and offer images to access points (green).
-**Play** below: every moving point is a frame on the air, a red one was lost there."""
+    """Vehicles with cameras drive on a grid of streets and offer images to access points (green). **Play**
+below: every moving point is a frame on the air; a red point is a frame that was lost there."""
 )
 ORIGIN = Markdown(
-    """The schemes are our reconstruction: of the paper they come from (Bruno & Nurchis, arXiv 1311.6013)
-only the abstract and the first lines could be read."""
+    """The schemes are our reconstruction: of their paper (Bruno & Nurchis, arXiv 1311.6013) only the
+abstract and the first lines were available."""
 )
-RUNNING = Markdown("Sending; the bar at the top shows how far. *Cancel* ends it.")
-PICK = Markdown("Click a frame on the timeline to see what it carried and how it fared.")
+RUNNING = Markdown("Sending; the bar at the top shows the progress. *Cancel* stops it.")
+PICK = Markdown("Click a frame on the timeline to see its contents and whether it arrived.")

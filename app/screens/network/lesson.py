@@ -91,7 +91,7 @@ def _place(text: str) -> Place:
     kind, _, number = text.partition(" ")
     if kind not in ("frame", "answer") or not number.isdecimal() or int(number) < 1:
         raise ValueError(
-            f"try start, end, such as '40 %', 'frame 1' or 'answer 1', or a cause: {', '.join(_CAUSES)}"
+            f"try start, end, for example '40 %', 'frame 1' or 'answer 1', or a cause: {', '.join(_CAUSES)}"
         )
     return Place("frame" if kind == "frame" else "answer", float(number))
 
@@ -214,7 +214,7 @@ def _worst(view: DeliveryView, end: MomentView) -> str:
     name, node = min(
         zip((one.name for one in view.nodes), end.nodes, strict=True), key=lambda one: one[1].depth_share
     )
-    return f"Of {name} {number(node.depth_share, 1, '%', 100.0)} of the measured pixels are there."
+    return f"Of the pixels that {name} measured, {number(node.depth_share, 1, '%', 100.0)} arrived."
 
 
 def _cost(view: DeliveryView, end: MomentView) -> str:

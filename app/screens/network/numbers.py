@@ -72,7 +72,7 @@ def verdict(views: Sequence[NetworkView]) -> Markdown:
         return nothing
     first, second = (view.label.partition(":")[0] for view in views)
     brings = Markdown(
-        "**{} brings {:.0%} of the images that {} brings, and keeps {:.0%} of what is seen**"
+        "**{} delivers {:.0%} of the images that {} delivers, and keeps {:.0%} of the coverage**"
     ).format(second, two[images] / one[images], first, two[coverage] / one[coverage])
     seen = f": {two[coverage]:.1%} of what the cameras saw instead of {one[coverage]:.1%}."
     return brings + seen
@@ -115,9 +115,9 @@ def runs_summary(views: Sequence[NetworkView]) -> Markdown:
         )
         if view.kept_until_ns < view.end_ns:
             sentences.append(
-                f"The timeline shows the first {(view.kept_until_ns - view.start_ns) / 1e9:,.1f} s, the "
-                "numbers and curves all."
+                f"The timeline shows the first {(view.kept_until_ns - view.start_ns) / 1e9:,.1f} s, "
+                "numbers and curves the whole run."
             )
         if not len(view.pieces):
-            sentences.append("Nothing happened in that time: no event was kept.")
+            sentences.append("The timeline is empty: no event was kept.")
     return Markdown(" ").join(sentences)

@@ -93,7 +93,7 @@ class Frames:
         first, last = np.searchsorted(answers.start_ns, (end_ns, end_ns + ANSWER_WITHIN_NS))
         back = answers.node[first:last] == one.peer[item]
         if (back & (answers.peer[first:last] == one.node[item])).any():
-            return "arrived and was answered"
+            return "arrived and was acknowledged"
         return "arrived"
 
 
@@ -106,8 +106,10 @@ def packet_sentence(packet: PacketView) -> str:
             where = f"row {rows[0] + 1}" if rows[0] == rows[-1] else f"rows {rows[0] + 1} to {rows[-1] + 1}"
             parts.append(f"{what} of {int(pixels.sum()):,} pixels in {where}")
     if not parts:
-        return "By itself it tells no measured pixel: there is none in its rows, or it needs other packets."
-    return f"It tells the {' and the '.join(parts)} (yellow in the picture and the cloud)."
+        return (
+            "This packet alone decodes to no measured pixel: its rows have none, or it needs other packets."
+        )
+    return f"This packet decodes to the {' and the '.join(parts)} (yellow in the picture and the cloud)."
 
 
 def legend_html(colors: Sequence[tuple[str, tuple[int, int, int]]]) -> Markup:

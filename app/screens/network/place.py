@@ -44,6 +44,9 @@ def show(name: str, handle: Any, text: str) -> None:
         except ValueError:
             value = None
     if value is None:
-        raise InputError(f"The address has {name}={text[:40]} of a network, which its control does not take")
+        raise InputError(
+            f"The address has {name}={text[:40]} for the Network screen, whose control does "
+            "not accept this value"
+        )
     if handle.value != value:
         handle.value = value

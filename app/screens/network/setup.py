@@ -18,9 +18,10 @@ from app.screens.network.what_if import WhatIf
 from app.web.markup import Markdown
 from app.window.ui import Ui
 from network_sim.config import NetworkConfig
+from network_sim.advice.no_effect import without_effect
 from network_sim.presets import PRESETS
 from packetmesh.errors import InputError
-from packetmesh.settings import differences, settings, with_settings
+from packetmesh.settings import differences, key_of, settings, with_settings
 from pipeline.config import PRESETS as CHAINS
 from pipeline.config import PipelineConfig
 
@@ -31,8 +32,8 @@ FIRST = next(iter(NETWORKS))
 MOMENTS = 20
 OF_NODES = ("off", "wall", "moved")
 FREE = Markdown(
-    """Any setting of `packetmesh simulate --describe`, several separated by spaces, for example
-`radio.capture_db=6 nodes.deadline_s=4`. Those for the second run apply to it alone."""
+    """Settings that `packetmesh simulate --describe` lists, separated by spaces, for example
+`radio.capture_db=6 nodes.deadline_s=4`. The settings of the second run apply only to that run."""
 )
 
 
@@ -50,9 +51,9 @@ class NetworkSetup:
         """Values of the controls before the user changes them."""
         self._pending: dict[str, str] = {}
         """Values for the nodes, which are known only after a delivery has come."""
-        self._preset = gui.add_dropdown("Preset", list(TITLES), hint="Which network carries the images.")
+        self._preset = gui.add_dropdown("Preset", list(TITLES), hint="Network that carries the images.")
         self._coding = gui.add_dropdown(
-            "Coding", list(CODING_NAMES), hint="How images become bytes, and which bytes go first."
+            "Coding", list(CODING_NAMES), hint="How images are encoded, and which bytes are sent first."
         )
         self._share = gui.add_slider(
             "Lose packets (%)",
@@ -60,7 +61,7 @@ class NetworkSetup:
             50.0,
             0.5,
             0.0,
-            hint="Share of the frames that get lost on every link, besides collisions.",
+            hint="Share of the frames lost on every link, in addition to collisions.",
         )
         self._burst = gui.add_slider(
             "in bursts of (frames)",
@@ -68,21 +69,21 @@ class NetworkSetup:
             50,
             1,
             8,
-            hint="How many get lost one after the other, on average.",
+            hint="Mean number of frames lost in a row.",
         )
         self._retransmit = gui.add_checkbox(
             "Send lost packets again",
             True,
-            hint="Packets that were given up are sent again. Each try of IEEE 802.11 has up to seven "
-            "attempts of its own: without this, bursts get through them, single losses do not.",
+            hint="Sends a packet again after the radio has given it up. IEEE 802.11 itself tries up to "
+            "seven times, which repairs single losses but not bursts.",
         )
-        self._vehicles = gui.add_slider("Vehicles", 1, 120, 1, 60, hint="How many of them have a camera.")
-        self._scheme = gui.add_dropdown("Scheme", ["-"], hint="Which images are asked for.")
+        self._vehicles = gui.add_slider("Vehicles", 1, 120, 1, 60, hint="Number of vehicles with a camera.")
+        self._scheme = gui.add_dropdown("Scheme", ["-"], hint="Rule by which access points request images.")
         self._beside = gui.add_dropdown(
-            "Beside", [NOTHING], hint="A second run with the same settings but this scheme."
+            "Compare with", [NOTHING], hint="A second run with the same settings but this scheme."
         )
         self._seed = gui.add_slider(
-            "Seed", 0, 50, 1, 0, hint="Everything that is drawn at random; the same seed gives the same run."
+            "Seed", 0, 50, 1, 0, hint="Seed of all random numbers; the same seed gives the same run."
         )
         ui.when_changed(self._preset, self._picked)
         for handle in (
@@ -98,23 +99,37 @@ class NetworkSetup:
     def add_advanced(self) -> None:
         """Add medium access, moments, and free text for all other settings."""
         gui, ui = self._ui.gui, self._ui
-        self._access = gui.add_dropdown("Medium access", list(self._ways), hint="Who may send when.")
+        self._access = gui.add_dropdown(
+            "Medium access", list(self._ways), hint="Rule by which nodes share the channel."
+        )
         self._shadowing = gui.add_slider(
-            "Shadowing (dB)", 0.0, 12.0, 0.5, 0.0, hint="Spread of each link's own constant gain or loss."
+            "Shadowing (dB)",
+            0.0,
+            12.0,
+            0.5,
+            0.0,
+            hint="Standard deviation of each link's constant gain or loss.",
         )
         self._moments = gui.add_slider(
-            "Moments", 4, 40, 1, MOMENTS, hint="At so many times the surface is rebuilt: after equal shares."
+            "Moments",
+            4,
+            40,
+            1,
+            MOMENTS,
+            hint="Number of times at which the surface is rebuilt, after equal shares of the bytes.",
         )
-        for handle in (self._access, self._shadowing, self._moments):
-            ui.when_changed(handle, self._on_change)
+        for handle in (self._access, self._shadowing):
+            ui.when_changed(handle, self._changed)
+        ui.when_changed(self._moments, self._on_change)
         gui.add_markdown(FREE)
         self._text = gui.add_text("Setting key=value", "", hint="For example nodes.deadline_s=4")
         self._beside_text = gui.add_text(
-            "Second run", "", hint="Settings that only a second run has; it is added if there is none."
+            "Second run", "", hint="Settings of the second run only; the run is added if there is none."
         )
-        gui.add_button("Use these settings", icon=viser.Icon.CHECK, hint="Sends again.").on_click(
-            lambda _: ui.post(self._use_text)
-        )
+        gui.add_button(
+            "Use these settings", icon=viser.Icon.CHECK, hint="Simulates the network again."
+        ).on_click(lambda _: ui.post(self._use_text))
+        self._idle = gui.add_markdown(Markdown(""))
         self.reset()
 
     @property
@@ -161,7 +176,7 @@ class NetworkSetup:
         for name, text in values.items():
             try:
                 if name not in handles:
-                    raise InputError(f"The address has {name[:40]} of a network, which is no control of it")
+                    raise InputError(f"The address has {name[:40]}, but this network has no such control")
                 show(name, handles[name], text)
             except InputError as error:
                 wrong.append(error)
@@ -314,9 +329,24 @@ class NetworkSetup:
         self._own |= {name: shown(self._handles()[name]) for name in loaded}
 
     def _use_text(self) -> None:
-        """Take the free settings; if they are wrong, the previous ones stay."""
+        """Take the free settings; if they are wrong, the previous ones stay. Name those without effect."""
         self._read_text()
+        self._changed()
+
+    def _changed(self) -> None:
+        """Name the settings without effect, and report the change."""
+        self._show_idle()
         self._on_change()
+
+    def _show_idle(self) -> None:
+        """Show why some of the given settings change nothing."""
+        given = [key_of(change) for change in (*self._extra, *self._beside_extra)]
+        if self._shadowing.value and not self.street:
+            given.append("radio.shadowing_db")
+        configs = list(self.runs().values()) if self.street else [self.sent().network]
+        said = [set(without_effect(config, given)) for config in configs]
+        sentences = [one for one in without_effect(configs[0], given) if all(one in other for other in said)]
+        self._idle.content = Markdown("\n\n").join(map(Markdown.escape, sentences))
 
     def _read_text(self) -> None:
         before = self._extra, self._beside_extra

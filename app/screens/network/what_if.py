@@ -17,10 +17,10 @@ from network_sim.radio.propagation import IEEE80211B
 from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.types import FloatArray
 
-NOBODY = "nobody"
+NOBODY = "none"
 SINK = "sink"
 RETRIES: dict[str, tuple[str, ...]] = {
-    "as the standard has it": (),
+    "standard": (),
     **{str(count): (f"mac.retries={count}",) for count in (0, 1, 2, 5, 10)},
 }
 RATES: dict[str, tuple[str, ...]] = {
@@ -33,7 +33,7 @@ MOST_AWAY_M, MOST_HALF_M = 1.0, 1.0
 APART = 0.4
 """Most of half the wall's length over the distance to the nearest other node: it affects one node."""
 MOVED_TEXT = Markdown(
-    "Drag the arrows: the radio moves and frames are sent from there; its camera stays. Choose *nobody* to "
+    "Drag the arrows: the radio moves and frames are sent from there; its camera stays. Choose *none* to "
     "put all radios back."
 )
 WALL_DB = 30.0
@@ -56,29 +56,35 @@ class WhatIf:
         """(2,) place of every node and of the sink before anything was moved."""
         self._moved_m: dict[str, FloatArray] = {}
         self._drawn: list[Any] = []
-        self._off = gui.add_dropdown("Switch off", [NOBODY], hint="This node has failed and sends nothing.")
+        self._off = gui.add_dropdown("Switch off", [NOBODY], hint="Node that has failed and sends nothing.")
         self._walled = gui.add_dropdown(
-            "Wall before",
+            "Wall at",
             [NOBODY],
-            hint="A wall stands between this node and the sink; serial lines and recorded links do not mind.",
+            hint="Puts a wall between this node and the sink; it has no effect on serial lines and "
+            "recorded links.",
         )
         self._wall_db = gui.add_slider(
-            "Wall takes (dB)", 0.0, 80.0, 1.0, WALL_DB, hint="Of the power of every frame that crosses it."
+            "Wall loss (dB)",
+            0.0,
+            80.0,
+            1.0,
+            WALL_DB,
+            hint="Attenuation of every frame that crosses the wall.",
         )
         self._retries = gui.add_dropdown(
             "Retries",
             list(RETRIES),
-            hint="How often a frame that is not acknowledged is sent again; only IEEE 802.15.4 with ACK and "
-            "802.11b do.",
+            hint="How often a frame without acknowledgement is sent again; only IEEE 802.15.4 with ACK "
+            "and 802.11b send again.",
         )
         self._rate = gui.add_dropdown(
             "802.11b rate",
             list(RATES),
-            hint="A slower frame lasts longer and is received from farther away and through thicker walls; "
-            "the other media have one rate each, under Medium access.",
+            hint="Frames at a lower rate take longer but reach farther and through thicker walls. Other "
+            "radios have one rate each, set by Medium access.",
         )
         self._mover = gui.add_dropdown(
-            "Move radio of", [NOBODY], hint="Arrows appear at this node; its camera stays where it is."
+            "Move radio of", [NOBODY], hint="Node whose radio the arrows move; its camera stays in place."
         )
         self._text = gui.add_markdown(Markdown(""))
         self._visible = True

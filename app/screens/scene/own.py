@@ -70,8 +70,9 @@ class OwnFolder:
                 min=0.0,
                 max=100_000.0,
                 step=1.0,
-                hint="Depth units in one metre (--depth-scale): 5000 for TUM's images. 0 takes whole numbers "
-                "as millimetres and metres in floating point, or what the kind of recording uses.",
+                hint="Depth units in one metre (--depth-scale): 5000 for TUM's images. 0: millimetres "
+                "for whole numbers and metres for floating point, or the unit of the kind of "
+                "recording.",
             )
             gui.add_markdown(PAIR_TEXT)
             for kind, (label, mime) in FILES.items():
@@ -82,7 +83,12 @@ class OwnFolder:
             )
             gui.add_markdown(RECORDING_TEXT)
             self._frames = gui.add_number(
-                "Frames", 3, min=1, max=MAX_NODES, step=1, hint="Of a recording; each becomes a node."
+                "Frames",
+                3,
+                min=1,
+                max=MAX_NODES,
+                step=1,
+                hint="Number of frames taken from a recording; each becomes a node.",
             )
             self._add_button("Recording …", RECORDINGS, self._keep_recording)
             self._notes = gui.add_markdown(Markdown(""))
@@ -101,7 +107,7 @@ class OwnFolder:
         self._have.content = (
             Markdown("Still needed: {}.").format(", ".join(missing))
             if missing
-            else Markdown("All there: press the button.")
+            else Markdown("All three are there: press the button.")
         )
 
     def _use_files(self) -> None:

@@ -22,9 +22,9 @@ from pipeline.io.demos import DEMO_SCENES
 from pipeline.sources import Demo, ImagePair, RigFolder
 
 TEXT = Markdown(
-    """**What you see.** Each camera node delivers a colour image and a depth image. The points are
-the depth pixels put where they belong in space; the gaps are what the sensor could not measure.
-Go on with **Depth**."""
+    """**What you see.** Each camera node delivers a colour image and a depth image. The points are the
+depth pixels at their places in space; gaps are pixels that the sensor could not measure. Go on with
+**Depth**."""
 )
 DEMOS = {name: scene.title for name, scene in DEMO_SCENES.items()}
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
@@ -58,7 +58,7 @@ class ScenePanel(Panel):
             "CEICP-A. thesis: rigid CEICP-N of the inferred on the sensor cloud, plain union.",
         )
         self.ui.when_changed(self._preset, self._picked_preset)
-        self._node = gui.add_dropdown("Node", ["node_00"], hint="Whose images are shown below.")
+        self._node = gui.add_dropdown("Node", ["node_00"], hint="Node whose images are shown below.")
         self.ui.when_changed(self._node, self._show_node)
         self._own = OwnFolder(
             self.ui, self.session.folder, self.session.new_folder, self._use_pair, self._read_recording
@@ -108,18 +108,18 @@ class ScenePanel(Panel):
                     ("Points", "Depth pixels that became points.", f"{node.sensor.total:,}"),
                     (
                         "Sensor coverage",
-                        "Share of the pixels for which the sensor knows a depth.",
+                        "Share of the pixels for which the sensor measured a depth.",
                         number(node.coverage, 1, "%", 100),
                     ),
                     (
                         "Holes",
-                        "Share of the pixels without depth: shadows of the projector, dark, shiny or steep "
-                        "surfaces, out of range.",
+                        "Share of the pixels without depth: in the projector's shadow, out of range, or "
+                        "on dark, shiny or steep surfaces.",
                         number(1 - node.coverage, 1, "%", 100),
                     ),
                     (
                         "Depth range",
-                        "2nd to 98th percentile of the known depths.",
+                        "2nd to 98th percentile of the measured depths.",
                         f"{node.nearest_m:.2f} to {node.farthest_m:.2f} m",
                     ),
                     (

@@ -12,12 +12,12 @@ from app.window.ui import Ui
 from pipeline.surface.findings import Suggestion
 
 TEXT = Markdown(
-    """A ball bridges the triangles around a point if it is as wide as the largest of their circumcircles.
-How wide that is can be read off the points before any ball rolls."""
+    """A ball closes the triangles around a point if its radius is at least that of their largest
+circumcircle. The app computes this radius from the points before any ball rolls."""
 )
-NO_ADVICE = "No point has neighbours on all sides, so no radius can be read off this cloud; try more points."
+NO_ADVICE = "No point has neighbours on all sides, so this cloud gives no radius; try more points."
 WAITING = Markdown("The first ball is about to roll.")
-STOPPED = Markdown("Stopped; the curves end where the sweep did.")
+STOPPED = Markdown("Stopped; the curves show the balls that have rolled.")
 UNNAMED = "–"
 """Label of the only button before there is a suggestion; it is hidden."""
 
@@ -47,11 +47,12 @@ class AdviceFolder:
             ui.buttons(
                 "All radii",
                 {"Sweep the radius": self._sweep, "Stop the sweep": on_stop},
-                "One ball after another, each alone over the cloud after fusion; it takes some seconds.",
+                "Rolls balls of increasing radius, each alone over the cloud after fusion; this takes "
+                "some seconds.",
             )
             self._status = gui.add_markdown(Markdown(""))
             self._below = gui.add_dropdown(
-                "Lower plot", list(BELOW), hint="What the lower of the two plots shows.", visible=False
+                "Lower plot", list(BELOW), hint="Quantities in the lower of the two plots.", visible=False
             )
             ui.when_changed(self._below, self._draw)
             self._plot = gui.add_plotly(

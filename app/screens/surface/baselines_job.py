@@ -38,8 +38,9 @@ def _note(clouds: FusedCloud, name: BaselineName, spec: Spec) -> str:
         largest_m = radii(spec.config.surface, clouds.r_F_m, clouds.sigma_D_m)[-1]
         return (
             f"Open3D's alpha shape (Edelsbrunner and Mücke 1994) with alpha {100 * largest_m:.3g} cm, the "
-            "radius of the largest ball: it bounds the small tetrahedra only, so a rough wall is a slab with "
-            "two sides and a smooth wall has gaps, which the full alpha shape would not have."
+            "radius of the largest ball: it keeps only faces of small tetrahedra, so a rough wall "
+            "becomes a slab with two sides, and a smooth wall has gaps that the full alpha shape would "
+            "not have."
         )
     return (
         "Screened Poisson reconstruction (Kazhdan and Hoppe 2013) with an octree of depth "

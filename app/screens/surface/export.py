@@ -7,10 +7,10 @@ from app.screens.surface.view import Coloring
 from app.web.markup import Markdown
 from app.window.panel import Offer, Offers
 
-HINT = """The surface as the Surface screen shows it: one page to turn it, offline, with a line between before
-and after; a moving picture of a flight along the cameras, for slides; the 3-D view as it is now."""
+HINT = """The surface as the Surface screen shows it: an offline page with the surface in 3-D and a line
+between before and after; an animation of a flight along the cameras, for slides; the current 3-D view."""
 NOTE = Markdown(
-    "No command makes these: each is of what you see. The meshes in them are those of the command above."
+    "No command writes these files: they show the current view. Their meshes are those of the command above."
 )
 
 

@@ -78,7 +78,7 @@ def flight_job(store: Store, spec: Spec, coloring: Coloring) -> Generator[Progre
         yield Progress(f"picture {done + 1} of {len(way)}", 0.1 + 0.8 * done / len(way))
         there.append(captioned(picture(camera), rig.name, NAMES[spec.shown], legend))
     stays_ms = [REST_MS, *[PICTURE_MS] * (len(there) - 2), REST_MS]
-    yield Progress("writing the moving picture", 0.95)
+    yield Progress("writing the animation", 0.95)
     return gif([*there, *there[-2:0:-1]], [*stays_ms, *stays_ms[-2:0:-1]])
 
 

@@ -15,22 +15,22 @@ from pipeline.surface.findings import Explanation, RayParts
 from pipeline.types import FloatArray
 
 TEXT = Markdown(
-    """**Click a red rim in the picture, or choose one here**, and read why it is there. The list goes
-along the mesh, so it also has gaps that no camera looks into: a *hole* is a loop of edges shorter than
-1 m with surface all around it; at a *rim* the surface ends, or the loop is longer."""
+    """**Click a red rim in the picture, or choose one here**, and read its cause. The list has all boundary
+loops of the mesh, also those that no camera sees: a *hole* is a loop shorter than 1 m with surface all
+around it; at a *rim* the surface ends, or the loop is longer."""
 )
 NONE = "none"
 LISTED_HOLES, LISTED_RIMS = 30, 10
-LOOKING = Markdown("Looking for the reason …")
-SILENT = Markdown(
-    "No answer came, since something else was computed instead. Click the hole again to ask once more."
-)
+LOOKING = Markdown("Looking for the cause …")
+SILENT = Markdown("There is no result, because another computation replaced this one. Click the hole again.")
 FILL_MOST_CM = 100.0
 FILL_OFF = Markdown(
-    "Filling is off. Drag the slider to close small holes by guessing, and see what that is worth."
+    "Filling is off. Drag the slider to close small holes with an invented surface, and compare its error."
 )
 FILLING = Markdown("Filling …")
-UNFILLED = Markdown("No answer came, since something else was computed instead. Drag the slider again.")
+UNFILLED = Markdown(
+    "There is no result, because another computation replaced this one. Drag the slider again."
+)
 NOTHING: tuple[HoleView, ...] = ()
 WHICH: tuple[Which, ...] = ("after", "before")
 
@@ -80,8 +80,8 @@ class HolesFolder:
             FILL_MOST_CM,
             5.0,
             0.0,
-            hint="Closes the holes of the surface after fusion whose loop is no longer than this with as "
-            "little area as possible. 0 is off. Rims, where the surface ends, are left alone.",
+            hint="Closes every hole after fusion whose loop is at most this long, with the least area; 0 "
+            "is off. Rims, where the surface ends, stay open.",
         )
         ui.when_changed(self._fill, self._dragged)
         self._filled = ui.gui.add_markdown(FILL_OFF)
@@ -213,7 +213,7 @@ class HolesFolder:
             return Markdown("Click a red rim, or show one surface alone to have its holes listed here.")
         rims = sum(hole.rim for hole in self._shown)
         counts = f"{_count(len(self._shown) - rims, 'hole')} and {_count(rims, 'rim')}"
-        return Markdown("{} {} fusion; none is chosen.").format(counts, self._which)
+        return Markdown("{} {} fusion; choose one.").format(counts, self._which)
 
     def _dragged(self) -> None:
         longest_cm = float(self._fill.value)
@@ -251,7 +251,7 @@ def shares_table(found: Explanation) -> Markup:
         for name, hint, share in (
             (
                 "Sensor measured",
-                "Pixels with sensor depth: there are points, so the ball or their normals leave the hole.",
+                "Pixels with sensor depth: there are points, so the ball or their normals cause the hole.",
                 found.sensor_share,
             ),
             (
@@ -261,7 +261,8 @@ def shares_table(found: Explanation) -> Markup:
             ),
             (
                 "Neither",
-                "Pixels for which nobody has a depth. Only another camera or invention can close these.",
+                "Pixels without measured or inferred depth. Only another camera or an invented surface "
+                "can close these.",
                 found.unknown_share,
             ),
         )
@@ -277,11 +278,9 @@ def parts_sentence(parts: RayParts) -> Markdown:
 
     missed = parts.missed_measured + parts.missed_inferred + parts.missed_unknown
     return Markdown(
-        "**All pixel rays, after fusion:** {} end on measured surface and "
-        "{} on inferred surface. {} miss it: "
-        "{} though the sensor measured there, "
-        "{} where only inference has a depth, "
-        "{} where nobody has one."
+        "**All pixel rays, after fusion:** {} end on measured surface and {} on inferred surface. {} "
+        "miss it: {} where the sensor measured depth, {} where there is only inferred depth, {} where "
+        "there is no depth."
     ).format(
         share(parts.on_sensor),
         share(parts.on_inferred),
@@ -295,15 +294,16 @@ def parts_sentence(parts: RayParts) -> Markdown:
 def filled_sentence(view: FilledView) -> Markdown:
     """Return markdown: the invented area, and how to judge it."""
     if not view.holes:
-        return Markdown("No hole is that small. Drag the slider further.")
+        return Markdown("No hole is that small. Drag the slider to a larger size.")
     truth = view.mesh.truth
     worth = (
-        "" if truth is None else f", and an F-score at 5 cm of {number(truth['f_score_5cm'], 1, '%', 100.0)}"
+        ""
+        if truth is None
+        else (f", and the F-score at 5 cm is {number(truth['f_score_5cm'], 1, '%', 100.0)}")
     )
     area, missed = number(view.area_m2, 1, "cm²", 1e4), view.mesh.quality.no_hit_ray_share
     return Markdown(
-        "**{} filled, {}.** The magenta surface is invented: nobody measured "
-        "it. It leaves {} no-hit rays{}. Compare that with the surfaces "
-        "before and after fusion: what fusion adds is inferred from the colour image, not made up from the "
-        "rim."
+        "**{} filled, {}.** The magenta surface is invented, not measured. With it {} of the rays miss "
+        "the surface{}. Compare with the surfaces before and after fusion: fusion adds surface inferred "
+        "from the colour image, not extrapolated from the rim."
     ).format(_count(view.holes, "hole"), area, number(missed, 1, "%", 100.0), worth)

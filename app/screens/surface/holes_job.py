@@ -61,7 +61,7 @@ def explain_job(store: Store, spec: Spec, which: Which, index: int) -> Generator
     def explain() -> Generator[Progress, None, ExplainView]:
         views = yield from views_of(store, spec)
         clouds, surface = yield from store.stages(spec, "clouds", which)
-        yield Progress("looking for the reason of the hole", 0.8)
+        yield Progress("looking for the cause of the hole", 0.8)
         holes = find_holes(surface.vertices_m, surface.triangles)
         if not 0 <= index < len(holes):
             raise InputError(

@@ -12,15 +12,17 @@ from pipeline.config import RadiusRule
 from pipeline.surface.findings import SEAM_M
 
 TEXT = Markdown(
-    """**What you see.** A ball rolls over the points and leaves a triangle wherever it rests on three.
-Too small, and it falls through between the points; too large, and it skips detail. Red lines are the rims
-of holes. Drag the radius, and compare before and after fusion. Go on with **Export**."""
+    """**What you see.** A ball rolls over the points and leaves a triangle wherever it rests on three. A
+ball that is too small falls through between the points; one that is too large skips detail. Red lines are
+the rims of holes. Drag the radius, and compare before and after fusion. Go on with **Export**."""
 )
 AFTER, BEFORE, BOTH = "after fusion", "before fusion (sensor only)", "side by side"
 POISSON, ALPHA = "Poisson, a baseline", "alpha shape, a baseline"
 BASELINES: dict[str, BaselineName] = {POISSON: "poisson", ALPHA: "alpha"}
 BASELINE_HEADS: dict[BaselineName, str] = {"poisson": "Poisson", "alpha": "alpha shape"}
-OWN_COLORS = "Colours cannot be chosen: a baseline makes vertices of its own, of which no point is known."
+OWN_COLORS = (
+    "A baseline has no choice of colours: its vertices are new, and no point of the cloud belongs to them."
+)
 SHOWN: dict[str, Shown] = {AFTER: "after", BEFORE: "before", BOTH: "after", **BASELINES}
 """The surface that is drawn and exported; of two side by side, the one after fusion."""
 PLACES = {"after": AFTER, "before": BEFORE, "both": BOTH, "poisson": POISSON, "alpha": ALPHA}
@@ -51,8 +53,8 @@ NAMES: dict[Shown, str] = {
 HINTS = {
     "Radii": "r_F and σ_D: mean and standard deviation of the distance to the nearest neighbour in the fused "
     "cloud. Several balls roll one after the other, the small ones first.",
-    "Show": "Which surface is drawn: the ball's, or that of another method over the same points.",
-    "Colours": "What the colours of the surface mean.",
+    "Show": "Surface that is drawn: the ball's, or that of another method from the same points.",
+    "Colours": "Meaning of the surface's colours.",
 }
 
 
@@ -60,7 +62,7 @@ _BOX = "display: inline-block; width: 0.9em; height: 0.9em; vertical-align: -0.1
 CLOSED = f"Holes of up to {100 * SEAM_M:.0f} cm around are closed here, not in the numbers."
 _INFERRED = ("inferred by the network", INFERRED)
 _OWN: dict[Coloring, str] = {
-    "photo": "The cameras' photographs; where none sees the surface, the colours of its points.",
+    "photo": "The cameras' photographs; where no camera sees the surface, the colours of its points.",
     "color": "The colours that the cameras saw at the points.",
 }
 
@@ -84,7 +86,7 @@ def legend_of(coloring: Coloring, has_truth: bool) -> Legend:
 
 def legend_html(coloring: Coloring, has_truth: bool, baseline: bool = False) -> Markup:
     """Return HTML of the legend of surface, baseline or left-out points."""
-    left_out = Legend("Points the ball left out:", (("measured", TARGET), _INFERRED))
+    left_out = Legend("Points that the ball left out:", (("measured", TARGET), _INFERRED))
     surface = Legend() if coloring in _OWN else legend_of(coloring, has_truth)
     closed = Legend(CLOSED if coloring in ("photo", "violet") else "")
     legends = (Legend(OWN_COLORS),) if baseline else (surface, left_out, closed)

@@ -54,7 +54,7 @@ def _radii(look: SurfaceLook, text: str) -> SurfaceLook:
     found = re.fullmatch(rf"{NUMBER} ?r_F", text)
     if found is None or not 0.0 < float(found[1]) <= _MOST_R_F:
         raise ValueError(
-            f"try one of {', '.join(_RULES)} or such as '1.5 r_F', above 0 and at most {_MOST_R_F:g} r_F"
+            f"try one of {', '.join(_RULES)} or for example '1.5 r_F', above 0 and at most {_MOST_R_F:g} r_F"
         )
     return replace(look, rule="manual", radius_in_r_F=float(found[1]))
 

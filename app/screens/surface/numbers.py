@@ -22,17 +22,17 @@ def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_trut
     rows = [
         row(
             "No-hit rays",
-            "Share of the cameras' pixel rays that miss the surface: what one sees as holes.",
+            "Share of the cameras' pixel rays that miss the surface: the visible holes.",
             lambda m: number(m.quality.no_hit_ray_share, 1, "%", 100),
         ),
         row(
             "Area of holes",
-            "Of all holes, as seen by the cameras, at the depth of the surface beside them.",
+            "Area of all holes that the cameras see, at the depth of the surface next to them.",
             lambda m: UNKNOWN if m.quality.gaps is None else number(m.quality.gaps.area_m2, 2, "m²"),
         ),
         row(
             "Large holes",
-            "Holes of 100 cm² or more: a hand fits through.",
+            "Holes of 100 cm² or more, as large as a hand.",
             lambda m: UNKNOWN if m.quality.gaps is None else f"{m.quality.gaps.large:,}",
         ),
         row(
@@ -41,14 +41,14 @@ def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_trut
             lambda m: UNKNOWN if m.quality.gaps is None else f"{m.quality.gaps.count:,}",
         ),
         row(
-            "Rays by guess",
-            "Share of the rays that meet surface most of whose points were inferred, not measured.",
+            "On inferred surface",
+            "Share of the rays that meet inferred surface: most of its points were inferred, not measured.",
             lambda m: number(m.quality.guessed_ray_share, 1, "%", 100),
         ),
         row(
             "Measured within 2 %",
-            "Share of the measured pixels whose ray meets the surface within 2 % of the measurement. It must "
-            "not fall by fusion: a measurement is never replaced by a guess.",
+            "Share of the measured pixels whose ray meets the surface within 2 % of the measurement. "
+            "Filling only the holes should not lower it, because it replaces no measurement.",
             lambda m: number(m.quality.within_2pct_share, 1, "%", 100),
         ),
         row(
@@ -60,8 +60,8 @@ def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_trut
         row("Triangles", "Triangles of the surface.", lambda m: f"{m.triangles:,}"),
         row(
             "Rim length",
-            "Length of all edges with one triangle: around holes, at the ends of the scene, and where "
-            "something stands before its background.",
+            "Length of all edges with one triangle: around holes, at the borders of the scene, and where "
+            "an object occludes its background.",
             lambda m: number(m.quality.boundary_length_m, 1, "m"),
         ),
         row("Pieces", "Connected components.", lambda m: f"{m.quality.components:,}"),
@@ -93,7 +93,11 @@ def note_html(view: BaselineView) -> Markup:
 def quick_line(view: PaintedView) -> Markup:
     """Return the line of a quick look, while the numbers below are still the previous ones."""
     mesh, radius_mm = next(iter(view.meshes.values())), 1000 * (view.request.radius_m or 0.0)
-    part = "" if view.points == view.all_points else f" of {view.all_points:,}; the rest when you let go"
+    part = (
+        ""
+        if view.points == view.all_points
+        else (f" of {view.all_points:,}; all points when you release the slider")
+    )
     return Markup(
         "<div style='padding: 0 0.8em; font-size: 13px'><b>{:.1f} mm</b>: "
         "{:,} triangles over {:,} points{}; rolled in "
@@ -104,15 +108,15 @@ def quick_line(view: PaintedView) -> Markup:
 def _rule(view: SurfaceView) -> Markup:
     """Return the rule for holes and, if there are more after fusion, the reason."""
     text = Markup(
-        "A <b>hole</b> is a patch of a camera's picture, of any size, whose rays miss the surface. The outer "
-        "rim of the scene is not one."
+        "A <b>hole</b> is a patch of a camera's picture, of any size, whose rays miss the surface. The "
+        "outer rim of the scene is not a hole."
     )
     before, after = (mesh and mesh.quality.gaps for mesh in (view.before, view.after))
     if before and after and after.count > before.count and after.area_m2 < before.area_m2:
         text += Markup(
-            " Fusion leaves <b>more but smaller</b> ones: it fills the middle of a large hole, and where "
-            "guess and measurement do not quite meet, a seam of tiny ones stays. Their area falls from "
-            "{:.2f} to {:.2f} m²."
+            " Fusion leaves <b>more but smaller</b> ones: it fills the middle of a large hole and leaves "
+            "a seam of tiny ones where inferred and measured surface do not quite meet. Their area falls "
+            "from {:.2f} to {:.2f} m²."
         ).format(before.area_m2, after.area_m2)
     return Markup("<div style='padding: 0.2em 0.8em; font-size: 13px'>{}</div>").format(text)
 
@@ -125,6 +129,6 @@ def _price(view: SurfaceView) -> Markup:
     if after >= before:
         return Markup("")
     return Markup(
-        "<div style='padding: 0.4em 0.8em; font-size: 13px'>Fewer holes have a price here: what fills them "
-        "is guessed, and the F-score falls from {:.1%} to {:.1%}.</div>"
+        "<div style='padding: 0.4em 0.8em; font-size: 13px'>Fewer holes have a price here: inferred "
+        "surface fills them, and the F-score falls from {:.1%} to {:.1%}.</div>"
     ).format(before, after)

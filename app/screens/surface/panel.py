@@ -70,7 +70,7 @@ class SurfacePanel(Panel):
         self._coloring = gui.add_dropdown("Colours", list(labels.COLORINGS), hint=labels.HINTS["Colours"])
         self._legend = gui.add_html(labels.legend_html("photo", False))
         self._loops = gui.add_checkbox("Hole rims", True, hint="Edges with one triangle only, in red.")
-        self._unused = gui.add_checkbox("Points left out", True, hint="Those that the ball never rested on.")
+        self._unused = gui.add_checkbox("Points left out", True, hint="Points that the ball never rested on.")
         self.ui.when_changed(self._coloring, self._picked_coloring)
         self.ui.when_changed(self._shown, self._picked_shown)
         for shown in (self._loops, self._unused):

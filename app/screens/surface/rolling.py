@@ -28,10 +28,11 @@ WAYS = {CLOSE_UP: "close", WHOLE: "whole"}
 CLOUDS: dict[str, Which] = {AFTER: "after", BEFORE: "before"}
 TEXT = Markdown(
     """A ball of true size is put down on three points and turns about one edge after the other until it
-touches the next point; every rest leaves a triangle. Green: the front, edges it has yet to turn about. Red:
-edges at which it found nothing, the rims of holes. Darker triangles are those of larger balls."""
+touches the next point; every rest leaves a triangle. Green: the front, edges about which the ball has not
+turned yet. Red: edges at which it found no point, the rims of holes. Darker triangles come from larger
+balls."""
 )
-WAITING = Markdown("Rolling; the bar at the top shows how far.")
+WAITING = Markdown("Rolling; the bar at the top shows the progress.")
 HAPPENED: dict[Happening, str] = {
     "seed": "put down on three points",
     "join": "joined a new point",
@@ -70,7 +71,7 @@ class RollingFolder:
         self._way = ui.gui.add_dropdown(
             "Watch", (CLOSE_UP, WHOLE), hint="A patch of the cloud in slow motion, or all its points."
         )
-        self._cloud = ui.gui.add_dropdown("Cloud", tuple(CLOUDS), hint="Over which points the ball rolls.")
+        self._cloud = ui.gui.add_dropdown("Cloud", tuple(CLOUDS), hint="Points over which the ball rolls.")
         for handle in (self._way, self._cloud):
             ui.when_changed(handle, self._chose)
         actions = {"Roll": self._request, "Close": self._close}
@@ -114,7 +115,7 @@ class RollingFolder:
         found = re.fullmatch(r"(\w+)-(\w+)-(\d{1,9})", place)
         ways, clouds = ({value: name for name, value in names.items()} for names in (WAYS, CLOUDS))
         if found is None or found[1] not in ways or found[2] not in clouds:
-            raise InputError(f"The address has ball={place[:30]}; try such as close-after-120")
+            raise InputError(f"The address has ball={place[:30]}; try for example close-after-120")
         self._way.value, self._cloud.value = ways[found[1]], clouds[found[2]]
         self._requested_step = int(found[3])
         self._request()
@@ -213,7 +214,7 @@ def status_line(view: WalkView, done: int) -> Markdown:
         Markdown("**Step {:,} of {:,}**").format(done, view.steps),
         f"{view.count(done):,} triangles",
         f"front {len(front):,} edges",
-        f"{len(dead):,} found nothing",
+        f"{len(dead):,} rim edges",
         radius,
     ]
     if done and view.happenings:

@@ -21,8 +21,8 @@ ADVANCED = (
         2_000,
         60_000,
         1_000,
-        hint="The clouds are voxel-averaged to about this many points before the ball rolls, or to the fewer "
-        "that voxels of twice the sensors' noise leave.",
+        hint="Number of points, approximately, to which the clouds are averaged over voxels before the "
+        "ball rolls. It is lower where such voxels would be smaller than twice the sensors' noise.",
     ),
     Number(
         "Smoothing passes",
@@ -30,8 +30,8 @@ ADVANCED = (
         0,
         5,
         1,
-        hint="How often every point is moved along its normal onto the plane of its neighbours. "
-        "0 leaves the sensor's noise in, as the thesis does, and the ball gets caught in it.",
+        hint="How often every point is moved along its normal onto the plane of its neighbours. 0 keeps "
+        "the sensor's noise, as the thesis does, and leaves more holes.",
     ),
 )
 

@@ -20,7 +20,7 @@ def suggestions_of(store: Store, spec: Spec) -> Generator[Progress, None, tuple[
     clouds = yield from store.stage(spec, "fused")
 
     def suggest() -> Generator[Progress, None, tuple[Suggestion, ...]]:
-        yield Progress("reading the ball radius off the points", 0.4)
+        yield Progress("computing the ball radius from the points", 0.4)
         return suggest_radii(clouds.fused)
 
     return (yield from store.remember(("suggest", key(spec, "fused")), suggest))

@@ -35,7 +35,7 @@ def walk_job(store: Store, spec: Spec, request: WalkRequest) -> Generator[Progre
     cloud = clouds.fused if request.which == "after" else clouds.sensor
 
     def walk() -> Generator[Progress, None, WalkView]:
-        yield Progress("choosing where to look", 0.0)
+        yield Progress("choosing a patch of the cloud", 0.0)
         return (yield from walk_over(cloud, radii_m, request))
 
     return (yield from store.remember(("walk", key(spec, "after"), request), walk))

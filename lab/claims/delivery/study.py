@@ -42,14 +42,14 @@ class Study:
         self, coding: str, loss: str = "burst", packet_bytes: int = LARGE, rigs: Iterable[str] = ()
     ) -> list[LossTask]:
         """Return the tasks with losses of a coding, by the default chain."""
-        wanted = tuple(rigs) or self.rigs
+        of_rigs = tuple(rigs) or self.rigs
         return [
             task
             for task in self.losses
             if (task.coding, task.loss, task.packet_bytes) == (coding, loss, packet_bytes)
             and task.share > 0.0
             and task.alignment == "local"
-            and task.rig in wanted
+            and task.rig in of_rigs
         ]
 
     def value(self, task: LossTask, name: str) -> float:

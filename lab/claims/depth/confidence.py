@@ -42,7 +42,7 @@ class Reliability:
     """(places, 3, 10) for every place and bin: pixels, sum of their confidences, correct pixels."""
 
     @property
-    def said(self) -> FloatArray:
+    def confidence(self) -> FloatArray:
         """(10,) mean confidence; NaN in an empty bin."""
         return self._share(1)
 
@@ -90,8 +90,8 @@ class Reliability:
 
 def gap_of(counts: FloatArray) -> float:
     """Return the expected calibration error of (places, 3, bins) counts (Naeini, Cooper, Hauskrecht 2015)."""
-    pixels, said, right = counts.sum(axis=0)
-    return float(np.abs(said - right).sum() / pixels.sum())
+    pixels, confidence, right = counts.sum(axis=0)
+    return float(np.abs(confidence - right).sum() / pixels.sum())
 
 
 def binned(confidence: FloatArray, right: BoolArray) -> FloatArray:
@@ -144,8 +144,8 @@ def judge_confidence(measured: Sequence[Reliability]) -> Outcome:
     ours: dict[str, float] = {}
     ci95: dict[str, tuple[float, float]] = {}
     for one in measured:
-        pixels, said, right = one.counts.sum(axis=(0, 2))
-        ours |= {f"said_{one.group}": said / pixels, f"true_{one.group}": right / pixels}
+        pixels, confidence, right = one.counts.sum(axis=(0, 2))
+        ours |= {f"said_{one.group}": confidence / pixels, f"true_{one.group}": right / pixels}
         ours[f"gap_{one.group}"] = one.gap
         ci95[f"gap_{one.group}"] = one.gap_ci95
     sentences = (
@@ -168,8 +168,8 @@ def confidence_chart(measured: Sequence[Reliability]) -> Chart:
     for one in measured:
         numbers = one.filled
         low, high = zip(*(one.true_ci95(number) for number in numbers), strict=True)
-        said, true = (tuple(values[numbers].tolist()) for values in (one.said, one.true))
-        curves.append(Curve(one.group, said, true, low, high))
+        confidence, true = (tuple(values[numbers].tolist()) for values in (one.confidence, one.true))
+        curves.append(Curve(one.group, confidence, true, low, high))
     return Chart(
         "Confidence, said against true",
         "said: mean confidence",
@@ -187,7 +187,7 @@ def confidence_table(measured: Sequence[Reliability]) -> Table:
             low, high = one.true_ci95(number)
             span = f"{EDGES[number]:.0%} to {EDGES[number + 1]:.0%}"
             true = f"{one.true[number]:.1%} [{low:.1%}, {high:.1%}]"
-            rows.append((one.group, span, int(one.pixels[number]), f"{one.said[number]:.1%}", true))
+            rows.append((one.group, span, int(one.pixels[number]), f"{one.confidence[number]:.1%}", true))
     return Table("Confidence in bins", ("images", "bin", "pixels", "said", "true"), tuple(rows), NOTE)
 
 

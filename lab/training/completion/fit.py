@@ -141,8 +141,8 @@ def fit(evidence: Evidence) -> FloatArray:
 
 def calibration(fitted: FloatArray, evidence: Evidence) -> Iterator[str]:
     """Yield, for each tenth of confidence: mean confidence, true share and number of pixels."""
-    said = expit(fitted[0] + evidence.features @ fitted[1:])
+    confidence = expit(fitted[0] + evidence.features @ fitted[1:])
     for low in np.arange(0.0, 1.0, 0.1):
-        inside = (said >= low) & (said < low + 0.1)
+        inside = (confidence >= low) & (confidence < low + 0.1)
         if inside.any():
-            yield f"{said[inside].mean():.1%} | {evidence.right[inside].mean():.1%} | {inside.sum()}"
+            yield f"{confidence[inside].mean():.1%} | {evidence.right[inside].mean():.1%} | {inside.sum()}"

@@ -177,8 +177,8 @@ def test_reset_leaves_the_lesson_and_takes_back_what_its_stop_had_set(tmp_path):
 
 
 PLAIN = (
-    r"3-D|k[12]|802\.11b?|1,500 bytes|1\.5 m only|1\.25 m|20 millionths|0\.02 ms|\b11? Mbit/s|250 kbit/s"
-    r"|0\.1 to the|node_02|16 × 16|16 pixels|√3|\+ 1, \+ 2 and \+ 4|from 0 to 2|within 5 %"
+    r"3-D|k[12]|802\.11b?|1,500 bytes|only 1\.5 m|1\.25 m|20 µs|0\.02 ms|\b11? Mbit/s|250 kbit/s"
+    r"|0\.1 to the|node_02|16 × 16|16 pixels|√3|\+ 1, 2 and 4|from 0 to 2|within 5 %"
 )
 """Numbers that no scene changes: of formulas, standards and settings."""
 
@@ -218,7 +218,7 @@ def test_a_field_is_the_number_of_now_or_of_another_stop_in_the_same_scene(tmp_p
 def test_a_field_that_nobody_computes_is_one_sentence(tmp_path, field):
     path = tmp_path / "lesson.md"
     path.write_text(f"# A\n## One\nx {field}\n## Two\ny")
-    with pytest.raises(InputError, match="no number of its screen; try one of end"):
+    with pytest.raises(InputError, match="not a number of its screen; try one of end"):
         read_lesson(path, SETTINGS, RaceLook(), ("end",))
 
 
@@ -356,7 +356,7 @@ def test_a_start_in_numbers_and_the_end(tmp_path):
         ("# A\n## One\nset: noise = much\nx", "try 0 to 10 cm"),
         ("# A\n## One\nopen:\nx", "section 'One', opens nothing"),
         ("# A\n## One\nset: holes = 95 %\nx", "try 0 to 80 %"),
-        ("# A\n## One\nset: start = near\nx", "try one of aligned, slightly off, far off or such as"),
+        ("# A\n## One\nset: start = near\nx", "try one of aligned, slightly off, far off or for example"),
         ("# A\n## One\nset: position = -1\nx", "try start, end or the number"),
         ("# A\n## One\nset: mode\nx", "cannot set mode = : try one of node on node"),
         ("# A\n## One\nask: Why?\nchoices:\n- [x] So.\nreveal: So.", "has no text"),

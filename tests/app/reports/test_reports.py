@@ -72,7 +72,8 @@ def test_claims_of_ours_stand_apart_from_the_thesis_s(tmp_path):
     ]
     write_reproduction_report(verdicts, tmp_path / "r.html")
     text = (tmp_path / "r.html").read_text()
-    places = [text.index(words) for words in ("claim C1", "Ours, beyond the thesis", "claim D1", "claim D2")]
+    heads = ("claim C1", "Our claims beyond the thesis", "claim D1", "claim D2")
+    places = [text.index(words) for words in heads]
     assert places == sorted(places)
     assert "Claims: 1 reproduced." in text
     assert "Claims: 1 holds, 1 does not hold." in text

@@ -98,6 +98,6 @@ def test_an_address_without_a_view_goes_back_to_the_apps(eye):
     "text", ["1,2", "a,b,c,d,e,f", "nan,0,0,0,0,0", "1,1,1,1,1,1", "1e9,0,0,0,0,0", ",,,,,"]
 )
 def test_what_is_no_view_gets_a_sentence(eye, text):
-    with pytest.raises(InputError, match="two places"):
+    with pytest.raises(InputError, match="an invalid camera"):
         eye.views.take(text)
     assert eye.view == SCENE

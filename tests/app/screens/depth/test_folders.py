@@ -158,7 +158,7 @@ def model(tmp_path):
 
 def test_a_preset_and_a_kind_are_chosen_with_the_file(model):
     model.gui.set("Preset", "midas-small")
-    model.gui.set("Gives", "inverse")
+    model.gui.set("Output", "inverse")
     model.gui.set("Preset", AS_IN_FILE)
     assert model.asked == [
         ModelChoice(None, "midas-small"),
@@ -191,7 +191,7 @@ def test_what_cannot_be_used_waits_for_what_it_expects(model):
     model.folder.write(DepthConfig())
     model.upload("odd.onnx")
     model.folder.load(None)
-    assert "before is kept" in model.gui.text()
+    assert "previous network stays" in model.gui.text()
     assert model.gui.find("Network file").value == "odd.onnx"
     model.gui.set("Preset", "midas-small")
     assert model.asked[-1] == ModelChoice(model.asked[0].model, "midas-small")
@@ -217,7 +217,7 @@ def test_a_network_from_the_command_line_is_listed_by_its_name(model):
     shown = {
         "Network file": "other.onnx",
         "Preset": "monodepth2",
-        "Gives": "inverse",
+        "Output": "inverse",
         "Size (px)": (640.0, 192.0),
         "Pixel values": "unit",
     }
@@ -228,7 +228,7 @@ def test_a_network_from_the_command_line_is_listed_by_its_name(model):
 def test_the_network_tells_what_it_is(model):
     view = ModelView(ModelChoice(), "inverse", "CPUExecutionProvider", 0.023, 5_000_000, {"licence": "MIT"})
     model.folder.load(view)
-    assert "line of 1/depth" in model.gui.text()
+    assert "linear fit of 1/depth" in model.gui.text()
     for part in ("inverse depth", "CPUExecutionProvider", "23 ms", "5.0 MB", "licence", "MIT"):
         assert part in model.gui.text()
 

@@ -166,7 +166,7 @@ def test_discs_hide_what_any_of_them_covers():
 def test_a_disc_without_measured_pixels_is_one_sentence(disc):
     z_m = np.ones((60, 80), np.float32)
     z_m[:, :40] = np.nan
-    with pytest.raises(InputError, match=f"the test takes {LEAST_HIDDEN_PX}: move it off the holes"):
+    with pytest.raises(InputError, match=f"the test needs {LEAST_HIDDEN_PX}: move it off the holes"):
         hidden_pixels(DepthMap(z_m), (disc,))
 
 

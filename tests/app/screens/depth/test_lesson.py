@@ -58,8 +58,8 @@ def test_to_hide_nothing_takes_back_what_was_to_be_hidden(tmp_path):
         ("reach = 0.1", "try more than 0 to 100 %"),
         ("reach = 0 %", "try more than 0 to 100 %"),
         ("least confidence = high", "try 0 to 100 %"),
-        ("hide = table", "try 'nothing' or such as '20 % wide at 50 % 40 %'"),
-        ("hide = 20 % wide at 50 % 140 %", "try 'nothing' or such as '20 % wide at 50 % 40 %'"),
+        ("hide = table", "try 'nothing' or for example '20 % wide at 50 % 40 %'"),
+        ("hide = 20 % wide at 50 % 140 %", "try 'nothing' or for example '20 % wide at 50 % 40 %'"),
     ],
 )
 def test_a_bad_setting_is_one_sentence(tmp_path, setting, sentence):
@@ -82,9 +82,9 @@ def test_the_stops_show_what_their_text_speaks_of():
     assert look_at("What the network says").right == "inferred"
     assert look_at("What the network says").alignment == "none"
     assert look_at("A line and a correction").right == "difference"
-    assert look_at("How far to believe it").coloring == "confidence"
+    assert look_at("How much to trust it").coloring == "confidence"
     assert look_at("Points that fly").reach < DepthConfig().reach
-    assert look_at("Hide what you know").hide is not None
+    assert look_at("Hide measured depth").hide is not None
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +115,7 @@ def test_confidence_and_what_is_left_out_are_as_the_lesson_says(room):
 
 @pytest.mark.parametrize("scene", ["living-room", "office", "workshop", "box-on-table"])
 def test_what_the_last_stop_hides_was_measured_in_every_scene(scene):
-    request = look_at("Hide what you know").hide
+    request = look_at("Hide measured depth").hide
     for frame in load_demo(scene).frames:
         columns = frame.depth.z_m.shape[1]
         (disc,) = request.discs

@@ -80,7 +80,7 @@ def test_a_node_that_an_address_asks_for_is_shown_once_it_is_there(session):
     session.panel.on_view("depth", view)
     assert node.place() == ""
     node.take("node_99")
-    with pytest.raises(InputError, match="node_99, which is not here; try one of node_00"):
+    with pytest.raises(InputError, match="node_99, which does not exist here; try one of node_00"):
         session.panel.on_view("depth", view)
     assert node.place() == ""
 
@@ -102,7 +102,7 @@ def test_a_bad_network_is_one_sentence_and_the_settings_stay(session):
     session.gui.upload("Add an ONNX file …", "bad.onnx", b"nonsense")
     assert session.spec == before
     assert "is not a readable ONNX network" in session.notices.pop()
-    assert "before is kept" in session.gui.text(MODEL)
+    assert "previous network stays" in session.gui.text(MODEL)
 
 
 def test_a_network_can_be_uploaded_and_given_back(session):

@@ -42,13 +42,13 @@ def lane(label, error_m, reason="converged", sigma_m=float("nan"), kernel=False)
     [
         ({"ICP point": 0.118, "CEICP-A plane": 0.001}, "**CEICP-A plane** ends 0.10 cm from the truth, "),
         ({"ICP point": 0.010, "CEICP-A plane": 0.015}, "**CEICP-A plane** 1.50 cm. So CEICP loses here."),
-        ({"ICP point": 0.05, "FICP plane": 0.09}, "Nobody arrives within 2 cm."),
+        ({"ICP point": 0.05, "FICP plane": 0.09}, "No method ends within 2 cm."),
         (
             {"ICP point": 0.0100, "CEICP-A plane": 0.0101},
             "Here both end equally far, 1.00 cm, from the truth.",
         ),
         ({"A": 0.01, "B": 0.01, "C": 0.01}, "Here all end equally far"),
-        ({"ICP point": 0.03}, "**ICP point** ends 3.00 cm from the truth. Nobody arrives"),
+        ({"ICP point": 0.03}, "**ICP point** ends 3.00 cm from the truth. No method ends"),
         ({"ICP point": None, "CEICP-A plane": None}, "The truth of this scene is not known."),
     ],
 )
@@ -60,7 +60,9 @@ def test_the_verdict_says_who_wins(errors_m, sentence):
 def test_where_nobody_knows_the_truth_nothing_speaks_of_it():
     lanes = (lane("ICP point", 0.03), lane("CEICP-A point", 0.01))
     said = verdict("pixels", lanes)
-    assert said.startswith("**CEICP-A point** ends 1.00 cm from where its own pixels are, **ICP point** 3.00")
+    assert said.startswith(
+        "**CEICP-A point** ends 1.00 cm from the measured points of its pixels, **ICP point** 3.00"
+    )
     unknown = race_table("cloud", tuple(lane(label, None) for label in ("ICP point", "CEICP-A point")))
     for html in (said, race_table("pixels", lanes), unknown):
         assert "tru" not in html
@@ -128,6 +130,6 @@ def test_the_places_say_how_far_the_cameras_agree_and_which_node_is_left_out(sha
     row = RegistrationRow("b", "a", "icp", 3, "converged", 0.01, None, None, float("nan"), False)
     poses = (np.eye(4), np.eye(4))
     said = places_table(FuseView(poses, poses, (row,), share, ("b is left out: of <what> both measured",)))
-    assert ("97.7% is within 2 %" in said) == np.isfinite(share)
+    assert ("97.7% of the points agree within 2 %" in said) == np.isfinite(share)
     assert "nan" not in said.lower()
     assert "b is left out: of &lt;what&gt; both measured" in said

@@ -181,5 +181,5 @@ def test_the_capture_range_is_the_same_again_and_from_any_start(capture, tmp_pat
 def test_without_truth_there_is_no_capture_range(tmp_path, rig):
     save_rig(tmp_path / "rig", replace(rig, truth=None))
     spec = replace(SPEC, source=RigFolder(str(tmp_path / "rig")))
-    with pytest.raises(InputError, match="truth of this scene is not known"):
+    with pytest.raises(InputError, match="true poses of this scene are not known"):
         end(capture_job(Store(str(tmp_path)), spec, Race()))

@@ -147,7 +147,7 @@ def test_the_table_shows_the_clock_and_says_why_frames_were_lost(screen):
     why = re.findall(r">· ([\w ]+)</button></td><td[^>]*>([\d,]+)</td>", html)
     assert sum(int(count.replace(",", "")) for _, count in why) == view.moments[-1].packets_lost
     assert ">by " in moment_table(view, view.moments[0], view.times_ns[0])
-    assert ("acknowledgement on its way", ANSWER) in legend(view)
+    assert ("acknowledgement on the air", ANSWER) in legend(view)
 
 
 def test_the_more_a_node_has_used_the_nearer_is_its_ball_to_orange(screen):
@@ -192,7 +192,7 @@ def test_picking_a_frame_tells_of_it_and_lights_its_pixels(screen):
     text = screen.gui.text("Packet")
     assert "→ sink" in text
     assert "Attempt" in text
-    assert "It tells the depth of" in text
+    assert "This packet decodes to the depth of" in text
     first, last = (int(n.replace(",", "")) for n in re.search(r"bytes ([\d,]+) to ([\d,]+)", text).groups())
     nodes = screen.spec.sent.network.nodes
     assert (last - first + 1, first % (last - first + 1)) == (nodes.payload_bytes - nodes.header_bytes, 0)
@@ -222,7 +222,7 @@ def test_a_node_switched_off_is_not_heard_and_the_difference_is_told(screen):
     assert "node_01 off" in screen.gui.text()
     assert f"instead of {100.0 * before.moments[-1].no_hit_share:.1f} %" in screen.gui.text()
     assert "--down node_01" in screen.panel.command
-    screen.gui.set("Switch off", "nobody")
+    screen.gui.set("Switch off", "none")
 
 
 def test_losses_that_nobody_repairs_cost_bytes(screen):
@@ -269,13 +269,13 @@ def test_frames_go_round_a_wall_over_another_camera_until_it_is_gone(screen):
 
     gui = screen.gui
     assert heard_by() == {"sink"}
-    gui.set("Wall takes (dB)", 80.0)
-    gui.set("Wall before", "node_01")
+    gui.set("Wall loss (dB)", 80.0)
+    gui.set("Wall at", "node_01")
     assert heard_by() == {"node"}
     assert "a wall of 80 dB" in gui.text()
     assert "radio.walls_m=" in screen.panel.command
     assert screen.drawn("/network/what-if/wall") is not None
-    gui.set("Wall before", "nobody")
+    gui.set("Wall at", "none")
     assert heard_by() == {"sink"}
     assert screen.drawn("/network/what-if/wall") is None
 
@@ -302,7 +302,7 @@ def test_a_second_drag_before_the_first_is_answered_counts_once(screen):
     run, row = screen.view.run, screen.view.nodes[0].row
     assert np.array([x_m, y_m]) - run.positions_m(run.start_ns)[row] == pytest.approx((0.4, 0.3), abs=2e-3)
     assert not what_if.off
-    ui.gui.set("Move radio of", "nobody")
+    ui.gui.set("Move radio of", "none")
     assert what_if.settings() == ()
 
 
@@ -314,7 +314,7 @@ def test_a_radio_that_is_dragged_out_of_range_is_not_heard_and_comes_back(screen
     assert screen.view.moments[-1].nodes[2].delivered_bytes == 0
     assert "radios moved" in gui.text()
     assert screen.handle("battery-node_02").position[0] > 9e4
-    gui.set("Move radio of", "nobody")
+    gui.set("Move radio of", "none")
     assert screen.view.moments[-1].delivered_bytes == view.total_bytes
     assert screen.drawn("/network/what-if/arrows") is None
 
@@ -332,6 +332,13 @@ def test_every_stop_of_the_lessons_asks_for_a_network_that_there_is(path):
         if stop.look.off:
             assert asked[-1].down == (stop.look.off,)
     assert len(set(asked)) >= 7
+
+
+def test_a_setting_that_changes_nothing_is_named_until_it_counts(screen):
+    screen.use("mac.rts=true")
+    assert "mac.rts changes nothing here: mac.kind is ieee802154" in screen.gui.text().replace("&#95;", "_")
+    screen.use("")
+    assert "changes nothing" not in screen.gui.text()
 
 
 def test_a_wrong_key_names_the_nearest_and_keeps_what_was(screen):
@@ -379,7 +386,7 @@ def test_vehicles_move_and_two_schemes_stand_beside_each_other(screen):
     assert (screen.handle("roads").colors == linear(np.array(STREET))).mean() > 0.8
     assert "Roads, each way" in gui.text()
     assert screen.panel._lanes()[0].labels(0)[0].text == "vehicle 1"
-    gui.set("Beside", "PDC: by chance, as offered")
+    gui.set("Compare with", "PDC: by chance, as offered")
     assert len(screen.results.view("network")) == 2
     assert [lane.labels(0)[0].text for lane in screen.panel._lanes()] == [
         "BASELINE · vehicle 1",
@@ -387,7 +394,7 @@ def test_vehicles_move_and_two_schemes_stand_beside_each_other(screen):
     ]
     assert ">PDC: by chance, as offered</th>" in gui.text()
     assert re.search(
-        r"PDC brings \d+% of the images that .+ brings, and keeps \d+% of what is seen", gui.text()
+        r"PDC delivers \d+% of the images that .+ delivers, and keeps \d+% of the coverage", gui.text()
     )
     lines = screen.panel.command.splitlines()
     assert len(lines) == 2

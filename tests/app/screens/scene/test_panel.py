@@ -133,7 +133,7 @@ def test_images_of_one_name_are_both_kept_by_it(session):
     [
         ("a.zip", b"nonsense", "cannot be read as a ZIP"),
         ("a.bag", b"nonsense", "bag"),
-        ("a.txt", b"nonsense", "no bag"),
+        ("a.txt", b"nonsense", "is a file not named .bag"),
         ("a.zip", zipfile.ZipFile, "of no known kind"),
     ],
 )

@@ -277,7 +277,7 @@ def test_an_answer_that_comes_after_filling_was_turned_off_is_not_told(screen):
 
 def test_sentences_carry_the_numbers(screen):
     assert parts_sentence(RayParts(0.5, 0.3, 0.05, 0.1, 0.05)).count("%") == 6
-    assert " 20.0 % miss it: 5.0 % though" in parts_sentence(RayParts(0.5, 0.3, 0.05, 0.1, 0.05))
+    assert " 20.0 % miss it: 5.0 % where" in parts_sentence(RayParts(0.5, 0.3, 0.05, 0.1, 0.05))
     text = filled_sentence(FILLED)
     assert "**3 holes filled, 123.0 cm².**" in text
     assert "3.1 %" in text

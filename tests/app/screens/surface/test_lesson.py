@@ -68,10 +68,10 @@ def test_all_that_can_be_shown_has_a_short_name(tmp_path):
     [
         ("radius = 2", "cannot set radius = 2: try one of show, radii, colours"),
         ("show = both", "try one of after fusion, before fusion, side by side, Poisson, alpha shape"),
-        ("radii = manual", "try one of thesis+, thesis or such as '1.5 r_F'"),
+        ("radii = manual", "try one of thesis+, thesis or for example '1.5 r_F'"),
         ("radii = 0 r_F", "above 0 and at most 20 r_F"),
         ("radii = 30 r_F", "above 0 and at most 20 r_F"),
-        ("radii = 20 mm", "such as '1.5 r_F'"),
+        ("radii = 20 mm", "for example '1.5 r_F'"),
         (
             "colours = truth",
             "try one of photographs, inferred in violet, the points' colours, source, distance to the truth,",

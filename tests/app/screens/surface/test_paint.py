@@ -98,7 +98,7 @@ def test_what_is_not_known_is_grey(made):
 
 def test_every_colouring_but_the_cameras_has_a_legend():
     for coloring in COLORINGS.values():
-        assert "Points the ball left out" in legend_html(coloring, True)
+        assert "Points that the ball left out" in legend_html(coloring, True)
         closed = "Holes of up to 15 cm around are closed" in legend_html(coloring, True)
         assert closed == (coloring in ("photo", "violet"))
         assert (legend_html(coloring, True) == legend_html("color", True)) == (coloring == "color")

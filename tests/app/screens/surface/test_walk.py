@@ -260,10 +260,10 @@ def test_a_close_up_has_a_focus_and_the_whole_has_none(room, close_up, whole):
 
 def test_the_line_tells_step_triangles_front_radius_and_what_happened(close_up, whole):
     line = status_line(close_up, 1)
-    assert line.startswith(f"**Step 1 of {close_up.steps}** · 1 triangles · front 3 edges · 0 found nothing")
+    assert line.startswith(f"**Step 1 of {close_up.steps}** · 1 triangles · front 3 edges · 0 rim edges")
     assert line.endswith("ball 16.0 mm (1 of 2) · **put down on three points**")
     assert "ball 30.0 mm (2 of 2) · **no edge is left to turn about**" in status_line(
         close_up, close_up.steps
     )
     assert status_line(whole, whole.steps).endswith("ball 30.0 mm (2 of 2)")
-    assert status_line(close_up, 0).endswith("front 0 edges · 0 found nothing · ball 16.0 mm (1 of 2)")
+    assert status_line(close_up, 0).endswith("front 0 edges · 0 rim edges · ball 16.0 mm (1 of 2)")
