@@ -33,7 +33,8 @@ SCRIPTS = tuple(
     _HERE / f"{name}.js"
     for name in (
         *("window/page", "window/hint", "window/dock_row", "dock/dock_view", "dock/dock", "dock/dock_plots"),
-        *("session/address", "lesson/lesson", "session/lecture", "screens/fuse/board", "landing"),
+        *("session/address", "lesson/lesson", "session/lecture", "screens/fuse/board"),
+        *("landing", "web/refused"),
     )
 )
 """Scripts in the order in which they run."""
@@ -41,7 +42,7 @@ STYLES = tuple(
     _HERE / f"{name}.css"
     for name in (
         *("window/page", "window/hint", "lesson/lesson", "dock/dock", "session/lecture"),
-        *("screens/fuse/board", "landing"),
+        *("screens/fuse/board", "landing", "web/refused"),
     )
 )
 
@@ -68,7 +69,7 @@ def landing_html(lecture: bool = False) -> Markup:
         '<main id="packetmesh-landing"{} inert role="dialog" aria-label="Welcome">'
         "<header><div><h1>PacketMesh</h1><p>From a camera network's packets to a surface mesh.</p></div>"
         '<button type="button" data-explore>Explore <kbd>Esc</kbd></button></header>'
-        "<article><div><h2>Six lessons, each of one question</h2><section>{}</section></div>{}"
+        "<article><div><h2>Six lessons, each about one question</h2><section>{}</section></div>{}"
         "</article></main>"
     ).format(shared, lessons, "" if lecture else others)
 

@@ -6,7 +6,7 @@ import contextlib
 import io
 import logging
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -36,6 +36,7 @@ from app.web.door import Door
 from app.web.entrance import Entrance, Token, is_loopback
 from app.web.gate import Gate
 from app.web.headers import strict_headers
+from app.web.names import allowed_names
 from app.web.origin import only_own_page, well_formed
 from app.web.own_folder import OwnFolder, own_folder
 from app.web.page import Page
@@ -51,8 +52,8 @@ PANEL_WIDTH_PX = 440
 ANYWHERE = "0.0.0.0"
 """Host that stands for all addresses of this machine."""
 FULL = (
-    f"There is room for {MOST_SESSIONS} browsers, {MOST_OF_ONE_ADDRESS} of them from one address, each with "
-    "a reconstruction of its own, and all places are taken. You come in automatically as soon as one is "
+    f"This server takes at most {MOST_SESSIONS} browsers, {MOST_OF_ONE_ADDRESS} from one address, each "
+    "with its own reconstruction, and all places are taken. You get in automatically as soon as one is "
     "free. With `packetmesh serve --lecture` all browsers share one reconstruction."
 )
 TRY_AGAIN = 1013
@@ -120,6 +121,7 @@ def build_server(
     lecture: bool = False,
     with_token: bool = True,
     pool: ComputePool | None = None,
+    allow_hosts: Iterable[str] = (),
 ) -> AppServer:
     """Start a server and return at once.
 
@@ -131,11 +133,14 @@ def build_server(
         lecture: share one session among all browsers, steered by those that open ``teacher_url``.
         with_token: admit only browsers that open ``class_link``, if other machines can reach the host.
         pool: a pool that is already started; None starts one. It stops with the server.
+        allow_hosts: further names of this server, which a proxy in front of it has.
 
     Raises:
-        InputError: the port is taken, the address is not this machine's, or the installed viser is unknown.
+        InputError: the port is taken, the address is not this machine's, a name is no host name, or the
+            installed viser is unknown.
         OSError: the server's folder cannot be made.
     """
+    allowed = allowed_names(allow_hosts)
     _check_address(host, port)
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # a port scan needs no stack trace
     share_arenas()
@@ -147,7 +152,7 @@ def build_server(
     visitor = Token("token") if with_token and not is_loopback(host) else None
     entrance = Entrance(visitor, teacher)
     door = Door()
-    server = _listening(host, port, door, entrance, page)
+    server = _listening(host, port, door, entrance, page, allowed)
     gate = Gate(server)
     app = AppServer(server, pool, folder, entrance=entrance)
     if port and server.get_port() != port:
@@ -172,13 +177,15 @@ def build_server(
     return app
 
 
-def _listening(host: str, port: int, door: Door, entrance: Entrance, page: Page) -> viser.ViserServer:
+def _listening(
+    host: str, port: int, door: Door, entrance: Entrance, page: Page, allowed: frozenset[str]
+) -> viser.ViserServer:
     """Return a server whose requests pass these checks in this order."""
     with contextlib.ExitStack() as outermost_first:
         for answers in (
             well_formed(),
-            strict_headers(page.script_hashes),
-            only_own_page(),
+            strict_headers(page.script_hashes, allowed),
+            only_own_page(allowed),
             entrance.guarded(),
             door.guarded(),
             page.served(),
@@ -209,14 +216,14 @@ def _let_in(app: AppServer, gate: Gate, begin: Callable[[Target, int], Session])
         try:
             built = begin(client, client.client_id).built
         except OSError as error:
-            client.add_notification("You cannot come in", file_trouble(error), color="red")
+            client.add_notification("The app cannot start for you", file_trouble(error), color="red")
             return None
         if client.client_id not in server.get_clients():  # it left before its session was built
             leave(client)
         return built
 
     def wait(client: viser.ClientHandle) -> None:
-        title = "You wait for a place"
+        title = "You are waiting for a place"
         notes[client.client_id] = client.add_notification(title, FULL, auto_close_seconds=None)
 
     async def come(client: viser.ClientHandle) -> None:  # quick, so it runs on the connections' thread

@@ -18,6 +18,9 @@ Scenario = Literal["collection", "street-grid"]
 MAX_PAYLOAD_BYTES: dict[MacKind, int] = {"ieee802154": 116, "ieee80211b": 2304}
 """Largest payload of a frame: 127 B less 11 B of header and check sum, and the limit of IEEE 802.11."""
 
+LEAST_CAPTURE_DB = -5.0
+"""Ratio of a frame's power to noise and interference below which ns-3 does not receive it (SPEC 6.3)."""
+
 
 @dataclass(frozen=True, slots=True)
 class LossConfig:
@@ -62,8 +65,9 @@ class RadioConfig:
     """Nominal range: the receive threshold is the mean power there (IEEE 802.11b: at 11 Mb/s)."""
     sense_range_m: float = 220.0
     """Distance up to which a transmission keeps others silent."""
-    capture_db: float = 10.0
-    """Least ratio of a frame's power to the sum of overlapping ones at which it survives."""
+    capture_db: float | None = None
+    """Least ratio of a frame's power to the sum of overlapping ones at which it survives; None is 3 dB in
+    IEEE 802.15.4, 10 dB in IEEE 802.11b; -5 dB is IEEE 802.15.4 as ns-3 simulates it."""
     noise_dbm: float | None = None
     """Power of the noise; None receives everything above the threshold without bit errors."""
     walls_m: tuple[float, ...] = ()
@@ -75,8 +79,9 @@ class RadioConfig:
         lengths = ("antenna_height_m", "range_m", "reference_m")
         for key in (*lengths, "frequency_hz", "antenna_gain", "path_loss_exponent"):
             above(f"radio.{key}", getattr(self, key), 0.0)
-        for key in ("shadowing_db", "capture_db", "wall_db"):
+        for key in ("shadowing_db", "wall_db"):
             at_least(f"radio.{key}", getattr(self, key), 0.0)
+        at_least("radio.capture_db", self.capture_db, LEAST_CAPTURE_DB)
         at_least("radio.system_loss", self.system_loss, 1.0)
         at_least("radio.nakagami_m", self.nakagami_m, 0.5)
         at_least("radio.sense_range_m", self.sense_range_m, self.range_m)
@@ -357,5 +362,11 @@ class NetworkConfig:
         else:
             key, size_bytes = "nodes.payload_bytes", self.nodes.payload_bytes
         most = MAX_PAYLOAD_BYTES.get(self.mac.kind)
+        capture_db = self.radio.capture_db
+        if self.mac.kind == "ieee80211b" and capture_db is not None and capture_db < 0.0:
+            raise InputError(
+                f"radio.capture_db is {capture_db}, with which {self.mac.kind} would receive two frames at "
+                "once; try at least 0"
+            )
         if most is not None and size_bytes > most:
             raise InputError(f"{key} makes packets of {size_bytes} bytes, but {self.mac.kind} carries {most}")

@@ -32,13 +32,13 @@ def deliver(
     """Send a rig's images through a network and rebuild the scene from what has arrived by each moment.
 
     Args:
-        images: What the nodes send.
-        out: Folder for what arrived in the end (as `reconstruct` writes it), moments.csv and delivery.html.
+        images: Images that the nodes send.
+        out: Folder for the final result (the files of `reconstruct`), moments.csv and delivery.html.
         preset: The network: thesis-link, greenhouse, office, or the config.json of a finished simulation.
-        coding: How images become bytes: raw, raw-color-first, raw-rows, raw-tiles, png, jpeg, rvl, tiles or
+        coding: How images are encoded: raw, raw-color-first, raw-rows, raw-tiles, png, jpeg, rvl, tiles or
             layered.
-        moments: How many times, after equal shares of the bytes, the scene is rebuilt.
-        link_trace: A recorded link (s, Mbit/s, round trip ms, share lost) over which every node sends.
+        moments: Number of times at which the scene is rebuilt, after equal shares of the bytes.
+        link_trace: A recorded link (s, Mbit/s, round trip ms, loss share) over which every node sends.
         down: Names of nodes that have failed and send nothing, for example node_02.
         chain: Settings of the reconstruction to start from.
         set: Settings of the network or the reconstruction, for example
@@ -46,7 +46,7 @@ def deliver(
         json: Print the moments as one JSON object.
     """
     named = images.source()
-    network, config = _settings(preset, chain, set)
+    before, network, config, of_network = _settings(preset, chain, set)
 
     from app.cli.reconstruct import imported_notes
     from app.cli.runs import iterate_imported
@@ -61,6 +61,7 @@ def deliver(
     source, imported = drain(iterate_imported(named, out), say_progress)
     if link_trace is not None:
         network = replace(network, mac=replace(network.mac, kind="replay", trace=str(link_trace)))
+    _say_notes(network, before, preset, of_network)
     delivery_spec = DeliverySpec(Spec(source, chain, config), network, coding, moments, down)
     steps = iterate_delivery(delivery_spec, processes=min(2, os.cpu_count() or 1))
     first = next(steps)  # an error here leaves no folder
@@ -79,8 +80,13 @@ def deliver(
         print_json(metrics)
 
 
-def _settings(preset: str, chain: str, changes: tuple[str, ...]) -> tuple[NetworkConfig, PipelineConfig]:
-    """Return the network's and the chain's settings; each change goes to the one that has its key."""
+def _settings(
+    preset: str, chain: str, changes: tuple[str, ...]
+) -> tuple[NetworkConfig, NetworkConfig, PipelineConfig, list[str]]:
+    """Return the network before and after its changes, the chain's settings, and the network's changes.
+
+    Each change goes to the one that has its key.
+    """
     from network_sim.presets import PRESETS as NETWORKS
     from packetmesh.settings import config_named, settings, with_settings
     from pipeline.config import PRESETS
@@ -89,7 +95,21 @@ def _settings(preset: str, chain: str, changes: tuple[str, ...]) -> tuple[Networ
     parts = {key.partition(".")[0] for key in settings(config)}
     of_chain = [change for change in changes if change.partition(".")[0] in parts]
     of_network = [change for change in changes if change not in of_chain]
-    return with_settings(network, of_network), with_settings(config, of_chain)
+    return network, with_settings(network, of_network), with_settings(config, of_chain), of_network
+
+
+def _say_notes(network: NetworkConfig, before: NetworkConfig, preset: str, changes: list[str]) -> None:
+    """Say which of the network's settings change nothing, and how recorded links were read."""
+    from app.cli.simulate import say_network_notes
+    from packetmesh.settings import key_of
+    from pipeline.delivery.plan import replaced_settings
+
+    replaced = replaced_settings(network)
+    for key in dict.fromkeys(map(key_of, changes)):
+        if key in replaced:
+            say(f"{key} changes nothing here: {replaced[key]}")
+    others = [change for change in changes if key_of(change) not in replaced]
+    say_network_notes(network, before, preset, others, placed=False)
 
 
 def _say_moment(moment: Moment) -> None:

@@ -5,15 +5,21 @@ from __future__ import annotations
 import signal
 import time
 import webbrowser
+from typing import Annotated
+
+import tyro
 
 from app.cli.options import PresetName
 from app.cli.text import say
 from packetmesh.settings import config_named
 from pipeline.config import PRESETS
 
+HostNames = Annotated[
+    tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(name="allow-host", metavar="NAME")
+]
 HEED_S = 0.2
 """Time between two checks for a signal to stop."""
-ALONE = ", from this machine only; --host 0.0.0.0 lets others in"
+ALONE = ", from this machine only; --host 0.0.0.0 admits other machines"
 
 
 def serve(
@@ -24,18 +30,22 @@ def serve(
     open: bool = False,
     lecture: bool = False,
     no_token: bool = False,
+    allow_host: HostNames = (),
 ) -> None:
     """Open the app: step through a reconstruction in the browser.
 
     Args:
         scene: Demo scene to start with (see `packetmesh scenes`), or a rig folder.
         preset: Settings to start with.
-        host: Address to listen on; other machines can reach only what is not loopback.
+        host: Address to listen on; other machines can connect only if it is not a loopback address.
         port: Port to listen on.
         open: Open a browser window.
-        lecture: Share one session among all browsers: who has the teacher's link steers, the class follows,
-            votes and looks around.
-        no_token: With another --host: let in whoever reaches it, not only who has the link that is printed.
+        lecture: Share one session among all browsers: the browser with the teacher's link controls it, the
+            class follows, votes and looks around.
+        no_token: With another --host: admit everyone who can reach the address, not only those with the
+            printed link.
+        allow_host: Further name of this server, with any port, for example lab.example.org of a proxy in
+            front of it.
     """
     from app.compute.jobs import start_pool
 
@@ -48,20 +58,27 @@ def serve(
         from app.server import build_server
         from app.web.entrance import is_loopback
 
-        app = build_server(scene, config, host, port, lecture, not no_token, pool=pool)
+        app = build_server(
+            scene, config, host, port, lecture, not no_token, pool=pool, allow_hosts=allow_host
+        )
     except BaseException:
         pool.close()
         raise
     try:
         if lecture:
-            say(f"You teach at {app.teacher_url} (keep it to yourself; stop with Ctrl-C)")
-            say(f"The class comes to {app.class_link}" + ALONE * is_loopback(host))
+            say(f"Teacher's link: {app.teacher_url} (keep it secret; stop with Ctrl-C)")
+            say(f"Link for the class: {app.class_link}" + ALONE * is_loopback(host))
         else:
             say(f"PacketMesh is at {app.link if is_loopback(host) else app.class_link} (stop with Ctrl-C)")
         if app.entrance.visitor is not None:
-            say("Only who has this link comes in: it is not encrypted, so keep to a network that you trust")
+            say(
+                "Only someone with this link can connect. Traffic is not encrypted, so use a network "
+                "that you trust"
+            )
         elif not is_loopback(host):
-            say("Whoever reaches this address comes in")
+            say("Anyone who can reach this address can connect")
+        if allow_host and app.entrance.visitor is None:
+            say(f"Anyone who can reach it as {' or '.join(allow_host)} can connect")
         if open:
             webbrowser.open(app.teacher_url if lecture else app.link)
         while not stops:  # an endless wait would miss a signal that another thread gets

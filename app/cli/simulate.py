@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -27,28 +27,62 @@ def simulate(
     describe: bool = False,
     json: bool = False,
 ) -> None:
-    """Run the camera network: packets from the nodes' cameras to the sink, and what they cost.
+    """Simulate the camera network: packets from the cameras to the sink, and the energy that they cost.
 
     Args:
         preset: thesis-link, street-grid, greenhouse, office, or the config.json of a finished run.
         out: Folder for trace.ndjson, trace.csv (of the first run), metrics.json and config.json.
         set: Settings to change, for example `--set nodes.images=5 radio.shadowing_db=4`.
-        replications: Runs with seeds that count up from run.seed; 95 % intervals need two or more.
-        sweep: One setting and its values, for example `scheme.k=3,5,10,none`; every value is replicated.
-        scheduler: Address of a Dask scheduler that does the runs; this machine's cores without it.
+        replications: Number of runs, with seeds that count up from run.seed; 95 % intervals need two or
+            more.
+        sweep: One setting and its values, for example `scheme.k=3,5,10,none`; every value gets all
+            replications.
+        scheduler: Address of a Dask scheduler that does the runs; without it, this machine's cores do.
         describe: List every setting with its value, unit and meaning, and run nothing.
         json: Print the metrics as one JSON object.
     """
     from network_sim.presets import PRESETS
     from packetmesh.settings import config_named, with_settings
 
-    config = with_settings(config_named(preset, PRESETS), set)
+    before = config_named(preset, PRESETS)
+    config = with_settings(before, set)
     if describe:
         _describe(config, json)
-    elif sweep is not None:
+        return
+    say_network_notes(config, before, preset, set)
+    if sweep is not None:
         _sweep(config, preset, sweep, replications, scheduler, out, json)
     else:
         _run(config, preset, replications, scheduler, out, json)
+
+
+def say_network_notes(
+    config: NetworkConfig, before: NetworkConfig, preset: str, changes: Sequence[str], placed: bool = True
+) -> None:
+    """Say which given settings change nothing, and how recorded links were read.
+
+    Args:
+        config: the network, with the changes.
+        before: the preset or the config file without them.
+        preset: name of the preset, or path of the file, whose settings count as given.
+        changes: settings as ``key=value``.
+        placed: whether the config has the nodes' places.
+
+    Raises:
+        InputError: a recorded link cannot be read.
+    """
+    from network_sim.advice.no_effect import without_effect
+    from network_sim.config import NetworkConfig
+    from network_sim.presets import PRESETS
+    from network_sim.radio.link_file import link_notes
+    from packetmesh.settings import differences, key_of
+
+    given = [key_of(change) for change in changes]
+    if preset not in PRESETS:
+        given += [key_of(change) for change in differences(before, NetworkConfig())]
+        before = NetworkConfig()
+    for sentence in (*without_effect(config, given, before if placed else None), *link_notes(config)):
+        say(sentence)
 
 
 def _describe(config: NetworkConfig, json: bool) -> None:
@@ -111,9 +145,10 @@ def _sweep(
 
     key, equals, values = sweep.partition("=")
     if not equals or not values:
-        wrong_use(f"--sweep {sweep} names no values; try for example --sweep scheme.k=3,5,10,none")
+        wrong_use(f"--sweep {sweep} has no values; try for example --sweep scheme.k=3,5,10,none")
     if out is not None:
         writable_folder(out)
+    _say_idle_sweep(config, key, values.split(","))
     cases = _run_with_progress(iterate_sweep(config, key, values.split(","), count, scheduler))
     record = {f"{key}={value}": _record(estimates) for value, estimates in cases.items()}
     if out is not None:
@@ -125,6 +160,17 @@ def _sweep(
     for value, estimates in cases.items():
         print(f"{key}={value}")
         _show(estimates, json=False)
+
+
+def _say_idle_sweep(config: NetworkConfig, key: str, values: Sequence[str]) -> None:
+    """Say why a swept setting changes nothing, if no value of it does."""
+    from network_sim.advice.no_effect import without_effect
+    from packetmesh.settings import with_settings
+
+    first, *others = (with_settings(config, [f"{key}={value}"]) for value in values)
+    said = [without_effect(other, [key], first) for other in others]
+    if said and all(said):
+        say(said[0][0])
 
 
 def _run_with_progress(steps: Generator[Progress, None, Result]) -> Result:

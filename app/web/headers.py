@@ -11,7 +11,7 @@ nothing from and send nothing to another server. A policy cannot forbid leaving 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import AbstractContextManager
 from functools import partial
 from typing import Any
@@ -28,22 +28,25 @@ POLICY = (
 OTHERS = {"X-Content-Type-Options": "nosniff", "X-Frame-Options": "DENY", "Referrer-Policy": "no-referrer"}
 
 
-def strict_headers(hashes: Sequence[str] = ()) -> AbstractContextManager[None]:
+def strict_headers(hashes: Sequence[str] = (), allowed: Collection[str] = ()) -> AbstractContextManager[None]:
     """Context in which servers start that send the policy with every answer.
 
     Args:
         hashes: hashes of the scripts allowed in the page, as the policy writes them.
+        allowed: further names of this server, from ``allowed_names``; its websocket may have any port there.
     """
-    return answering(partial(_with_headers, " ".join(hashes)))
+    named = [f"[{name}]" if ":" in name else name for name in sorted(allowed)]
+    others = "".join(f" ws://{name}:* wss://{name}:*" for name in named)
+    return answering(partial(_with_headers, " ".join(hashes), others))
 
 
-def _with_headers(hashes: str, answer: Answer) -> Answer:
+def _with_headers(hashes: str, others: str, answer: Answer) -> Answer:
     def answered(connection: Any, request: Any) -> Any:
         response = answer(connection, request)
         if response is not None:
             host = request.headers.get("Host", "")
             plain = bool(host) and all(letter.isalnum() or letter in ".-:[]_" for letter in host)
-            websocket = f"ws://{host} wss://{host}" if plain else ""
+            websocket = (f"ws://{host} wss://{host}" if plain else "") + others
             response.headers["Content-Security-Policy"] = POLICY.format(hashes=hashes, websocket=websocket)
             for name, value in OTHERS.items():
                 response.headers[name] = value

@@ -2,7 +2,11 @@
 
 A web page of any other site can open a websocket to 127.0.0.1, and a site whose name is made to point there
 (DNS rebinding) can even read the answers. Browsers send the site as ``Origin`` and the name that they looked
-up as ``Host``: the two must be equal, and must name this machine.
+up as ``Host``: the two must be equal, and must name this machine. The person who starts the server can allow
+further names, for a proxy in front of it; a proxy may replace ``Host``, so that an allowed ``Origin`` is
+accepted with every ``Host`` of this machine.
+
+Pages cannot see why a websocket is refused. So the page asks for ``WHY`` and shows the answer.
 """
 
 from __future__ import annotations
@@ -11,13 +15,17 @@ import contextlib
 import functools
 import http
 import ipaddress
+import re
 import socket
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
+from functools import partial
 from typing import Any, TypeAlias
-from urllib.parse import urlsplit
+from urllib.parse import parse_qs, urlsplit
 
 from websockets.asyncio import server as websockets_server
+
+from app.web.names import OPTION, host_name
 
 Answer: TypeAlias = Callable[[Any, Any], Any]
 """Takes a connection and its request. Returns a response, or None to continue to the websocket."""
@@ -25,13 +33,18 @@ ONCE = ("Host", "Origin", "Upgrade", "Cookie", "Accept-Encoding")
 """Headers that a request may have only once."""
 NOT_WELL_FORMED = "This is not a request that PacketMesh understands.\n"
 REFUSED = "PacketMesh answers only its own page: open the address that it printed when it started.\n"
+WHY = "/why-refused"
+"""Path that answers with the reason why a page of ``?origin=`` gets no websocket; empty if it gets one."""
+_NOBODY: frozenset[str] = frozenset()
+_ADDRESS = re.compile(r"[A-Za-z0-9._:\[\]-]{1,260}")
 
 
-def is_own(headers: Mapping[str, str]) -> bool:
+def is_own(headers: Mapping[str, str], allowed: frozenset[str] = _NOBODY) -> bool:
     """Whether a request comes from this server's own page, or from no page.
 
     Args:
         headers: headers of the request; names in any case.
+        allowed: further names of this server, from ``allowed_names``.
     """
     host = headers.get("Host", "")
     origin = headers.get("Origin")
@@ -40,7 +53,30 @@ def is_own(headers: Mapping[str, str]) -> bool:
         page = host if origin is None else urlsplit(origin).netloc
     except ValueError:  # an address with an unclosed bracket
         return False
-    return _names_this_machine(name) and page.lower() == host.lower()
+    if not (_names_this_machine(name) or host_name(host) in allowed):
+        return False
+    return page.lower() == host.lower() or _page_name(origin) in allowed
+
+
+def _page_name(origin: str | None) -> str | None:
+    """Return the host name of a page's origin; None if it has none."""
+    protocol, separator, address = (origin or "").partition("://")
+    return host_name(address) if separator and protocol in ("http", "https") and "@" not in address else None
+
+
+def refusal(headers: Mapping[str, str]) -> str:
+    """Return the sentence for a refused request: the address that it used, and the option that allows it."""
+    origin, address = headers.get("Origin"), headers.get("Host", "")
+    name = host_name(address) if origin is None else _page_name(origin)
+    if name is None:
+        return REFUSED
+    if origin is not None:
+        address = origin.partition("://")[2]
+    shown = address.lower() if _ADDRESS.fullmatch(address) else name
+    return (
+        f"PacketMesh does not answer pages of {shown}: open the address that it printed when it started, or, "
+        f"if {shown} is your proxy, start the server with: packetmesh serve {OPTION} {name}\n"
+    )
 
 
 def _names_this_machine(name: str) -> bool:
@@ -69,9 +105,13 @@ def _understood(answer: Answer) -> Answer:
     return answered
 
 
-def only_own_page() -> AbstractContextManager[None]:
-    """Context in which servers start that refuse requests from other sites' pages."""
-    return answering(_guard)
+def only_own_page(allowed: frozenset[str] = _NOBODY) -> AbstractContextManager[None]:
+    """Context in which servers start that refuse requests from other sites' pages.
+
+    Args:
+        allowed: further names of this server, from ``allowed_names``.
+    """
+    return answering(partial(_guard, allowed))
 
 
 @contextlib.contextmanager
@@ -93,12 +133,23 @@ def answering(change: Callable[[Answer], Answer]) -> Iterator[None]:
         setattr(websockets_server, "serve", serve)  # noqa: B010
 
 
-def _guard(answer: Answer) -> Answer:
+def _guard(allowed: frozenset[str], answer: Answer) -> Answer:
     """Return the server's answer function, which now refuses requests from other sites."""
 
     def guarded(connection: Any, request: Any) -> Any:
-        if not is_own(request.headers):
-            return connection.respond(http.HTTPStatus.FORBIDDEN, REFUSED)
+        if not is_own(request.headers, allowed):
+            return connection.respond(http.HTTPStatus.FORBIDDEN, refusal(request.headers))
+        path, _, query = request.path.partition("?")
+        if path == WHY and "Upgrade" not in request.headers:
+            return connection.respond(
+                http.HTTPStatus.OK, _why(request.headers.get("Host", ""), query, allowed)
+            )
         return answer(connection, request)
 
     return guarded
+
+
+def _why(host: str, query: str, allowed: frozenset[str]) -> str:
+    """Return why a page of the query's origin gets no websocket under this ``Host``; empty if it gets one."""
+    page = {"Host": host, "Origin": parse_qs(query).get("origin", [""])[0]}
+    return "" if is_own(page, allowed) else refusal(page)

@@ -13,7 +13,8 @@ import numpy as np
 import simpy
 
 from network_sim.config import UplinkConfig
-from network_sim.radio.link_trace import LinkTrace, Replay, constant_link, read_link_trace
+from network_sim.radio.link_file import read_link_trace
+from network_sim.radio.link_trace import LinkTrace, Replay, constant_link
 from network_sim.types import Cause, EventKind, Packet
 from packetmesh.errors import InputError
 

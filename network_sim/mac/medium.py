@@ -1,11 +1,10 @@
 """One shared radio channel: frames on the air, carrier sense, and which frames survive (SPEC 6.3).
 
 A frame is received when its power reaches the receive threshold, exceeds the largest sum of overlapping
-powers by the capture ratio, and its receiver was not sending meanwhile; the stronger frame survives even if
-it began later. This would be too strict for IEEE 802.15.4, which spreads its bits over many chips: its
-receivers keep the frame that began first, and the ratio of the powers gives the error rate of the overlapped
-bits (as in ns-3's lr-wpan). A node senses a frame whose mean power reaches the carrier-sense threshold;
-sensing has no fading. Propagation takes no time.
+powers by the capture ratio, and its receiver was not sending meanwhile. In IEEE 802.11b the stronger frame
+survives even if it began later. Receivers of IEEE 802.15.4 keep the frame that began first; above the capture
+ratio, noise and interference together give the error rate of its overlapped bits. A node senses a frame whose
+mean power reaches the carrier-sense threshold; sensing has no fading. Propagation takes no time.
 """
 
 from __future__ import annotations
@@ -270,8 +269,14 @@ class Medium:
         return _NONE
 
     def _lost_in_overlap(self, frame: Transmission, powers_w: list[float], interference_w: float) -> bool:
-        """Return whether an 802.15.4 receiver was busy with an earlier frame or has wrong overlapped bits."""
+        """Return whether an 802.15.4 receiver loses a frame to the frames that overlap it.
+
+        It was busy with an earlier one, their power is too near (the same spreading code tells them apart
+        worse than noise), or overlapped bits are wrong.
+        """
         if max(powers_w[: frame.earlier], default=0.0) >= self._rx_w:
+            return True
+        if frame.power_w < self.radio.capture_ratio * interference_w:
             return True
         if not interference_w:
             return False

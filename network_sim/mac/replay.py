@@ -9,7 +9,8 @@ import numpy as np
 import simpy
 
 from network_sim.mac.context import MacContext
-from network_sim.radio.link_trace import Replay, read_link_trace
+from network_sim.radio.link_file import read_link_trace
+from network_sim.radio.link_trace import Replay
 from network_sim.radio.losses import LinkLosses
 from network_sim.types import Cause, Delivery, EventKind, Packet
 from packetmesh.errors import InputError

@@ -1,28 +1,18 @@
-"""Recorded links: reading a recording, and its replay in simulated time (SPEC 6.5)."""
+"""Recorded links, and their replay in simulated time (SPEC 6.5); ``link_file`` reads them."""
 
 from __future__ import annotations
 
 import math
-import sys
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from network_sim.types import NS_PER_S, to_ns
-from packetmesh.errors import InputError
-from packetmesh.files import read_text
 
 FloatArray = NDArray[np.float64]
 
-HOLE_ROWS = 10.0
-HOLE_S = 1.0
-"""A step longer than both ``HOLE_S`` and ``HOLE_ROWS`` times the median step between rows is a hole."""
-_COLUMNS = ("time in s", "rate in Mbit/s", "round trip in ms", "share lost from 0 to 1")
-MOST_BYTES = 20_000_000
-"""Largest size of a recording: half a million rows."""
 _FOR_EVER_NS = 2**62
 
 
@@ -57,69 +47,6 @@ class LinkTrace:
 def constant_link(rate_bps: float, round_trip_s: float, loss: float) -> LinkTrace:
     """Create a link that never changes."""
     return LinkTrace(*(np.array([value]) for value in (0.0, rate_bps, round_trip_s, loss)))
-
-
-def read_link_trace(path: str | Path) -> LinkTrace:
-    """Read a recorded link: a text file with four columns (``_COLUMNS``).
-
-    Times rise from row to row and count from the first one. Lines may be blank, and text after a # is a
-    comment. A share between -1 and 0 counts as 0: more packets arrived during the row than were sent in it.
-
-    Raises:
-        InputError: the file cannot be read, has no rows, or a row has the wrong number of columns, a field
-            that is no number, or a number out of range; times do not rise; a hole in time leaves the link's
-            state unknown; or all rates are 0.
-    """
-    text = read_text(path, "recorded link", MOST_BYTES)
-    lines, rows = [], []
-    for number, line in enumerate(text.splitlines(), 1):
-        if fields := line.partition("#")[0].split():
-            lines.append(number)
-            rows.append(_row(fields, f"{path}, line {number}"))
-    if not rows:
-        raise InputError(f"The recorded link {path} has no rows; try columns of {', '.join(_COLUMNS)}")
-    t_s, rate_mbps, round_trip_ms, loss = np.array(rows).T
-    _check_times(t_s, lines, path)
-    if not rate_mbps.any():
-        raise InputError(f"The recorded link {path} has a rate of 0 throughout; try another recording")
-    return LinkTrace(t_s - t_s[0], 1e6 * rate_mbps, 1e-3 * round_trip_ms, np.maximum(loss, 0.0))
-
-
-def _row(fields: list[str], where: str) -> list[float]:
-    if len(fields) != len(_COLUMNS):
-        wanted = f"{len(_COLUMNS)}: {', '.join(_COLUMNS)}"
-        raise InputError(f"{where} has {len(fields)} columns; try {wanted}")
-    row = []
-    for name, text in zip(_COLUMNS, fields, strict=True):
-        try:
-            value = float(text)
-        except ValueError:
-            raise InputError(f"{where} has '{text}' as {name}; try a number, or # before a comment") from None
-        least, most, hint = 0.0, sys.float_info.max, "0 or more"
-        if name == _COLUMNS[-1]:
-            least, most, hint = -1.0, 1.0, "a share, not per cent"
-        if not least <= value <= most:
-            raise InputError(f"{where} has {text} as {name}; try {hint}")
-        row.append(value)
-    return row
-
-
-def _check_times(t_s: FloatArray, lines: list[int], path: str | Path) -> None:
-    if len(t_s) < 2:
-        return
-    steps_s = np.diff(t_s)
-    if (steps_s <= 0.0).any():
-        row = int(np.argmax(steps_s <= 0.0)) + 1
-        where = f"{path}, line {lines[row]}"
-        raise InputError(f"{where} is at {t_s[row]:g} s, after {t_s[row - 1]:g} s; try rows in order of time")
-    usual_s = float(np.median(steps_s))
-    holes = steps_s > max(HOLE_S, HOLE_ROWS * usual_s)
-    if holes.any():
-        row = int(np.argmax(holes)) + 1
-        raise InputError(
-            f"{path}, line {lines[row]} comes {steps_s[row - 1]:g} s after the row before, and most rows are "
-            f"{usual_s:g} s apart; try to cut the recording at this hole"
-        )
 
 
 class Replay:

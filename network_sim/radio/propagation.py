@@ -27,6 +27,11 @@ IEEE80211B: dict[float, tuple[Modulation, float]] = {
 }
 """Modulation by rate in bit/s, and the decibels by which it needs less power than 11 Mb/s. The data sheet of
 Acer's MPCI-101 has -91, -88, -85 and -82 dBm, at which 8 % of frames of 1024 bytes are lost."""
+OQPSK_CAPTURE_DB = 3.0
+"""Capture ratio of IEEE 802.15.4 if ``radio.capture_db`` is None: the co-channel rejection of a CC2420 (SPEC
+6.3)."""
+DSSS_CAPTURE_DB = 10.0
+"""The same for IEEE 802.11b (SPEC 6.3)."""
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 _ROUNDING = 1e-9  # nodes exactly range_m apart hear each other, however their distance was computed
@@ -249,7 +254,10 @@ class Radio:
         sensed_w = law.power_w(config.sense_range_m) * (1.0 - _ROUNDING)
         self.cs_threshold_w = min(sensed_w, self.rx_threshold_w)
         """Carrier-sense threshold; never above the receive threshold."""
-        self.capture_ratio = ratio(config.capture_db)
+        capture_db = config.capture_db
+        if capture_db is None:
+            capture_db = OQPSK_CAPTURE_DB if modulation(mac) == "oqpsk" else DSSS_CAPTURE_DB
+        self.capture_ratio = ratio(capture_db)
         """Least ratio of a frame's power to the sum of overlapping powers with which it survives."""
         self.noise_w = None if config.noise_dbm is None else watts(config.noise_dbm)
         """Power of the noise; None if there are no bit errors."""

@@ -17,8 +17,8 @@ from app.screens.network.place import show, shown, text_of, values_of
 from app.screens.network.what_if import WhatIf
 from app.web.markup import Markdown
 from app.window.ui import Ui
-from network_sim.config import NetworkConfig
 from network_sim.advice.no_effect import without_effect
+from network_sim.config import NetworkConfig
 from network_sim.presets import PRESETS
 from packetmesh.errors import InputError
 from packetmesh.settings import differences, key_of, settings, with_settings

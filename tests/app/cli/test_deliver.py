@@ -130,3 +130,25 @@ def test_a_recording_is_imported_and_sent(capsys, tmp_path):
     (moment,) = json.loads(out)["moments"]
     assert moment["surface"]["triangles"] > 100
     assert json.loads(out)["import"]["kind"] == "bag"
+
+
+def test_network_settings_that_change_nothing_and_the_form_of_a_recorded_link_are_said(
+    capsys, rig_folder, tmp_path
+):
+    link = tmp_path / "link.txt"
+    link.write_text("0 2.5 35 3\n0.5 3 29 0\n")
+    words = ("--rig", rig_folder, "--moments", 1, "--link-trace", link, "--out", tmp_path / "out", *FEW)
+    given = (
+        "nodes.images=3",
+        "radio.capture_db=6",
+        "nodes.retransmit=true",
+        "nodes.count=9",
+        "mac.ack=false",
+    )
+    code, _, err = run(capsys, "deliver", *words, *given)
+    assert code == 0
+    said = [
+        line.partition(" changes nothing here: ")[0] for line in err.splitlines() if "changes nothing" in line
+    ]
+    assert sorted(said) == ["nodes.count", "nodes.images", "radio.capture_db"]
+    assert f"The recorded link {link} was read with loss in per cent\n" in err

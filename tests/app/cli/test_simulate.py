@@ -146,3 +146,55 @@ def test_a_reader_who_goes_away_is_no_error():
     answer = subprocess.run(command, shell=True, capture_output=True, text=True)
     assert answer.stdout.count("\n") == 1
     assert answer.stderr == ""
+
+
+def idle(err):
+    """The settings that change nothing, as the command says."""
+    return [
+        line.partition(" changes nothing here: ")[0] for line in err.splitlines() if "changes nothing" in line
+    ]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["radio.capture_db=6"], []),
+        (["radio.capture_db=6", "mac.kind=serial"], ["radio.capture_db"]),
+        (["mac.kind=ideal", "mac.rts=true", "radio.noise_dbm=-90"], ["mac.rts", "radio.noise_dbm"]),
+        (["radio.tx_power_dbm=3"], ["radio.tx_power_dbm"]),
+        (["radio.tx_power_dbm=3", "radio.noise_dbm=-90"], []),
+        (["radio.range_m=120"], ["radio.range_m"]),
+        (["radio.range_m=10"], []),
+        (["scheme.k=4", "loss.burst_packets=5"], ["scheme.k", "loss.burst_packets"]),
+    ],
+)
+def test_a_given_setting_that_changes_nothing_is_said(capsys, given, said):
+    code, _, err = run(capsys, "--set", *TINY, *given)
+    assert code == 0
+    assert idle(err) == said
+
+
+def test_a_config_file_s_settings_count_as_given_and_a_preset_s_do_not(capsys, tmp_path):
+    serial = ["--preset", "greenhouse", "--set", *TINY, "mac.kind=serial"]
+    code, _, err = run(capsys, *serial, "--out", tmp_path)
+    assert (code, idle(err)) == (0, [])
+    code, _, err = run(capsys, "--preset", tmp_path / "config.json")
+    assert code == 0
+    assert {"radio.nakagami_m", "radio.noise_dbm", "nodes.spacing_m"} < set(idle(err))
+    assert "nodes.image_bytes" not in idle(err)
+
+
+def test_a_sweep_that_changes_nothing_is_said(capsys):
+    for sweep, said in (("scheme.k=3,5,none", ["scheme.k"]), ("mac.retries=0,3", [])):
+        code, _, err = run(capsys, "--set", *TINY, "--sweep", sweep)
+        assert code == 0
+        assert idle(err) == said
+
+
+def test_how_a_recorded_link_was_read_is_said_once(capsys, tmp_path):
+    link = tmp_path / "link.csv"
+    link.write_text("time_ms;rate_kbps;rtt_ms;loss_%\r\n0;2500,5;35;0,5\r\n15;2500;29;0\r\n")
+    code, _, err = run(capsys, "--set", *TINY, "mac.kind=replay", f"mac.trace={link}", "--replications", "2")
+    assert code == 0
+    note = "was read with time in ms, rate in kbit/s, loss in per cent, decimal commas"
+    assert err.count(f"The recorded link {link} {note}\n") == err.count("was read with") == 1

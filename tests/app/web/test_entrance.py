@@ -169,19 +169,26 @@ def test_only_loopback_needs_no_token(host, alone):
     assert is_loopback(host) == alone
 
 
-@pytest.mark.parametrize("words", [(), ("--no-token",)])
-def test_the_command_passes_on_whether_a_token_is_wanted(monkeypatch, words):
+@pytest.mark.parametrize(
+    ("words", "with_token", "names"),
+    [
+        ((), True, ()),
+        (("--no-token",), False, ()),
+        (("--allow-host", "a.example", "--allow-host", "b.example"), True, ("a.example", "b.example")),
+    ],
+)
+def test_the_command_passes_on_who_may_come_in(monkeypatch, words, with_token, names):
     asked, pools = [], []
 
-    def refuse(*arguments, pool):
-        asked.append(arguments[-1])
+    def refuse(*arguments, pool, allow_hosts):
+        asked.append((arguments[-1], allow_hosts))
         pools.append(pool)
         raise InputError("not now")
 
     monkeypatch.setattr("app.server.build_server", refuse)
     with pytest.raises(SystemExit):
         main(["serve", "--host", "192.0.2.1", *words])
-    assert asked == [not words]
+    assert asked == [(with_token, names)]
     with pytest.raises(RuntimeError, match="the pool is closed"):
         pools[0].submit("a", print, on_progress=print, on_end=print)
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import simpy
 
-from network_sim.config import MacConfig, NetworkConfig, NodesConfig
+from network_sim.config import MacConfig, NetworkConfig, NodesConfig, RadioConfig
 from network_sim.mac.context import MacContext, random_below
 from network_sim.mac.ieee802154 import Ieee802154
 from network_sim.mac.medium import Medium
@@ -314,11 +314,22 @@ def test_one_saturated_node_reaches_the_closed_form(payload_bytes: int, ack: boo
 )
 def test_saturated_nodes_share_the_channel_as_in_ns3(count: int, kbps: float, delivered: float) -> None:
     """Rates by ns-3 3.44 (tests/benchmarks/ns3_saturation.py), shares of delivered packets by SPEC 6.1."""
-    result = saturation(NetworkConfig(), count, 60.0, seed=2)
+    result = saturation(NetworkConfig(radio=RadioConfig(capture_db=-5.0)), count, 60.0, seed=2)
     assert result.throughput_bps / 1000 == pytest.approx(kbps, rel=0.02)
     assert result.delivery_ratio == pytest.approx(delivered, abs=0.05)
     fair = sum(result.packets_by_node) / count
     assert max(result.packets_by_node) < 1.15 * fair
+
+
+def test_nodes_of_equal_power_share_less_than_in_ns3_because_no_overlapping_frame_survives() -> None:
+    """Of n nodes that contend, ns-3 saves most first frames of a collision; here both are lost."""
+    strict, as_ns3 = (
+        saturation(NetworkConfig(radio=RadioConfig(capture_db=capture_db)), 3, 60.0, seed=2)
+        for capture_db in (None, -5.0)
+    )
+    lost, saved = (run.losses[Cause.COLLISION] / run.attempts for run in (strict, as_ns3))
+    assert 1.25 < lost / saved < 2.0  # both frames of a pair, or the later one only and some of the first
+    assert 0.85 < strict.throughput_bps / as_ns3.throughput_bps < 0.95
 
 
 def test_the_same_seed_gives_the_same_result() -> None:

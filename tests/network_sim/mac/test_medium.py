@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import simpy
 
-from network_sim.config import MacConfig, RadioConfig
+from network_sim.config import MacConfig, MacKind, RadioConfig
 from network_sim.mac.medium import MEMORY_NS, REFRESH_NS, Medium
 from network_sim.radio.places import FixedPlaces
 from network_sim.radio.propagation import Radio, oqpsk_bit_error_rate
@@ -41,10 +41,15 @@ class Scene:
         return self.outcomes
 
 
-def scene(*x_m: float, seed: int = 0, **radio: Any) -> Scene:
+def scene(*x_m: float, seed: int = 0, kind: MacKind = "ieee80211b", **radio: Any) -> Scene:
     env, rng = simpy.Environment(), np.random.default_rng(seed)
     places = FixedPlaces(np.array([[x, 0.0] for x in x_m]))
-    return Scene(env, Medium(env, Radio(RadioConfig(**radio), MacConfig(), rng), places, rng), {})
+    return Scene(env, Medium(env, Radio(RadioConfig(**radio), MacConfig(kind=kind), rng), places, rng), {})
+
+
+def spread(*x_m: float, **radio: Any) -> Scene:
+    """A scene of IEEE 802.15.4."""
+    return scene(*x_m, kind="ieee802154", **radio)
 
 
 def test_alone_within_range() -> None:
@@ -71,13 +76,22 @@ def test_the_stronger_frame_is_captured_from_ten_decibels_on(far_m: float, first
     assert it.run() == {(0, first): near, (2, 50 - first): Cause.COLLISION}
 
 
-def test_spread_frames_are_lost_when_the_receiver_has_an_earlier_one() -> None:
+def overlap(it: Scene, later_us: int = 100) -> dict[tuple[int, int], Cause]:
+    """Two frames of 125 bytes to node 1: node 0's, and node 2's that begins later."""
+    it.frame(0, 4000, 0, 1, size_bytes=125, modulation="oqpsk")
+    it.frame(later_us, 4000, 2, 1, size_bytes=125, modulation="oqpsk")
+    return it.run()
+
+
+@pytest.mark.parametrize("later_us", [0, 1, 160, 3999])
+def test_spread_frames_of_equal_power_are_both_lost(later_us: int) -> None:
+    assert set(overlap(spread(0, 20, 40), later_us).values()) == {Cause.COLLISION}
+
+
+def test_as_in_ns3_the_first_of_two_equal_spread_frames_has_the_bit_errors_of_0_db() -> None:
     survived = 0
     for later_us in range(1, 400):
-        it = scene(0, 20, 40, seed=later_us)
-        it.frame(0, 4000, 0, 1, size_bytes=125, modulation="oqpsk")
-        it.frame(later_us, 4000, 2, 1, size_bytes=125, modulation="oqpsk")
-        outcomes = it.run()
+        outcomes = overlap(spread(0, 20, 40, seed=later_us, capture_db=-5.0), later_us)
         assert outcomes[2, later_us] == Cause.COLLISION
         survived += outcomes[0, 0] == Cause.NONE
     # IEEE 802.15.4-2006, E.4.1.8: each of the overlapped bits is wrong as at 0 dB.
@@ -86,12 +100,31 @@ def test_spread_frames_are_lost_when_the_receiver_has_an_earlier_one() -> None:
     assert survived / 399 == pytest.approx(expected, abs=3 * np.sqrt(expected * (1 - expected) / 399))
 
 
-def test_a_spread_frame_survives_a_weaker_one_and_not_a_stronger_one() -> None:
-    for x_m, expected in ((60.0, Cause.NONE), (22.0, Cause.COLLISION)):
-        it = scene(0, 20, x_m)
-        it.frame(0, 4000, 0, 1, size_bytes=125, modulation="oqpsk")
-        it.frame(100, 4000, 2, 1, size_bytes=125, modulation="oqpsk")
-        assert it.run()[0, 0] == expected
+@pytest.mark.parametrize(
+    ("settings", "least_db"), [({}, 3.0), ({"capture_db": 3.0}, 3.0), ({"capture_db": 6.0}, 6.0)]
+)
+def test_the_first_spread_frame_survives_from_the_capture_ratio_on(
+    settings: dict[str, float], least_db: float
+) -> None:
+    for more_db, expected in ((0.01, Cause.NONE), (-0.01, Cause.COLLISION)):
+        far_m = 20.0 * 10.0 ** ((least_db + more_db) / 20.0)  # 20 log10(far / 20) is the ratio of the powers
+        assert overlap(spread(0, 20, 20 + far_m, **settings))[0, 0] == expected
+
+
+def test_a_stronger_spread_frame_that_begins_later_is_lost_too() -> None:
+    outcomes = overlap(spread(0, 60, 61))
+    assert set(outcomes.values()) == {Cause.COLLISION}
+
+
+def test_noise_and_a_weaker_frame_together_make_bit_errors() -> None:
+    """The noise is as strong as the frame: alone it spoils one in seven, with interference nearly all."""
+    lost = {}
+    for far_m in (32.0, 400.0):  # 4.1 dB and 26 dB below the frame
+        lost[far_m] = sum(
+            overlap(spread(0, 20, 20 + far_m, seed=seed, noise_dbm=-51.1))[0, 0] != Cause.NONE
+            for seed in range(60)
+        )
+    assert lost[400.0] < 20 < 50 < lost[32.0]
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from network_sim.config import NetworkConfig
-from network_sim.radio.link_trace import read_link_trace
+from network_sim.radio.link_file import read_link_trace
 from network_sim.simulate import simulate
 from network_sim.trace.conservation import balance, image_balance
 from network_sim.trace.frames import fates

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from network_sim.radio.link_trace import LinkTrace, Replay, constant_link, read_link_trace
+from network_sim.radio.link_file import read_link_trace
+from network_sim.radio.link_trace import LinkTrace, Replay, constant_link
 from network_sim.types import NS_PER_S
 from packetmesh.errors import InputError
 
@@ -43,14 +44,16 @@ def test_a_file_is_read_in_its_units_from_its_first_time(tmp_path):
         ("# only a comment\n\n", "has no rows"),
         ("0 1 2\n", "line 1 has 3 columns; try 4"),
         ("0 1 2 0 9\n", "line 1 has 5 columns"),
-        ("t rate rtt loss\n0 1 2 0\n", "line 1 has 't' as time"),
+        ("t speed rtt loss\n0 1 2 0\n", "line 1 does not name the four columns"),
+        ("t rate rtt loss\n", "no rows below its header"),
         ("0 1 2 0\n1 nan 2 0\n", "line 2 has nan as rate"),
         ("0 1 inf 0\n", "line 1 has inf as round trip"),
         ("-0.015 1 2 0\n0 1 2 0\n", "line 1 has -0.015 as time"),
         ("0 -1 2 0\n", "line 1 has -1 as rate"),
         ("0 1 -2 0\n", "line 1 has -2 as round trip"),
-        ("0 1 2 -1.5\n", "line 1 has -1.5 as share"),
-        ("0 1 2 7.5\n", "try a share, not per cent"),
+        ("0 1 2 -1.5\n", "line 1 has -1.5 as loss in share"),
+        ("0 1 2 107.5\n", "line 1 has 107.5 as loss in per cent; try 0 to 100"),
+        ("t rate rtt loss_share\n0 1 2 7.5\n", "line 2 has 7.5 as loss in share; try 0 to 1"),
         ("0 1 2 0\n\n1 1 2 0\n0.5 1 2 0\n", "line 4 is at 0.5 s, after 1 s"),
         ("0 1 2 0\n1 1 2 0\n1 1 2 0\n", "line 3 is at 1 s, after 1 s"),
         ("".join(f"{t} 1 2 0\n" for t in (0, 1, 2, 3, 60, 61, 62)), "line 5 comes 57 s after"),
@@ -67,7 +70,7 @@ def test_what_cannot_be_a_recording_is_one_sentence(tmp_path, text, names):
 
 
 @pytest.mark.parametrize(
-    ("content", "said"), [(None, "does not exist"), (b"\xff\xfe\x00binary\x80", "is not a text file")]
+    ("content", "said"), [(None, "does not exist"), (b"\x80binary\x80", "is not a text file")]
 )
 def test_what_is_no_text_file_is_one_sentence(tmp_path, content, said):
     path = tmp_path / "link.bin"

@@ -101,7 +101,20 @@ def test_thresholds_are_met_exactly_up_to_the_ranges(config: RadioConfig) -> Non
         assert here.mean_power_w(range_m) >= threshold_w
         assert here.mean_power_w(math.hypot(0.6 * range_m, 0.8 * range_m)) >= threshold_w
         assert here.mean_power_w(range_m * 1.000001) < threshold_w
-    assert here.capture_ratio == pytest.approx(10.0)
+
+
+def test_the_capture_ratio_is_that_of_the_standard_or_as_set() -> None:
+    ratios = {
+        (kind, capture_db): r.Radio(
+            RadioConfig(capture_db=capture_db), MacConfig(kind=kind), np.random.default_rng(0)
+        ).capture_ratio
+        for kind in ("ieee802154", "ieee80211b")
+        for capture_db in (None, 0.0, 20.0)
+    }
+    assert ratios["ieee802154", None] == pytest.approx(10.0**0.3)
+    assert ratios["ieee80211b", None] == pytest.approx(10.0)
+    for kind in ("ieee802154", "ieee80211b"):
+        assert (ratios[kind, 0.0], ratios[kind, 20.0]) == (pytest.approx(1.0), pytest.approx(100.0))
 
 
 def test_noise_is_in_watts_or_absent() -> None:

@@ -335,8 +335,8 @@ def test_every_stop_of_the_lessons_asks_for_a_network_that_there_is(path):
 
 
 def test_a_setting_that_changes_nothing_is_named_until_it_counts(screen):
-    screen.use("mac.rts=true")
-    assert "mac.rts changes nothing here: mac.kind is ieee802154" in screen.gui.text().replace("&#95;", "_")
+    screen.use("scheme.k=3")
+    assert "scheme.k changes nothing here: scenario is collection" in screen.gui.text()
     screen.use("")
     assert "changes nothing" not in screen.gui.text()
 

@@ -178,7 +178,7 @@ def test_who_finds_no_place_is_told_and_comes_in_when_one_is_free(running, monke
     with closing(Connection(running.url)) as first:
         wait_for(lambda: "Radius (mm)" in first.uuids, 60.0)
         with closing(Connection(running.url)) as second:
-            wait_for(lambda: f"You wait for a place: {FULL}" in second.notices)
+            wait_for(lambda: f"You are waiting for a place: {FULL}" in second.notices)
             assert len(running.sessions) == 1
             first.close()
             wait_for(lambda: "Radius (mm)" in second.uuids, 60.0)

@@ -1,0 +1,1 @@
+"""Sentences about a config: settings that change nothing in its runs."""
