@@ -15,7 +15,7 @@ from pipeline.config import PipelineConfig, RegistrationConfig
 from pipeline.io.clouds import write_cloud
 from pipeline.io.poses import write_pose
 from pipeline.pairs.register import DEFAULT_METHOD, Answer
-from pipeline.types import FloatArray, PointCloud
+from pipeline.types import PointCloud
 
 _STEP_COLUMNS = (
     "index", "sigma_m", "gate_m", "objective", "rmse_m", "mean_distance_m", "effective_pairs", "entropy_nat",
@@ -40,8 +40,8 @@ def _draws(answer: Answer) -> dict[str, Any]:
     return {"draws": answer.draws, "spread_m": answer.spread_m, "draws_agree": answer.agreed}
 
 
-def chosen_pose(answers: Sequence[Answer]) -> FloatArray:
-    """Return the (4, 4) pose of CEICP-A if it found one, else of the first method that did.
+def chosen_answer(answers: Sequence[Answer]) -> Answer:
+    """Return the answer of CEICP-A if it found a pose, else of the first method that did.
 
     Raises:
         ReconstructionError: no method determined the pose; the message says why.
@@ -50,9 +50,7 @@ def chosen_pose(answers: Sequence[Answer]) -> FloatArray:
     if not good:
         reason = answers[0].stop_reason.partition(": ")[2].rstrip(".")
         raise ReconstructionError(f"{answers[0].method} found no pose: {reason}")
-    best = next((answer for answer in good if answer.method == DEFAULT_METHOD), good[0])
-    assert best.T_target_source is not None
-    return best.T_target_source
+    return next((answer for answer in good if answer.method == DEFAULT_METHOD), good[0])
 
 
 def write_register_folder(
@@ -68,7 +66,7 @@ def write_register_folder(
     Args:
         folder: created if it is missing.
         answers: answers of all methods that ran.
-        source: the source cloud as it was read; ``chosen_pose`` is applied to it.
+        source: the source cloud as it was read; the pose of ``chosen_answer`` is applied to it.
         config: settings of the registration.
         command: arguments of the command line, stored in ``config.json`` with the settings.
         with_truth: whether ``metrics.json`` contains errors against a true pose.
@@ -77,7 +75,8 @@ def write_register_folder(
         InputError: the folder cannot be written.
         ReconstructionError: there is no pose to write.
     """
-    pose = chosen_pose(answers)
+    pose = chosen_answer(answers).T_target_source
+    assert pose is not None
     write_json(
         folder / "config.json",
         command | {"settings": settings(replace(PipelineConfig(), node_registration=config))},

@@ -1,25 +1,34 @@
-"""Readers of points from plain numbers: NumPy arrays, and sweeps of the KITTI benchmark."""
+"""Readers of points from plain numbers: NumPy arrays, and LiDAR sweeps of KITTI and nuScenes."""
 
 from __future__ import annotations
+
+import logging
+from pathlib import PurePath
 
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.io.cloud_table import POSITION, check_count
-from pipeline.io.cloud_text import table_of_columns
+from pipeline.io.cloud_columns import say_columns, table_named, table_of_columns
+from pipeline.io.cloud_table import POSITION, Layout, check_count
 from pipeline.io.numpy_files import array_in
-from pipeline.types import AnyPath
+from pipeline.types import AnyPath, FloatArray
 
-SWEEP_ROW = np.dtype([(name, "<f4") for name in (*POSITION, "reflectance")])
+_log = logging.getLogger(__name__)
+
+_NUMBER = np.dtype("<f4")
+_KITTI, _NUSCENES = 4, 5
+"""Numbers of a point: x, y, z, reflectance; or x, y, z, intensity, index of the laser's ring."""
+_MOST_RINGS = 128
+_LARGEST_INTENSITY = 255.0
 FARTHEST_M = 1e5
 """Largest plausible coordinate of a sweep; larger numbers mean that the file is something else."""
 
 
-def parse_npy(path: AnyPath, data: bytes) -> np.ndarray:
+def parse_npy(path: AnyPath, data: bytes, layout: Layout) -> np.ndarray:
     """Read an array (N, 3 or more); columns after the third are interpreted as in text files.
 
     Raises:
-        InputError: the file is damaged, or not such an array of numbers.
+        InputError: the file is damaged, not such an array of numbers, or its columns are in doubt.
     """
     try:
         array = array_in(data)
@@ -34,23 +43,89 @@ def parse_npy(path: AnyPath, data: bytes) -> np.ndarray:
             "colours or normals"
         )
     check_count(path, len(array))
-    return table_of_columns(array.astype(np.float64))
+    return table_of_columns(path, array.astype(np.float64), layout.columns)
 
 
-def parse_sweep(path: AnyPath, data: bytes) -> np.ndarray:
-    """Read a LiDAR sweep in KITTI's format: x, y, z and reflectance, four bytes each (Geiger et al. 2013).
+def parse_sweep(path: AnyPath, data: bytes, layout: Layout) -> np.ndarray:
+    """Read a LiDAR sweep of four-byte numbers, by given columns, or as KITTI's or nuScenes' format.
+
+    KITTI has x, y, z and reflectance (Geiger et al. 2013), nuScenes x, y, z, intensity and the index of the
+    laser's ring, a whole number (Caesar et al. 2020). The values tell them apart, or else the file's name.
 
     Raises:
-        InputError: the length is no multiple of a row, or the numbers are no positions.
+        InputError: the length is no multiple of a row, the numbers are no positions, or may be either format.
     """
-    if not data or len(data) % SWEEP_ROW.itemsize:
+    if layout.columns is not None:
+        rows = _rows(path, data, len(layout.columns))
+        _check_positions(path, rows[:, [layout.columns.index(name) for name in POSITION]])
+        return table_named(rows, layout.columns)
+    width = _width(path, data)
+    rows = _rows(path, data, width)
+    _check_positions(path, rows[:, :3])
+    names = (*POSITION, *(["_"] * (width - 3)))
+    if width == _NUSCENES:
+        say_columns(path, names, ("x", "y", "z", "intensity", "ring index"))
+    return table_named(rows, names)
+
+
+def _width(path: AnyPath, data: bytes) -> int:
+    """Return how many numbers a point has.
+
+    Raises:
+        InputError: the length fits neither format, or the numbers may be either.
+    """
+    size = len(data)
+    fits = [width for width in (_KITTI, _NUSCENES) if size and size % (width * _NUMBER.itemsize) == 0]
+    if not fits:
         raise InputError(
-            f"The point cloud {path} has {len(data)} bytes, which are no rows of four 4-byte numbers; "
-            "a .bin file is read as a sweep of KITTI"
+            f"The point cloud {path} has {size} bytes, which are no rows of four or five 4-byte numbers; "
+            "a .bin file is read as a sweep of KITTI or nuScenes, and --columns names other columns"
         )
-    table = np.frombuffer(data, SWEEP_ROW)
-    check_count(path, len(table))
-    positions = np.stack([table[name] for name in POSITION])
-    if not (np.abs(np.nan_to_num(positions, nan=np.inf)) < FARTHEST_M).any(axis=1).all():
-        raise InputError(f"The numbers in {path} are no positions; a .bin file is read as a sweep of KITTI")
-    return table
+    named_nuscenes = str(path).lower().endswith(".pcd.bin") or PurePath(path).name.startswith("LIDAR_TOP")
+    if named_nuscenes and _NUSCENES in fits:
+        return _NUSCENES
+    plausible = [width for width in fits if _plausible(_rows(path, data, width))]
+    if fits == [_KITTI] and not named_nuscenes:
+        return _KITTI
+    if len(plausible) == 1:
+        return plausible[0]
+    _check_positions(path, _rows(path, data, fits[0])[:, :3])
+    raise InputError(
+        f"The sweep {path} may have four numbers a point, as in KITTI, or five, as in nuScenes; try "
+        "--columns x,y,z,i or --columns x,y,z,i,_, whichever is right"
+    )
+
+
+def _plausible(rows: FloatArray) -> bool:
+    """Return whether the columns after the position are an intensity and, in rows of five, a ring index."""
+    intensity = rows[:, 3]
+    with np.errstate(invalid="ignore"):
+        fine = bool(np.all((intensity >= 0.0) & (intensity <= _LARGEST_INTENSITY)))
+        if fine and rows.shape[1] == _NUSCENES:
+            ring = rows[:, 4]
+            fine = bool(np.all((ring >= 0.0) & (ring < _MOST_RINGS) & (ring == np.rint(ring))))
+    return fine
+
+
+def _rows(path: AnyPath, data: bytes, width: int) -> FloatArray:
+    """Return the (N, width) numbers of a file.
+
+    Raises:
+        InputError: the length is no multiple of a row, or there are too many points.
+    """
+    if not data or len(data) % (width * _NUMBER.itemsize):
+        raise InputError(
+            f"The point cloud {path} has {len(data)} bytes, which are no rows of {width} 4-byte numbers; try "
+            "--columns with a name for each number of a point"
+        )
+    check_count(path, len(data) // (width * _NUMBER.itemsize))
+    with np.errstate(invalid="ignore"):
+        return np.frombuffer(data, _NUMBER).reshape(-1, width).astype(np.float64)
+
+
+def _check_positions(path: AnyPath, points: FloatArray) -> None:
+    """Raise an InputError if a coordinate is beyond ``FARTHEST_M`` everywhere, or all numbers are zero."""
+    if not points.any() or not (np.abs(np.nan_to_num(points, nan=np.inf)) < FARTHEST_M).any(axis=0).all():
+        raise InputError(
+            f"The numbers in {path} are no positions; a .bin file is read as a sweep of KITTI or nuScenes"
+        )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,12 +17,24 @@ FARTHEST, MOST_FAR_SHARE = 1e12, 0.1
 """If a larger share of points than MOST_FAR_SHARE is beyond FARTHEST (in any unit), the file was misread."""
 POSITION, NORMAL, COLOR = ("x", "y", "z"), ("nx", "ny", "nz"), ("red", "green", "blue")
 LABEL = "source"
+_BYTE = 255
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What a user says about a table whose file does not name its columns."""
+
+    columns: tuple[str, ...] | None = None
+    """Field of each column (``parse_columns``); None finds them in the file."""
+    header_unit: bool = True
+    """Whether positions are converted to metres if the titles of the columns name another unit."""
 
 
 def cloud_of(path: AnyPath, table: np.ndarray) -> PointCloud:
     """Convert a structured array whose fields are named as in PLY files to a cloud.
 
-    Floating-point colours range from 0 to 1. Points that are not finite are left out.
+    Floating-point colours range from 0 to 1 unless one is larger; colours above 255 have 16 bits. Points that
+    are not finite are left out.
 
     Raises:
         InputError: x, y or z is missing, or no point is finite.
@@ -30,8 +43,12 @@ def cloud_of(path: AnyPath, table: np.ndarray) -> PointCloud:
     if points_m is None:
         raise InputError(f"The point cloud {path} has no x, y, z; try a file with positions")
     colors = columns(table, COLOR, np.float64)
-    if colors is not None and table["red"].dtype.kind == "f":
-        colors = np.rint(colors * 255.0)
+    if colors is not None:
+        largest = np.nanmax(colors, initial=0.0)
+        if largest > _BYTE:
+            colors = colors // 256.0
+        elif table["red"].dtype.kind == "f":
+            colors = np.rint(colors * (255.0 if largest <= 1.0 else 1.0))
     source = columns(table, (LABEL,), np.uint8)
     cloud = PointCloud(
         points_m=points_m,

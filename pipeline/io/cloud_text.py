@@ -2,78 +2,173 @@
 
 from __future__ import annotations
 
+import logging
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, check_count, number_rows, truncated
-from pipeline.types import AnyPath
+from pipeline.io.cloud_columns import (
+    UNUSED,
+    checked_width,
+    guessed_columns,
+    say_columns,
+    table_named,
+)
+from pipeline.io.cloud_decimals import Dialect, dialect_of, split_titles
+from pipeline.io.cloud_header import Header, header_of, named_axes, names_degrees, no_position
+from pipeline.io.cloud_table import COLOR, POSITION, Layout, check_count, truncated
+from pipeline.types import AnyPath, FloatArray
 
-_NAMES = {"r": "red", "g": "green", "b": "blue", "normal_x": "nx", "normal_y": "ny", "normal_z": "nz"}
+_log = logging.getLogger(__name__)
+
 MOST_COLUMNS = 1000
-_UNIT_TOLERANCE = 0.02
-"""Largest deviation of a triple's length from 1 with which it is read as a normal."""
+_GRID_TITLES = ("ncols", "nrows", "north:", "dsaa")
+"""First words of grids of heights: ESRI, GRASS, Surfer."""
+_COMMENTS = ("#", "//", "%")
+_HEADER_LINES = 50
+"""Lines without numbers that may be above the table."""
+_SEPARATORS = re.compile(r"[\s,;|\"]+")
+_NOT_A_NUMBER = (
+    "",
+    "nan",
+    "null",
+    "none",
+    "na",
+    "n/a",
+    "-nan",
+    "nan(ind)",
+    "-nan(ind)",
+    "1.#qnan",
+    "-1.#ind",
+)
+_PTS = {4: (*POSITION, UNUSED), 7: (*POSITION, UNUSED, *COLOR)}
+"""Columns of Leica's PTS with an intensity."""
 
 
-def parse_text(path: AnyPath, data: bytes) -> np.ndarray:
+@dataclass(frozen=True, slots=True)
+class _Lines:
+    """The lines of a text by their purpose."""
+
+    comments: list[str]
+    """Comments above the numbers, without their marks."""
+    titles: list[str]
+    """Other lines above the numbers."""
+    numbers: list[str]
+    counted: bool
+    """Whether a line says how many points there are."""
+
+
+def parse_text(path: AnyPath, data: bytes, layout: Layout) -> np.ndarray:
     """Read the points as a structured array.
 
-    A first line of words names the columns (x, y, z, r, g, b, nx, ny, nz in any order). Without it the first
-    three columns are the position; further triples are normals if their lengths are one, or colours if they
-    are integers up to 255. Other columns are ignored, as are lines that begin with # or //.
+    Titles in the last line above the numbers, also in a comment, name the columns (``header_of``). Without
+    them the columns are guessed (``guessed_columns``). Decimal commas are read where something else
+    separates the numbers. What is not plain is logged, and what is in doubt is an error.
+
+    Args:
+        path: name of the file.
+        data: content of the file.
+        layout: columns as the user names them, and whether a unit in the titles counts.
 
     Raises:
-        InputError: the file is not such text, its lines differ in length, or there are too many points.
+        InputError: the file is not such text, its lines differ in length, its columns or decimal marks are
+            in doubt, or there are too many points.
     """
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"The point cloud {path} is not a text file; try to export it as PLY") from None
-    for separator in ",;\t":
-        text = text.replace(separator, " ")
-    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith(("#", "//"))]
-    names = None
-    if lines and not _is_number(lines[0].split()[0]):
-        names = [_NAMES.get(word, word) for word in lines.pop(0).lower().replace('"', "").split()]
-    if not lines or len(lines[0].split()) < 3:
+    lines = _lines_of(path, _without_groups(_decoded(path, data)))
+    if not lines.numbers:
         raise InputError(f"The point cloud {path} has no lines of three numbers or more; try another file")
-    check_count(path, len(lines))
-    width = len(lines[0].split())
+    check_count(path, len(lines.numbers))
+    dialect = dialect_of(path, lines.numbers)
+    width = len(dialect.cells(lines.numbers[:1])[0])
     if width > MOST_COLUMNS:
         raise InputError(f"The point cloud {path} has {width} columns; try one with a point on each line")
-    rows = number_rows(path, "\n".join(lines).encode(), len(lines), width)
-    if names is not None and len(names) == width:
-        twice = [name for name in (*POSITION, *NORMAL, *COLOR) if names.count(name) > 1]
-        if twice:
-            raise InputError(f"The point cloud {path} has two columns {twice[0]}; try to name one otherwise")
-        return _table(rows, names)
-    return table_of_columns(rows)
+    if layout.columns is not None:
+        checked_width(path, layout.columns, width)
+        return _table(path, lines.numbers, dialect, layout.columns, more=True)
+    if lines.titles and lines.titles[0].lower().split()[0] in _GRID_TITLES:
+        raise InputError(f"{path} is a grid of heights and no list of points; try to export it as x y z")
+    header = _header(path, lines, dialect, width)
+    if header is None:
+        return _guessed(path, lines, dialect, width)
+    if not header.plain or dialect.decimal_comma:
+        say_columns(path, header.names, header.titles, dialect.decimal_comma)
+    table = _table(path, lines.numbers, dialect, header.names)
+    metres = header.metres_per_unit
+    if layout.header_unit and metres is not None and metres != 1.0:
+        _log.warning(
+            "%s: its titles say that a unit is %.7g m; x, y, z are converted to metres", path, metres
+        )
+        for name in POSITION:
+            table[name] *= metres
+    return table
 
 
-def table_of_columns(rows: np.ndarray) -> np.ndarray:
-    """Convert (N, 3 or more) numbers to a structured array; guess which columns are normals or colours."""
-    return _table(rows, _guessed(rows))
+def _decoded(path: AnyPath, data: bytes) -> str:
+    """Return the text of a file in UTF-8, UTF-16 with a byte order mark, or Windows' Latin-1."""
+    wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
+    for encoding in ("utf-16",) if wide else ("utf-8-sig", "cp1252"):
+        try:
+            text = data.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        if encoding == "utf-8-sig" or all(c.isprintable() or c.isspace() for c in text[:10_000]):
+            return text
+    raise InputError(f"The point cloud {path} is not a text file; try to export it as PLY")
 
 
-def parse_pts(path: AnyPath, data: bytes) -> np.ndarray:
-    """Read Leica's PTS: a line with the number of points, then x, y, z, intensity and optionally r, g, b.
+def _without_groups(text: str) -> str:
+    """Remove apostrophes and, where blanks do not separate, no-break spaces that mark thousands."""
+    marks = "'\u2019" + ("\u00a0\u202f" if ";" in text or "\t" in text else "")
+    if not any(mark in text for mark in marks):
+        return text
+    return re.sub(rf"(?<=\d)[{marks}](?=\d{{3}})", "", text)
 
-    Raises:
-        InputError: the file is not such text, or ends before its last point.
-    """
-    first, _, rest = data.partition(b"\n")
-    if not first.strip().isdigit():
-        return parse_text(path, data)  # many PTS files lack the first line
-    count = int(first)
-    check_count(path, count)
-    lines = [line for line in rest.splitlines() if line.strip()]
-    if len(lines) < count:
-        raise truncated(path, len(lines), count)
-    width = len(lines[0].split()) if lines else 0
-    if width not in (3, 4, 6, 7):
-        raise InputError(f"The point cloud {path} has {width} columns; a PTS file has 3, 4, 6 or 7")
-    rows = number_rows(path, rest, count, width)
-    colors = list(COLOR) if width >= 6 else []
-    return _table(rows, [*POSITION, *(["intensity"] if width in (4, 7) else []), *colors])
+
+def _lines_of(path: AnyPath, text: str) -> _Lines:
+    """Sort the lines; a line with a count must be followed by as many lines of numbers."""
+    comments: list[str] = []
+    titles: list[str] = []
+    numbers: list[str] = []
+    left: int | None = None  # lines of numbers that the last count still promises
+    for line in text.splitlines():
+        plain = line.strip()
+        if not plain:
+            continue
+        if plain.startswith(_COMMENTS):
+            if not numbers:
+                comments.append(plain.lstrip("#/% "))
+        elif plain.isdigit() and (left == 0 if numbers else left is None):
+            left = int(plain)
+            check_count(path, left)
+        elif not numbers and not _has_numbers(plain):
+            titles.append(plain)
+            if len(titles) > _HEADER_LINES:
+                break
+        elif left == 0:
+            raise InputError(
+                f"The point cloud {path} has more lines of numbers than its first line counts; try to "
+                "correct or to remove that line"
+            )
+        else:
+            numbers.append(line.lstrip().rstrip(" \r\n"))
+            left = None if left is None else left - 1
+    if left:
+        raise truncated(path, len(numbers), len(numbers) + left)
+    return _Lines(comments, titles, numbers, left is not None)
+
+
+def _has_numbers(line: str) -> bool:
+    """Return whether a line has three numbers or more."""
+    count = 0
+    for word in _SEPARATORS.split(line):
+        count += _is_number(word)
+        if count == 3:
+            return True
+    return False
 
 
 def _is_number(word: str) -> bool:
@@ -84,28 +179,99 @@ def _is_number(word: str) -> bool:
     return True
 
 
-def _guessed(rows: np.ndarray) -> list[str]:
-    """Guess the names of the columns from their values."""
-    names = list(POSITION)
-    for start in range(3, rows.shape[1] - 2, 3):
-        triple = rows[:, start : start + 3]
-        lengths = np.linalg.norm(triple, axis=1)
-        if "nx" not in names and np.all(np.abs(lengths - 1.0) < _UNIT_TOLERANCE):
-            names += NORMAL
-        elif "red" not in names and np.all((triple >= 0) & (triple <= 255) & (triple == np.rint(triple))):
-            names += COLOR
-        else:
-            names += [f"column_{start + k}" for k in range(3)]
-    return names + [f"column_{k}" for k in range(len(names), rows.shape[1])]
+def _header(path: AnyPath, lines: _Lines, dialect: Dialect, width: int) -> Header | None:
+    """Return what the titles of the columns say; None if there are none."""
+    open_end = width > 3 and not dialect.cells(lines.numbers[:1])[0][-1].strip()
+    for line in reversed(lines.titles):
+        titles = split_titles(line, dialect, width)
+        if len(titles) == width - 1 and open_end:
+            titles = [*titles, ""]
+        if len(titles) == width:
+            header = header_of(path, titles)
+            if header is None:
+                raise no_position(path, titles)
+            return header
+        if named_axes(titles) >= 2:
+            raise InputError(
+                f"The point cloud {path} has {len(titles)} titles ({line[:80]}) above {width} columns; try "
+                "--columns with a name for each column, for example x,y,z,_"
+            )
+    for line in reversed(lines.comments):
+        titles = split_titles(line, dialect, width)
+        if len(titles) == width:
+            header = header_of(path, titles)
+            if header is not None:
+                return header
+            if names_degrees(titles):
+                raise no_position(path, titles)
+    if lines.titles:
+        _log.warning(
+            "%s: its first line, %s, is no title of %d columns and not read",
+            path,
+            lines.titles[0][:80],
+            width,
+        )
+    return None
 
 
-def _table(rows: np.ndarray, names: list[str]) -> np.ndarray:
-    """Return a structured array; integer colours get an integer type, which marks them as 0 to 255."""
-    kinds = dict.fromkeys(names, "f8")
-    places = [place for place, name in enumerate(names) if name in COLOR]
-    if places and np.all(rows[:, places] == np.rint(rows[:, places])) and rows[:, places].max() > 1:
-        kinds |= {names[place]: "i8" for place in places}
-    table = np.empty(len(rows), list(kinds.items()))
-    for name, column in zip(names, rows.T, strict=True):
-        table[name] = column
-    return table
+def _guessed(path: AnyPath, lines: _Lines, dialect: Dialect, width: int) -> np.ndarray:
+    """Return the table of columns without titles; columns of words are not used."""
+    first = dialect.cells(lines.numbers[:1])[0]
+    while first and not first[-1].strip():  # a separator at the end of the line
+        first = first[:-1]
+    places = [k for k, cell in enumerate(first) if _is_number(cell) or cell.strip().lower() in _NOT_A_NUMBER]
+    if len(places) < 3:
+        raise InputError(f"The point cloud {path} has no lines of three numbers or more; try another file")
+    rows = _numbers(path, lines.numbers, dialect, width, places)
+    pts = PurePath(path).suffix.lower() == ".pts" and len(places) == width
+    if pts and lines.counted and width not in (3, 4, 6, 7):
+        raise InputError(
+            f"The point cloud {path} has {width} columns, and a PTS file has 3, 4, 6 or 7; try --columns "
+            "x,y,z,_ with a name for each column"
+        )
+    found = _PTS[width] if pts and width in _PTS else guessed_columns(path, rows)
+    names = [UNUSED] * width
+    for place, name in zip(places, found, strict=True):
+        names[place] = name
+    if (UNUSED in names and not pts) or dialect.decimal_comma:
+        say_columns(path, names, decimal_comma=dialect.decimal_comma)
+    return table_named(rows, found)
+
+
+def _table(
+    path: AnyPath, lines: Sequence[str], dialect: Dialect, names: Sequence[str], more: bool = False
+) -> np.ndarray:
+    """Return the table of the named columns; with ``more``, lines may have more columns than names."""
+    places = [k for k, name in enumerate(names) if name != UNUSED]
+    rows = _numbers(path, lines, dialect, len(names), places, more)
+    return table_named(rows, [names[k] for k in places])
+
+
+def _numbers(
+    path: AnyPath,
+    lines: Sequence[str],
+    dialect: Dialect,
+    width: int,
+    places: Sequence[int],
+    more: bool = False,
+) -> FloatArray:
+    """Return the (N, len(places)) numbers at some places of lines of ``width`` cells; empty cells are NaN."""
+    cells = dialect.cells(lines)
+    if any(len(row) < width if more else len(row) != width for row in cells):
+        raise _not_numbers(path, width)
+    picked = [[row[k] for k in places] for row in cells] if more or len(places) < width else cells
+    try:
+        return np.array(picked, dtype=np.float64)
+    except ValueError:
+        picked = [["nan" if c.strip().lower() in _NOT_A_NUMBER else c for c in row] for row in picked]
+    try:
+        return np.array(picked, dtype=np.float64)
+    except ValueError:
+        raise _not_numbers(path, width) from None
+
+
+def _not_numbers(path: AnyPath, width: int) -> InputError:
+    return InputError(
+        f"The point cloud {path} has a line that is not {width} numbers; try to export it again, or "
+        "--columns with the columns that every line has"
+    )

@@ -10,13 +10,15 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_GEOMETRY_BYTES, atomic_path, read_bytes
 from pipeline.io.cloud_arrays import parse_npy, parse_sweep
+from pipeline.io.cloud_columns import parse_columns
 from pipeline.io.cloud_models import parse_model
 from pipeline.io.cloud_npz import parse_npz
 from pipeline.io.cloud_pcd import parse_pcd
 from pipeline.io.cloud_ply import TYPES, parse_ply
+from pipeline.io.cloud_precision import too_coarse
 from pipeline.io.cloud_surveys import parse_e57, parse_las
-from pipeline.io.cloud_table import COLOR, LABEL, NORMAL, POSITION, cloud_of
-from pipeline.io.cloud_text import parse_pts, parse_text
+from pipeline.io.cloud_table import COLOR, LABEL, NORMAL, POSITION, Layout, cloud_of
+from pipeline.io.cloud_text import parse_text
 from pipeline.io.cloud_vtk import parse_vtk
 from pipeline.types import AnyPath, PointCloud
 
@@ -24,24 +26,37 @@ _PARSERS: dict[str, Callable[[AnyPath, bytes], np.ndarray]] = {
     ".ply": parse_ply,
     ".pcd": parse_pcd,
     ".npz": parse_npz,
-    ".npy": parse_npy,
-    **dict.fromkeys((".xyz", ".txt", ".asc", ".csv"), parse_text),
-    ".pts": parse_pts,
     ".vtk": parse_vtk,
-    ".bin": parse_sweep,
     **dict.fromkeys((".obj", ".stl", ".glb"), parse_model),
     **dict.fromkeys((".las", ".laz"), parse_las),
     ".e57": parse_e57,
 }
 """Parsers by suffix. A new format is a file with a parser that returns a table, and a line here."""
+_TABLE_PARSERS: dict[str, Callable[[AnyPath, bytes, Layout], np.ndarray]] = {
+    ".npy": parse_npy,
+    **dict.fromkeys((".xyz", ".txt", ".asc", ".csv", ".pts"), parse_text),
+    ".bin": parse_sweep,
+}
+"""Parsers of tables whose columns a user can name."""
 
 
-def read_cloud(path: AnyPath) -> PointCloud:
+def takes_columns(path: AnyPath) -> bool:
+    """Return whether the columns of such a file can be named by a user."""
+    return PurePath(path).suffix.lower() in _TABLE_PARSERS
+
+
+def read_cloud(path: AnyPath, columns: str | None = None, header_unit: bool = True) -> PointCloud:
     """Read points, with normals, colours and source labels if the file has them.
 
     The suffix determines the format: .ply (also if there is none), .pcd, .npz, .npy, text in .xyz, .txt, .asc
-    and .csv, .pts, legacy .vtk, KITTI's .bin, the vertices of .obj, .stl and .glb, and with the extra
-    ``clouds`` .las, .laz and .e57. Faces and points that are not finite are ignored.
+    and .csv, .pts, legacy .vtk, .bin sweeps of KITTI and nuScenes, the vertices of .obj, .stl and .glb, and
+    with the extra ``clouds`` .las, .laz and .e57. Faces and points that are not finite are ignored.
+
+    Args:
+        path: the file.
+        columns: columns of text, .npy and .bin files, such as ``x,y,z,_,r,g,b`` (``parse_columns``); without
+            it they are found in the file, and what is not plain is logged.
+        header_unit: whether positions are converted to metres if the titles of the columns name another unit.
 
     Returns:
         (N, 3) points in the file's unit, which should be metres.
@@ -55,15 +70,22 @@ def read_cloud(path: AnyPath) -> PointCloud:
     [0.5, 0.0, 1.0]
     """
     suffix = PurePath(path).suffix.lower() or ".ply"
-    if suffix not in _PARSERS:
-        raise InputError(
-            f"The point cloud {path} is of a kind that is not read; try one of {', '.join(_PARSERS)}"
-        )
-    return cloud_of(path, _PARSERS[suffix](path, read_bytes(path, MAX_GEOMETRY_BYTES, "point cloud")))
+    if suffix not in _PARSERS and suffix not in _TABLE_PARSERS:
+        known = ", ".join((*_PARSERS, *_TABLE_PARSERS))
+        raise InputError(f"The point cloud {path} is of a kind that is not read; try one of {known}")
+    layout = Layout(None if columns is None else parse_columns(columns), header_unit)
+    if columns is not None and not takes_columns(path):
+        raise InputError(f"The point cloud {path} names its columns itself; try it without --columns")
+    data = read_bytes(path, MAX_GEOMETRY_BYTES, "point cloud")
+    if takes_columns(path):
+        return cloud_of(path, _TABLE_PARSERS[suffix](path, data, layout))
+    return cloud_of(path, _PARSERS[suffix](path, data))
 
 
 def write_cloud(path: AnyPath, cloud: PointCloud) -> None:
     """Write a binary PLY: float positions and normals, uchar colours and source label.
+
+    Positions are double if float would move a point by more than a tenth of a millimetre.
 
     Raises:
         InputError: the name does not end in .ply, or the folder cannot be written.
@@ -75,8 +97,9 @@ def write_cloud(path: AnyPath, cloud: PointCloud) -> None:
     """
     if not str(path).endswith(".ply"):
         raise InputError(f"{path} is no name for a point cloud; try one that ends in .ply")
+    word = "double" if too_coarse(cloud.points_m) else "float"
     fields: list[tuple[str, str, np.ndarray]]
-    fields = [(name, "float", cloud.points_m[:, axis]) for axis, name in enumerate(POSITION)]
+    fields = [(name, word, cloud.points_m[:, axis]) for axis, name in enumerate(POSITION)]
     if cloud.normals is not None:
         fields += [(name, "float", cloud.normals[:, axis]) for axis, name in enumerate(NORMAL)]
     if cloud.colors is not None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import io
 import json
+import logging
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +15,12 @@ from PIL import Image
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_GEOMETRY_BYTES, atomic_path, read_bytes
+from pipeline.io.cloud_precision import middle_m, too_coarse
 from pipeline.io.images import jpeg_of
 from pipeline.kernels.geometry import rigid
-from pipeline.types import AnyPath, Surface, Texture
+from pipeline.types import AnyPath, FloatArray, Surface, Texture
+
+_log = logging.getLogger(__name__)
 
 MESH_SUFFIXES = (".ply", ".glb", ".obj", ".stl")
 _MAX_HEADER_BYTES = 10_000
@@ -29,13 +34,17 @@ T_GLTF_WORLD = rigid(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0
 def write_mesh(path: AnyPath, surface: Surface, texture: Texture | None = None) -> None:
     """Write the triangles of a surface, with its colours, in the format of the suffix.
 
+    Where 32-bit numbers would move a vertex by more than a tenth of a millimetre, far from the origin, PLY
+    stores doubles, and GLB stores vertices relative to a translation of its root node. OBJ is text.
+
     Args:
         path: name ending in .ply (binary), .glb, .obj or .stl (binary, without colours).
         surface: in metres, Z up; a .glb file is rotated to Y up, as glTF requires.
         texture: photographs for the surface, which only .glb files store.
 
     Raises:
-        InputError: the suffix is none of these, there is no triangle, or the folder cannot be written.
+        InputError: the suffix is none of these, there is no triangle, the format is too coarse for its place
+            (``check_place``), or the folder cannot be written.
 
     >>> import numpy as np, packetmesh as pm
     >>> surface = pm.Surface(np.eye(3), np.array([[0, 1, 2]]))
@@ -46,6 +55,19 @@ def write_mesh(path: AnyPath, surface: Surface, texture: Texture | None = None) 
     suffix = mesh_suffix(path)
     if not len(surface.triangles):
         raise InputError(f"There is no triangle to write into {path}; try a larger ball radius")
+    check_place(path, surface.vertices_m)
+    far = too_coarse(surface.vertices_m)
+    T_gltf_mesh = T_GLTF_WORLD
+    if far and suffix == ".glb":
+        offset_m = middle_m(surface.vertices_m)
+        surface = replace(surface, vertices_m=surface.vertices_m - offset_m)
+        T_gltf_mesh = T_GLTF_WORLD @ rigid(np.eye(3), offset_m)
+        _log.warning(
+            "%s: its 32-bit numbers are too coarse so far from the origin, so the vertices are relative to "
+            "(%.0f, %.0f, %.0f) m, which the translation of the root node adds",
+            path,
+            *offset_m,
+        )
     if texture is not None and suffix == ".glb":
         mesh = _dressed(surface, texture)
     else:
@@ -54,10 +76,46 @@ def write_mesh(path: AnyPath, surface: Surface, texture: Texture | None = None) 
     with atomic_path(path) as sibling:
         if suffix == ".glb":
             scene = trimesh.Scene()
-            scene.add_geometry(mesh, transform=T_GLTF_WORLD)
+            scene.add_geometry(mesh, transform=T_gltf_mesh)
             scene.export(str(sibling))
+        elif far and suffix == ".ply":
+            sibling.write_bytes(_ply_of_doubles(surface))
         else:
             mesh.export(str(sibling))
+
+
+def check_place(path: AnyPath, points_m: FloatArray) -> None:
+    """Check that the format of a mesh file is fine enough for (N, 3) points.
+
+    Raises:
+        InputError: the file would move a point by more than a tenth of a millimetre.
+    """
+    suffix = mesh_suffix(path)
+    if suffix not in (".stl", ".glb") or not too_coarse(points_m):
+        return
+    if suffix == ".stl" or too_coarse(points_m - middle_m(points_m)):
+        raise InputError(
+            f"The mesh {path} reaches {np.nanmax(np.abs(points_m)):.4g} m from the origin, where the 32-bit "
+            f"numbers of {suffix} files are too coarse; try .ply or .obj"
+        )
+
+
+def _ply_of_doubles(surface: Surface) -> bytes:
+    """Return a binary PLY with double positions and, if there are any, colours."""
+    names = [("x", "<f8"), ("y", "<f8"), ("z", "<f8")]
+    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(surface.vertices_m)}"]
+    header += [f"property double {name}" for name, _ in names]
+    if surface.colors is not None:
+        names += [(name, "u1") for name in ("red", "green", "blue")]
+        header += [f"property uchar {name}" for name, _ in names[3:]]
+    vertices = np.empty(len(surface.vertices_m), names)
+    columns = [*surface.vertices_m.T, *(() if surface.colors is None else surface.colors.T)]
+    for (name, _), column in zip(names, columns, strict=True):
+        vertices[name] = column
+    faces = np.empty(len(surface.triangles), [("count", "u1"), ("corners", "<i4", 3)])
+    faces["count"], faces["corners"] = 3, surface.triangles
+    header += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header\n"]
+    return "\n".join(header).encode("ascii") + vertices.tobytes() + faces.tobytes()
 
 
 def _dressed(surface: Surface, texture: Texture) -> trimesh.Trimesh:

@@ -14,12 +14,14 @@ from packetmesh.errors import InputError, PacketMeshError, ReconstructionError
 from pipeline.config import Metric, RegistrationConfig
 from pipeline.kernels.geometry import apply
 from pipeline.kernels.point_sets import distinct_rows, middle_extent_m
+from pipeline.pairs.units import check_units
 from pipeline.registration import average_hausdorff_m, point_error_m, register_timed
 from pipeline.registration.global_start import default_voxel_m, global_start
 from pipeline.registration.methods import METHODS
 from pipeline.registration.neighbourhood import pca_normals
 from pipeline.registration.observability import open_motions
 from pipeline.registration.peers import PEERS, available_peers, run_peer
+from pipeline.surface.given_normals import without_bad_normals
 from pipeline.surface.voxel import voxel_average, voxel_for_count
 from pipeline.types import FloatArray, PointCloud, RegistrationStep
 
@@ -31,8 +33,6 @@ ALIASES = {"ceicp": DEFAULT_METHOD}
 LEAST_POINTS = 6
 LARGEST_M, SMALLEST_M = 1000.0, 0.001
 """Plausible extents of a cloud in metres."""
-UNIT_RATIOS = (300.0, 3000.0)
-"""If one cloud is about a thousand times as large as the other, one of them is in millimetres."""
 EVALUATED_POINTS = 20_000
 """Both clouds are thinned to about this many points before their distance is measured."""
 SHAPE_POINTS = 3000
@@ -131,7 +131,7 @@ def config_for(
 
 
 def prepared_cloud(cloud: PointCloud, name: str, voxel_m: float | None) -> PointCloud:
-    """Remove repeated points and, if ``voxel_m`` is given, thin the cloud.
+    """Remove repeated points and bad normals and, if ``voxel_m`` is given, thin the cloud.
 
     Raises:
         InputError: there are fewer than six distinct points, or the size is implausible in metres.
@@ -152,6 +152,7 @@ def prepared_cloud(cloud: PointCloud, name: str, voxel_m: float | None) -> Point
             f"The {name} cloud is {extent_m:.3g} m across, as if its numbers were {unit}; "
             "try --metres-per-unit with those of source and target"
         )
+    cloud = without_bad_normals(cloud, name)
     return cloud if voxel_m is None else voxel_average(cloud, voxel_m)
 
 
@@ -162,20 +163,24 @@ def prepared_pair(
     voxel_m: float | None = None,
     T_init: FloatArray | None = None,
     T_true: FloatArray | None = None,
+    units_known: bool = False,
 ) -> Pair:
     """Check and thin two clouds and determine the start pose.
+
+    Args:
+        source: the cloud that moves.
+        target: the cloud that stays.
+        config: settings of the registration.
+        voxel_m: edge of the cubes that keep one point each; None keeps all points.
+        T_init: (4, 4) start pose T_target_source; None is the identity.
+        T_true: (4, 4) true pose, if it is known.
+        units_known: whether the user has given the units of both clouds.
 
     Raises:
         InputError: points cannot be used, or the clouds have different units.
         ReconstructionError: the target's shape leaves a motion open, or no global start was found.
     """
-    ratio = middle_extent_m(source.points_m) / max(middle_extent_m(target.points_m), 1e-300)
-    if UNIT_RATIOS[0] < max(ratio, 1.0 / max(ratio, 1e-300)) < UNIT_RATIOS[1]:
-        larger, units = ("source", "0.001 1") if ratio > 1.0 else ("target", "1 0.001")
-        raise InputError(
-            f"The {larger} cloud is {max(ratio, 1.0 / ratio):.0f} times as large as the other, as if it were "
-            f"in millimetres and the other in metres; try --metres-per-unit {units}"
-        )
+    check_units(source, target, units_known, config.with_scale)
     source, target = (
         prepared_cloud(cloud, name, voxel_m) for cloud, name in ((source, "source"), (target, "target"))
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,12 +15,14 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.config import SurfaceConfig
+from pipeline.io.cloud_precision import middle_m, too_coarse
 from pipeline.io.clouds import read_cloud
-from pipeline.io.meshes import mesh_suffix, write_mesh
+from pipeline.io.meshes import check_place, mesh_suffix, write_mesh
 from pipeline.kernels.point_sets import distinct_rows
 from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.surface.boundary import edges_and_faces
-from pipeline.surface.normals import oriented_normals, turned_to_viewpoint
+from pipeline.surface.given_normals import DOUBTFUL_SHARE, agreement, known_normals, opposite_text
+from pipeline.surface.normals import oriented_normals, turned_outwards, turned_to_viewpoint
 from pipeline.surface.radii import radii, spacing
 from pipeline.surface.smooth import smooth
 from pipeline.surface.surrounding import surrounding_radii
@@ -43,6 +45,7 @@ _LINE = 1e-6
 
 GIVEN = "given"
 GIVEN_TURNED = "given, turned to the viewpoint"
+GIVEN_AGREEING = "given, turned to agree among neighbours and outwards"
 ESTIMATED_VIEWPOINT = "estimated, turned to the viewpoint"
 ESTIMATED_OUTWARDS = "estimated, consistent among neighbours and outwards"
 
@@ -62,8 +65,13 @@ class MeshOptions:
     max_points: int | None = None
     """Thin the cloud to about this many points first."""
     smoothing_passes: int = 0
-    metres_per_unit: float = 1.0
-    """Unit of the cloud's coordinates in metres; 0.001 for millimetres."""
+    metres_per_unit: float | None = None
+    """Unit of the cloud's coordinates in metres, 0.001 for millimetres; None is the unit that the titles of a
+    text file's columns name, or else metres."""
+    estimate_normals: bool = False
+    """Whether given normals are ignored and estimated from the points."""
+    columns: str | None = None
+    """Columns of a table of points, as in ``read_cloud``."""
 
     def __post_init__(self) -> None:
         for radius_m in self.radii_m or ():
@@ -77,7 +85,8 @@ class MeshOptions:
             raise InputError(f"At most {self.max_points} points make no surface; try at least {LEAST_POINTS}")
         if self.smoothing_passes < 0:
             raise InputError(f"There cannot be {self.smoothing_passes} smoothing passes; try 0 or more")
-        check_unit(self.metres_per_unit)
+        if self.metres_per_unit is not None:
+            check_unit(self.metres_per_unit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +123,9 @@ def iterate_mesh_file(
     started = time.perf_counter()
     suffix = mesh_suffix(out)
     yield Progress(f"reading {path}", 0.0)
-    meshed = yield from iterate_mesh_cloud(read_cloud(path), options)
+    cloud = read_cloud(path, options.columns, header_unit=options.metres_per_unit is None)
+    check_place(out, cloud.points_m * (options.metres_per_unit or 1.0))
+    meshed = yield from iterate_mesh_cloud(cloud, options)
     if suffix == ".stl" and meshed.surface.colors is not None:
         _log.warning("STL has no place for the colours; a .ply, .obj or .glb keeps them")
     yield Progress(f"writing {out}", 0.95)
@@ -131,9 +142,17 @@ def iterate_mesh_cloud(cloud: PointCloud, options: MeshOptions) -> Generator[Pro
         ReconstructionError: no ball makes a triangle.
     """
     yield Progress("looking for repeated points", 0.05)
-    cloud = in_metres(usable_points(cloud), options.metres_per_unit)
+    metres_per_unit = options.metres_per_unit or 1.0
+    if options.estimate_normals:
+        cloud = replace(cloud, normals=None)
+    cloud = in_metres(usable_points(cloud), metres_per_unit)
+    far = too_coarse(cloud.points_m)
+    offset_m = middle_m(cloud.points_m) if far else np.zeros(3)  # sums of squares lose digits far away
+    viewpoint_m = None if options.viewpoint_m is None else np.array(options.viewpoint_m) - offset_m
+    if far:
+        cloud = replace(cloud, points_m=cloud.points_m - offset_m)
     width_m = width_of(cloud)
-    doubt = doubtful_unit(width_m, options.metres_per_unit)
+    doubt = doubtful_unit(width_m, metres_per_unit)
     if doubt is not None:
         _log.warning(doubt)
     if options.max_points is not None and len(cloud) > options.max_points:
@@ -141,17 +160,21 @@ def iterate_mesh_cloud(cloud: PointCloud, options: MeshOptions) -> Generator[Pro
         cloud = voxel_average(cloud, voxel_for_count(cloud.points_m, options.max_points))
         _check_shape(cloud.points_m)
     yield Progress(f"normals of {len(cloud)} points", 0.15)
-    cloud, normals = with_normals(cloud, options.viewpoint_m)
+    cloud, normals = with_normals(cloud, viewpoint_m)
     yield Progress(f"the normals are {normals}", 0.35)
     if options.smoothing_passes:
         yield Progress(f"smoothing {len(cloud)} points", 0.4)
         cloud = smooth(cloud, options.smoothing_passes)
     yield Progress("spacing of the points", 0.5)
     radii_m = chosen_radii(cloud, options.radii_m)
-    _check_resolution(cloud.points_m, radii_m[0])
+    if not far:
+        _check_resolution(cloud.points_m, radii_m[0])
     sizes = ", ".join(f"{1000.0 * radius_m:.4g}" for radius_m in radii_m)
     yield Progress(f"rolling balls of {sizes} mm over {len(cloud)} points", 0.55)
-    return MeshedCloud(reconstruct_surface(cloud, radii_m), len(cloud), normals, width_m, doubt)
+    surface = reconstruct_surface(cloud, radii_m)
+    if far:
+        surface = replace(surface, vertices_m=surface.vertices_m + offset_m)
+    return MeshedCloud(surface, len(cloud), normals, width_m, doubt)
 
 
 def mesh_report(meshed: MeshedCloud) -> dict[str, Any]:
@@ -231,15 +254,34 @@ def doubtful_unit(width_m: float, metres_per_unit: float) -> str | None:
     return f"The cloud is {width_m:.3g} m wide; {advice}"
 
 
-def with_normals(cloud: PointCloud, viewpoint_m: Sequence[float] | None) -> tuple[PointCloud, str]:
-    """Return the cloud with unit normals, and the origin of the normals."""
-    place_m = None if viewpoint_m is None else np.array(viewpoint_m, dtype=np.float64)
+def with_normals(cloud: PointCloud, viewpoint_m: FloatArray | None) -> tuple[PointCloud, str]:
+    """Return the cloud with unit normals, and the origin of the normals.
+
+    Given normals are turned to the viewpoint. Without one they stay, unless so many neighbours disagree that
+    their signs say nothing: then they are turned to agree, or estimated if even their axes disagree.
+    """
+    if cloud.normals is not None and not (found := agreement(cloud.points_m, cloud.normals)).axes_fit:
+        _log.warning("The normals of the file disagree with their neighbours; they are estimated")
+        cloud = replace(cloud, normals=None)
     if cloud.normals is None:
-        cloud = oriented_normals(cloud, place_m)
-        return cloud, ESTIMATED_OUTWARDS if place_m is None else ESTIMATED_VIEWPOINT
-    if place_m is None:
-        return cloud, GIVEN
-    return turned_to_viewpoint(cloud, place_m), GIVEN_TURNED
+        cloud = oriented_normals(cloud, viewpoint_m)
+        return cloud, ESTIMATED_OUTWARDS if viewpoint_m is None else ESTIMATED_VIEWPOINT
+    if viewpoint_m is not None:
+        return turned_to_viewpoint(cloud, viewpoint_m), GIVEN_TURNED
+    if not found.signs_fit:
+        _log.warning(
+            "%s; they are turned to agree and outwards; --viewpoint X Y Z turns them to a camera, and "
+            "--estimate-normals estimates them",
+            opposite_text(found),
+        )
+        return turned_outwards(cloud), GIVEN_AGREEING
+    if found.opposite_share > DOUBTFUL_SHARE:
+        _log.warning(
+            "%s, and the surface may be torn there; try --viewpoint X Y Z with the place of the camera, or "
+            "--estimate-normals",
+            opposite_text(found),
+        )
+    return cloud, GIVEN
 
 
 def chosen_radii(cloud: PointCloud, radii_m: tuple[float, ...] | None) -> tuple[float, ...]:
@@ -271,16 +313,18 @@ def _known_normals(cloud: PointCloud) -> PointCloud:
     """Normalise the normals; leave out points without one, or all normals if no point has one."""
     if cloud.normals is None:
         return cloud
-    lengths = np.linalg.norm(cloud.normals, axis=1)
-    known = np.isfinite(lengths) & (lengths > 0.0)
+    known = known_normals(cloud.normals)
     if not known.any():
         _log.warning("All normals of the file are zero or not finite; they are estimated from the points")
         return replace(cloud, normals=None)
     if not known.all():
-        _log.warning("%d points are left out: their normals are zero or not finite", (~known).sum())
+        _log.warning(
+            "%d points are left out: their normals are zero or not finite; --estimate-normals keeps them",
+            (~known).sum(),
+        )
         cloud = cloud.select(known)
     assert cloud.normals is not None
-    return replace(cloud, normals=cloud.normals / lengths[known, None])
+    return replace(cloud, normals=cloud.normals / np.linalg.norm(cloud.normals, axis=1, keepdims=True))
 
 
 def _check_shape(points_m: FloatArray) -> None:

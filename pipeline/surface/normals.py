@@ -90,6 +90,13 @@ def turned_to_viewpoint(cloud: PointCloud, viewpoint_m: FloatArray) -> PointClou
     return replace(cloud, normals=np.where(away[:, None], -cloud.normals, cloud.normals))
 
 
+def turned_outwards(cloud: PointCloud) -> PointCloud:
+    """Turn the normals of a cloud so that neighbours agree and each connected component faces outwards."""
+    assert cloud.normals is not None
+    points_m = cloud.points_m - np.median(cloud.points_m, axis=0)
+    return replace(cloud, normals=_turned_outwards(points_m, cloud.normals))
+
+
 def _with_normals(cloud: PointCloud, neighbours: int) -> PointCloud:
     """Estimate unit normals without orientation."""
     if min(len(cloud), neighbours) < 3:

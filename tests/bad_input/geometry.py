@@ -80,6 +80,13 @@ def clouds() -> Iterator[Made]:
     yield "a.xyz", "lines of different lengths", b"1 2 3\n1 2 3 4\n1 2\n"
     yield "a.csv", "columns that are named twice", b"x,x,y,z\n1,2,3,4\n"
     yield "a.csv", "hexadecimal", b"x,y,z\n0x1,0x2,0x3\n"
+    yield "a.csv", "commas of two meanings", b"1,050,2,040,3,000\n4,010,5,020,6,030\n"
+    yield "decimal.csv", "commas of two meanings", b"1,234;5;6,789\n2,345;6;7,891\n"
+    yield "decimal.csv", "titles of degrees", b"lat;lon;alt\n48,1;11,5;519\n"
+    yield "titled.txt", "more points than counted", b"1\n1 2 3\n4 5 6\n"
+    yield "titled.txt", "a count of 10^30", b"1" + b"0" * 30 + b"\n1 2 3\n"
+    yield "titled.txt", "titles of other columns", b"a b c\n1 2 3\n"
+    yield "LIDAR_TOP.pcd.bin", "rows of three", np.ones((1, 7), "<f4").tobytes()
     yield "ascii.ply", "a property twice", ply("ascii").replace(b"float y", b"float x")
     yield "ascii.ply", "no property", b"ply\nformat ascii 1.0\nelement vertex 3\nend_header\n1 2 3\n"
     yield "ascii.ply", "a header without an end", b"ply\n" + b"comment x\n" * 100_000

@@ -20,7 +20,7 @@ import pye57
 import trimesh
 from PIL import Image
 
-from network_sim.radio.link_trace import read_link_trace
+from network_sim.radio.link_file import read_link_trace
 from packetmesh.files import write_json
 from packetmesh.progress import drain
 from packetmesh.settings import config_named, settings
@@ -239,6 +239,9 @@ def samples() -> tuple[Sample, ...]:
         "ascii.vtk": vtk("ASCII", text(POINTS).encode()),
         "binary.vtk": vtk("BINARY", POINTS.astype(">f4").tobytes()),
         "000001.bin": sweep,
+        "LIDAR_TOP.pcd.bin": np.hstack([POINTS, np.ones((COUNT, 2))]).astype("<f4").tobytes(),
+        "decimal.csv": ("X;Y;Z\n" + text(POINTS, ";").replace(".", ",")).encode(),
+        "titled.txt": ("//X Y Z Intensity\n" + text(np.hstack([POINTS, POINTS[:, :1]]))).encode(),
         "a.obj": written("a.obj", _surface),
         "a.stl": written("a.stl", _surface),
         "a.glb": written("a.glb", _surface),
@@ -246,7 +249,8 @@ def samples() -> tuple[Sample, ...]:
         "a.laz": written("a.laz", las),
         "a.e57": written("a.e57", e57),
     }
-    anywhere = ("a.xyz", "a.csv", "000001.bin", "a.obj")
+    tables = ("a.xyz", "a.csv", "decimal.csv", "titled.txt")
+    anywhere = (*tables, "000001.bin", "LIDAR_TOP.pcd.bin", "a.obj")
     found = [Sample(name, data, read_cloud, MESH, name in anywhere) for name, data in clouds.items()]
     for suffix in ("ply", "obj", "stl", "glb"):
         name = f"mesh.{suffix}"

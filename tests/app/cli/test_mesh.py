@@ -189,9 +189,9 @@ def test_a_place_that_takes_no_mesh_is_one_sentence(capsys, tmp_path, ball, out,
 
 
 def test_balls_that_nothing_stops_are_one_sentence(capsys, tmp_path):
-    """Normals that contradict each other leave no seed."""
-    opposite = PointCloud(np.eye(3), normals=np.array([[0, 0, 1.0], [0, 0, -1.0], [0, 0, 1.0]]))
-    write_cloud(tmp_path / "cloud.ply", opposite)
+    """Normals across the surface, as of one point in ten of no scanner, leave no seed."""
+    across = PointCloud(np.eye(3), normals=np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0], [-1.0, 0.0, 1.0]]))
+    write_cloud(tmp_path / "cloud.ply", across)
     got = run(capsys, tmp_path / "cloud.ply", "--out", tmp_path / "mesh.ply", "--radii-m", 1.0)
     commands.check_one_sentence(got, 1, "rests on three points whose normals agree")
 
@@ -200,3 +200,48 @@ def test_an_older_mesh_survives_a_failure(capsys, tmp_path, ball):
     (tmp_path / "mesh.ply").write_text("older")
     assert run(capsys, ball, "--out", tmp_path / "mesh.ply", "--radii-m", 0.001)[0] == 1
     assert (tmp_path / "mesh.ply").read_text() == "older"
+
+
+def test_columns_and_a_unit_may_be_given(capsys, caplog, tmp_path):
+    points_m = sphere(1500).points_m
+    table = np.hstack([np.arange(1500.0)[:, None], 1000.0 * points_m])
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",")
+    command = (tmp_path / "a.csv", "--out", tmp_path / "mesh.ply", "--json")
+    commands.check_one_sentence(run(capsys, *command), 1, "try --columns _,x,y,z or --columns x,y,z,_")
+    code, text, _ = run(capsys, *command, "--columns", "_,x,y,z", "--metres-per-unit", 0.001)
+    assert code == 0
+    assert json.loads(text)["width_m"] == pytest.approx(1.96, abs=0.02)
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="n,x [mm],y [mm],z [mm]", comments="")
+    for unit in ((), ("--metres-per-unit", 0.001)):
+        code, text, _ = run(capsys, *command, *unit)
+        assert code == 0
+        assert json.loads(text)["width_m"] == pytest.approx(1.96, abs=0.02)
+    assert caplog.text.count("converted to metres") == 1
+
+
+def test_flipped_normals_are_named_and_may_be_estimated(capsys, caplog, tmp_path):
+    signs = np.where(np.random.default_rng(0).random((1500, 1)) < 0.5, -1.0, 1.0)
+    write_cloud(tmp_path / "flipped.ply", replace(sphere(1500), normals=signs * sphere(1500).normals))
+    command = (tmp_path / "flipped.ply", "--out", tmp_path / "mesh.ply", "--json")
+    for option, says in (
+        ((), "given, turned to agree among neighbours and outwards"),
+        (("--estimate-normals",), "estimated, consistent among neighbours and outwards"),
+        (("--viewpoint", 0, 0, 0), "given, turned to the viewpoint"),
+    ):
+        code, text, _ = run(capsys, *command, *option)
+        assert code == 0
+        assert (json.loads(text)["normals"], json.loads(text)["genus"]) == (says, 0)
+    assert caplog.text.count("of neighbouring normals point against each other") == 1
+
+
+def test_a_far_cloud_is_meshed_in_its_place_or_the_format_is_refused_first(capsys, tmp_path):
+    far_m = sphere(1500).points_m + np.array([5e5, 4.65e6, 300.0])
+    np.savez(tmp_path / "far.npz", points=far_m)
+    assert run(capsys, tmp_path / "far.npz", "--out", tmp_path / "mesh.ply")[0] == 0
+    vertices_m = read_mesh(tmp_path / "mesh.ply").vertices_m
+    order, expected = (np.lexsort(np.round(points_m, 6).T) for points_m in (vertices_m, far_m))
+    assert np.abs(vertices_m[order] - far_m[expected]).max() < 1e-4
+    code, _, err = run(capsys, tmp_path / "far.npz", "--out", tmp_path / "mesh.stl")
+    assert code == 1
+    assert err.splitlines()[-1].endswith("32-bit numbers of .stl files are too coarse; try .ply or .obj")
+    assert "rolling" not in err

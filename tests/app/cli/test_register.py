@@ -8,11 +8,13 @@ import pytest
 
 from pipeline.io.clouds import read_cloud, write_cloud
 from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
+from pipeline.kernels.open3d_runtime import o3d
 from pipeline.registration import point_error_m
 from pipeline.registration.methods import METHODS
 from pipeline.registration.peers import available_peers
 from pipeline.types import PointCloud
 from tests.app import commands
+from tests.pipeline.pairs.rooms import room
 
 T_TRUE = rigid(rotation_exp(np.radians(4.0) * np.array([0.6, -0.48, 0.64])), [0.03, -0.02, 0.03])
 KEYS = {"T_target_source", "iterations", "stop_reason", "rmse_m", "average_hausdorff_m", "elapsed_s"}
@@ -110,7 +112,10 @@ def test_clouds_that_have_nothing_in_common_end_elsewhere_with_every_draw_and_it
     assert code == 0
     assert not row["draws_agree"]
     assert row["spread_m"] > 0.005
-    assert f"10 draws of the points end up to {100 * row['spread_m']:.1f} cm" in err.splitlines()[-1]
+    assert (
+        f"10 random draws of the points give poses up to {100 * row['spread_m']:.1f} cm"
+        in err.splitlines()[-1]
+    )
 
 
 def test_a_start_pose_a_voxel_and_a_gate_are_heeded(capsys, tmp_path, files):
@@ -221,3 +226,73 @@ def test_wrong_use_is_one_sentence_and_leaves_nothing_behind(capsys, tmp_path, f
     argv = [files / word if word.endswith(".ply") else word for word in argv]
     commands.check_one_sentence(run(capsys, *argv, "--out", tmp_path / "out"), code, says)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("value", [0.0, np.nan])
+@pytest.mark.parametrize("count", [40, 4000])
+@pytest.mark.parametrize("voxel", [(), ("--voxel-m", 0.02)])
+def test_normals_that_are_unknown_are_estimated_with_a_sentence(
+    capsys, caplog, tmp_path, files, value, count, voxel
+):
+    target = read_cloud(files / "target.ply").points_m
+    normals = np.tile([0.6, 0.0, 0.8], (len(target), 1))
+    normals[:count] = value
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(target))
+    cloud.normals = o3d.utility.Vector3dVector(normals)
+    o3d.io.write_point_cloud(str(tmp_path / "bad.ply"), cloud)
+    command = (files / "source.ply", tmp_path / "bad.ply", "--truth", files / "truth.txt", "--json", *voxel)
+    code, out, _ = run(capsys, *command, "--out", tmp_path / "out")
+    assert code == 0
+    assert json.loads(out)["ceicp-a"]["point_error_m"] < 0.003
+    assert f"normals of {count} of the {len(target)} points of the target cloud are zero" in caplog.text
+
+
+def test_a_far_pair_keeps_its_place(capsys, tmp_path):
+    away = rigid(np.eye(3), [5e5, 4.65e6, 300.0])
+    source, target = apply(away @ inverse(T_TRUE), corner(1)), apply(away, corner(2))
+    np.savetxt(tmp_path / "source.xyz", source, "%.6f")
+    np.savetxt(tmp_path / "target.xyz", target, "%.6f")
+    assert run(capsys, tmp_path / "source.xyz", tmp_path / "target.xyz", "--out", tmp_path / "out")[0] == 0
+    T = np.loadtxt(tmp_path / "out" / "transform.txt")
+    moved = o3d.io.read_point_cloud(str(tmp_path / "out" / "aligned.ply"))
+    np.testing.assert_allclose(
+        np.asarray(moved.points), apply(T, np.loadtxt(tmp_path / "source.xyz")), atol=1e-4
+    )
+    assert np.abs(np.asarray(moved.points) - apply(away, corner(1))).max() < 0.005
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("feet", 0.3048), ("inches", 0.0254), ("centimetres", 0.01)])
+def test_units_are_named_and_the_remedy_works(capsys, tmp_path, files, unit, metres):
+    np.savez(tmp_path / "other.npz", points=read_cloud(files / "source.ply").points_m / metres)
+    command = (tmp_path / "other.npz", files / "target.ply", "--truth", files / "truth.txt", "--json")
+    got = run(capsys, *command, "--out", tmp_path / "out")
+    commands.check_one_sentence(
+        got, 1, f"in {unit} and the other in metres; try --metres-per-unit {metres} 1"
+    )
+    code, out, _ = run(capsys, *command, "--metres-per-unit", metres, 1, "--out", tmp_path / "out")
+    assert code == 0
+    assert json.loads(out)["ceicp-a"]["point_error_m"] < 0.003
+
+
+def test_a_mirrored_source_is_named(capsys, tmp_path):
+    np.savez(tmp_path / "left.npz", points=room(1, 1500) * [-1.0, 1.0, 1.0])
+    np.savez(tmp_path / "right.npz", points=room(2, 1500))
+    code, _, err = run(capsys, tmp_path / "left.npz", tmp_path / "right.npz", "--out", tmp_path / "out")
+    assert code == 0
+    assert "because one is mirrored: with x negated the source fits to" in err
+
+
+def test_columns_may_be_given_once_or_for_each_cloud(capsys, tmp_path, files):
+    source, target = (read_cloud(files / f"{name}.ply").points_m for name in ("source", "target"))
+    np.savetxt(tmp_path / "source.txt", np.hstack([np.arange(len(source))[:, None], source]))
+    np.savetxt(tmp_path / "target.txt", target)
+    moving = tmp_path / "source.txt"
+    command = (moving, tmp_path / "target.txt", "--out", tmp_path / "out")
+    commands.check_one_sentence(run(capsys, *command), 1, "--columns _,x,y,z")
+    assert run(capsys, *command, "--columns", "_,x,y,z", "auto")[0] == 0
+    assert (
+        run(capsys, moving, files / "target.ply", "--columns", "_,x,y,z", "--out", tmp_path / "ply")[0] == 0
+    )
+    plain = (files / "source.ply", files / "target.ply", "--out", tmp_path / "out")
+    commands.check_one_sentence(run(capsys, *plain, "--columns", "x,y,z"), 1, "try it without --columns")
+    commands.check_one_sentence(run(capsys, *plain, "--columns", "x", "y", "z"), 1, "3 texts for two clouds")

@@ -199,10 +199,24 @@ def test_points_that_span_nothing_are_refused(points_m, says):
         meshed(PointCloud(np.asarray(points_m, dtype=np.float64)))
 
 
-def test_points_too_far_away_for_a_mesh_file_are_refused():
-    map_m = sphere(2000).points_m + np.array([4e5, 5e6, 300.0])
-    with pytest.raises(InputError, match=r"reaches 5e\+06 m from the origin.* 0\.5 m apart; try to move it"):
-        meshed(PointCloud(map_m))
+@pytest.mark.parametrize("with_normals", [True, False])
+@pytest.mark.parametrize("viewpoint_m", [None, (4e5, 5e6, 300.0)])
+def test_a_cloud_far_away_has_the_mesh_of_the_same_cloud_at_the_origin(with_normals, viewpoint_m):
+    far_m = np.array([4e5, 5e6, 300.0])
+    near = sphere(2000) if with_normals else PointCloud(sphere(2000).points_m)
+    near_view_m = None if viewpoint_m is None else (0.0, 0.0, 0.0)
+    there = meshed(replace(near, points_m=near.points_m + far_m), viewpoint_m=viewpoint_m)
+    here = meshed(near, viewpoint_m=near_view_m)
+    np.testing.assert_array_equal(there.surface.triangles, here.surface.triangles)
+    np.testing.assert_allclose(there.surface.vertices_m - far_m, here.surface.vertices_m, atol=1e-8)
+    assert there.normals == here.normals
+
+
+def test_tiny_balls_where_floats_are_coarse_are_refused():
+    """1 mm of a surface at 900 m, where floats are 0.06 mm apart."""
+    tiny = PointCloud(1e-3 * sphere(2000).points_m + np.array([900.0, 0.0, 0.0]))
+    with pytest.raises(InputError, match=r"reaches 900 m from the origin.* 6\.1e-05 m apart; try to move it"):
+        meshed(tiny)
     assert mesh_report(meshed(PointCloud(sphere(2000).points_m + 1000.0)))["genus"] == 0
 
 

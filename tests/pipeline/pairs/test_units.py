@@ -1,0 +1,88 @@
+"""Two clouds of which one is in another unit: the factor, its name, and the option that settles it."""
+
+import re
+
+import numpy as np
+import pytest
+
+from packetmesh.errors import InputError
+from pipeline.kernels.geometry import apply, rigid, rotation_exp
+from pipeline.pairs.units import check_units, size_ratio
+from pipeline.types import PointCloud
+
+RNG = np.random.default_rng(8)
+AWAY = rigid(rotation_exp(np.array([0.3, -0.9, 0.5])), [2.0, -1.0, 0.5])
+
+
+def room(count: int, size_m=(6.0, 5.0, 3.0)) -> np.ndarray:
+    """Random points on the walls of a room."""
+    points = RNG.uniform(0.0, 1.0, (count, 3))
+    points[np.arange(count), RNG.integers(0, 3, count)] = RNG.integers(0, 2, count)
+    return points * size_m
+
+
+def checked(source_m, target_m, known=False, with_scale=False):
+    check_units(PointCloud(source_m), PointCloud(target_m), known, with_scale)
+
+
+def test_the_ratio_does_not_depend_on_the_pose():
+    points_m = room(3000)
+    found = size_ratio(apply(AWAY, 3.0 * points_m), points_m)
+    assert found.factor == pytest.approx(3.0, rel=1e-9)
+    assert found.deviation == pytest.approx(0.0, abs=1e-9)
+    assert size_ratio(points_m, room(3000, (6.0, 1.0, 1.0))).deviation > 0.1
+
+
+UNITS = [
+    ("millimetres", 0.001),
+    ("centimetres", 0.01),
+    ("inches", 0.0254),
+    ("feet", 0.3048),
+    ("yards", 0.9144),
+]
+
+
+@pytest.mark.parametrize(("name", "metres"), UNITS)
+@pytest.mark.parametrize("moving", [True, False])
+def test_a_unit_is_named_and_the_option_brings_the_clouds_to_one_size(name, metres, moving):
+    one, other = apply(AWAY, room(20_000)) / metres, room(20_000)
+    pair = (one, other) if moving else (other, one)
+    with pytest.raises(InputError, match=f"in {name} and the other in metres") as caught:
+        checked(*pair)
+    factors = [
+        float(word) for word in re.search(r"--metres-per-unit (\S+) ([^,\s]+)", str(caught.value)).groups()
+    ]
+    assert factors == ([metres, 1.0] if moving else [1.0, metres])
+    scaled = [factor * points for factor, points in zip(factors, pair, strict=True)]
+    checked(*scaled)
+    checked(*scaled, known=True)
+
+
+def test_kilometres_are_named():
+    with pytest.raises(InputError, match=r"the source were in kilometres.*--metres-per-unit 1000 1"):
+        checked(0.001 * room(3000), room(3000))
+
+
+def test_any_factor_is_named_where_the_shapes_are_the_same():
+    with pytest.raises(
+        InputError, match=r"target cloud is 2\.\d+ times .* in another unit; try --metres-per"
+    ) as caught:
+        checked(room(20_000), apply(AWAY, 2.5 * room(20_000)))
+    factor = float(re.search(r"--metres-per-unit 1 (\S+),", str(caught.value))[1])
+    assert factor == pytest.approx(0.4, rel=0.02)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_parts_of_a_place_may_differ_in_size(known):
+    whole = room(20_000)
+    checked(whole[whole[:, 0] < 2.0], whole, known)
+    checked(whole, room(20_000) * 1.03, known)
+
+
+def test_given_units_settle_it_except_for_a_thousand():
+    checked(3.28 * room(3000), room(3000), known=True)
+    checked(3.28 * room(3000), room(3000), with_scale=True)
+    with pytest.raises(InputError, match="in millimetres"):
+        checked(1000.0 * room(3000), room(3000), known=True)
+    with pytest.raises(InputError, match="in centimetres"):
+        checked(100.0 * room(3000), room(3000), with_scale=True)
