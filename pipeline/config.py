@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from packetmesh.errors import InputError
 
-Pattern = Literal["circles", "circles-asymmetric", "chessboard", "charuco"]
+Pattern = Literal["circles", "circles-asymmetric", "chessboard", "charuco", "aprilgrid"]
 """Pattern that is printed on a calibration board."""
 Lens = Literal["thesis", "brown", "rational", "fisheye"]
 """Distortion of a camera: k1, k2 (SPEC 1.1); also p1, p2, k3; also k4 to k6; or a fisheye's."""

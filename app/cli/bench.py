@@ -19,15 +19,16 @@ def bench(
     load_s: float = 60.0,
     json: bool = False,
 ) -> None:
-    """Measure speed and memory beside peers, in one run.
+    """Measure speed and memory of PacketMesh and of other programs, in one run.
 
     Args:
         out: Folder for bench.json.
-        only: Cases to run, or what stands before their colons, as `chain,network`; all without it.
+        only: Cases to run, or groups (the text before the colon), for example `chain,network`; all by
+            default.
         problems: Solve registration problems instead: a folder of lists and clouds in the form of the
             point-clouds-registration-benchmark (arXiv 2003.12841); writes problems.csv, a row for each
             problem and method.
-        load_s: How long the thirty browsers of the cases `load` and `soak` stay, in seconds.
+        load_s: Duration of the cases `load` and `soak`, which run thirty browsers, in seconds.
         json: Print the results as one JSON object.
     """
     from lab.benchmarks import CASES, run_benchmarks

@@ -18,8 +18,8 @@ def depth_lines(report: CameraReport) -> Iterator[str]:
         return
     fit, correction = report.depth, report.depth.correction
     yield (
-        f"Depth is off by {1000.0 * fit.rms_before_m:.1f} mm on the board, corrected by "
-        f"{1000.0 * fit.rms_after_m:.1f} mm, noise included; terms: {', '.join(fit.terms) or 'none'}"
+        f"RMS depth error on the board, noise included: {1000.0 * fit.rms_before_m:.1f} mm measured, "
+        f"{1000.0 * fit.rms_after_m:.1f} mm corrected; terms: {', '.join(fit.terms) or 'none'}"
     )
     for term, name in (("offset", "offset_m"), ("scale", "scale"), ("curvature", "curvature_per_m")):
         if term in fit.terms:

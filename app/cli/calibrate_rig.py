@@ -18,16 +18,25 @@ if TYPE_CHECKING:
     from pipeline.config import Lens
 
 
-def several_cameras(images: Sequence[str]) -> tuple[NodeShots, ...]:
+def several_cameras(images: Sequence[str], rig: bool = False) -> tuple[NodeShots, ...]:
     """Return the nodes whose folders are named; none if the images are of one camera.
 
+    Args:
+        images: folders, files and patterns.
+        rig: whether the images of one folder are of several cameras, which their names tell.
+
     Raises:
-        InputError: folders without images, more cameras than a rig has, or only one camera below a folder.
+        InputError: folders without images, more cameras than a rig has, only one camera below a folder, or
+            names that do not tell cameras apart.
     """
     from packetmesh.errors import InputError
-    from pipeline.calibration.shots import node_folders, node_shots
+    from pipeline.calibration.from_images import image_files
+    from pipeline.calibration.shots import node_folders, node_shots, series_shots
 
     folders = [Path(word) for word in images]
+    own_folders = all(map(Path.is_dir, folders)) and (len(folders) > 1 or bool(node_folders(folders[0])))
+    if rig and not own_folders:
+        return series_shots(image_files(images, one_camera=True))
     if not all(folder.is_dir() for folder in folders):
         return ()
     below = [one for folder in folders for one in (*node_folders(folder), *folder.glob("infrared_*"))]
@@ -110,10 +119,10 @@ def _lines(report: RigReport, trust: Mapping[str, Trust]) -> Iterator[str]:
         yield from (f"{name}: {line}" for line in depth_lines(one))
     for name, worth in trust.items():
         for odd in worth.outliers:
-            yield f"Perhaps leave out: {odd.reason} (--without {name}/{odd.name})"
+            yield f"Consider leaving out: {odd.reason} (--without {name}/{odd.name})"
         yield f"{name}: {worth.verdict.sentence}"
     unseen = report.rig.held_out
-    beside = "" if unseen is None else f"; {unseen.rms_px:.3f} px at moments that it has not seen"
+    beside = "" if unseen is None else f"; {unseen.rms_px:.3f} px at held-out moments"
     yield f"RMS {report.rig.rms_px:.3f} px over {len(report.rig.moments)} moments{beside}"
     for name, one in report.cameras.items():
         for image, detection in one.detections.items():

@@ -32,7 +32,7 @@ class Finding:
 
 
 def doctor(json: bool = False) -> None:
-    """Tell what this machine has, and what is wrong with it.
+    """Report the versions and resources of this machine, and what PacketMesh needs but lacks.
 
     Args:
         json: Print the findings as one JSON object.
@@ -45,7 +45,7 @@ def doctor(json: bool = False) -> None:
             print(f"{'ok ' if finding.ok else 'BAD'} {finding.name:<14} {finding.detail}")
     bad = [finding.name for finding in findings if not finding.ok]
     if bad:
-        raise PacketMeshError(f"Not everything is well: {', '.join(bad)} (see above)")
+        raise PacketMeshError(f"These checks failed: {', '.join(bad)} (see above)")
 
 
 def examine() -> list[Finding]:
@@ -72,7 +72,7 @@ def _python() -> Iterator[Finding]:
 def _machine() -> Iterator[Finding]:
     memory_gb = psutil.virtual_memory().total / 1e9
     detail = f"{os.cpu_count()} cores, {memory_gb:.1f} GB of memory, {platform.system()} {platform.machine()}"
-    yield Finding("machine", memory_gb > 3, detail + ("" if memory_gb > 3 else "; the app wants 3 GB"))
+    yield Finding("machine", memory_gb > 3, detail + ("" if memory_gb > 3 else "; the app needs 3 GB"))
 
 
 def _packages() -> Iterator[Finding]:

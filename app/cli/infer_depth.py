@@ -39,24 +39,26 @@ def infer_depth(
     """Infer the depth of photographs (PNG or JPEG) with our network or any other.
 
     Args:
-        photos: Colour images; the orientation that a camera noted in them is not applied.
+        photos: Colour images; an orientation in their metadata is not applied.
         out: Folder for NAME_depth.png, 16 bits, and NAME_preview.png. Metric depth is in millimetres, 0
             where unknown; relative depth is scaled so that its largest value is 65534.
-        model: An ONNX depth network; the one that ships without it.
-        preset: How that network wants its image; without it, what its metadata say.
-        kind: What it gives: metres, depth up to scale, or disparity up to scale and shift.
-        size_px: Width and height of its input, where the file leaves them free.
-        normalisation: ImageNet's mean and deviation, or values from 0 to 1 (unit) or to 255 (bytes).
-        channels: Order of its channels.
-        sensor: The sensor's depth image of the one photograph, to make inferred depth metric.
-        fill: Keep what the sensor measured and fill its holes only, as `reconstruct` does; with --sensor.
-        depth_scale: Depth units per metre in that image; else whole numbers are millimetres, others metres.
-        json: Print what was done as one JSON object.
+        model: An ONNX depth network; without it, the one that comes with PacketMesh.
+        preset: Input and output of that network; without it, its metadata decide.
+        kind: Output of the network: metres, depth up to scale, or disparity up to scale and shift.
+        size_px: Width and height of its input, if the file leaves them open.
+        normalisation: Input values: normalised with ImageNet's mean and deviation, from 0 to 1 (unit), or
+            from 0 to 255 (bytes).
+        channels: Order of its colour channels.
+        sensor: Depth image of the sensor for one photograph; it makes the inferred depth metric.
+        fill: Keep the measured depth and fill only its holes, as `reconstruct` does; needs --sensor.
+        depth_scale: Depth units per metre in the sensor image; without it, whole numbers are millimetres
+            and floating-point numbers metres.
+        json: Print the results as one JSON object.
     """
     if not photos:
         wrong_use("infer-depth needs at least one photograph")
     if sensor is not None and len(photos) > 1:
-        wrong_use("--sensor belongs to one photograph; give one at a time")
+        wrong_use("--sensor is the depth image of one photograph; give only one photograph")
     if fill and sensor is None:
         wrong_use("--fill needs the depth image whose holes are filled: --sensor DEPTH")
     from packetmesh.files import writable_folder
@@ -66,7 +68,8 @@ def infer_depth(
     twice = next((stem for stem in stems if stems.count(stem) > 1), None)
     if twice is not None:
         raise InputError(
-            f"Two photographs are called {twice}, and so would be their depth; try them one by one"
+            f"Two photographs are called {twice}, so their depth files would have the same name; try them "
+            "one by one"
         )
     network = DepthNetwork(model, preset, Overrides(kind, size_px, normalisation, channels))
     writable_folder(out)

@@ -26,22 +26,22 @@ class SourceOptions:
     """A demo scene (see `packetmesh scenes`)."""
     rig: Path | None = None
     """A folder with node_00/{color.png, depth.png, intrinsics.json, pose.txt}, node_01/...; `reconstruct`
-    also takes a recording that `import` knows."""
+    also takes a recording that `import` can read."""
     color: Path | None = None
     """Colour image of a single RGB-D pair."""
     depth: Path | None = None
     """Its 16-bit depth image."""
     intrinsics: Path | None = None
-    """Its camera: JSON with fx, fy, cx, cy; Open3D JSON; or ROS camera_info."""
+    """Intrinsics of its camera: JSON with fx, fy, cx, cy; Open3D JSON; or ROS camera_info."""
     depth_scale: float | None = None
-    """Depth units per metre in the depth images of a pair or a rig; without it whole numbers are millimetres
+    """Depth units per metre in the depth images of a pair or a rig; without it, whole numbers are millimetres
     and floating-point numbers metres."""
     depth_intrinsics: Path | None = None
-    """The camera of a depth image that is not registered to the colour image."""
+    """Intrinsics of the depth camera, if the depth image is not registered to the colour image."""
     extrinsics: Path | None = None
-    """Where that camera stands: JSON with T_color_depth, four rows of four numbers, metres."""
+    """Pose of the depth camera: JSON with T_color_depth, four rows of four numbers, metres."""
     calibration: Path | None = None
-    """A calibration's folder: its node_00/{intrinsics.json, pose.txt, ...} take the place of the own."""
+    """Folder of a calibration; its node_00/{intrinsics.json, pose.txt, ...} replace those of the images."""
 
     def source(self) -> FileSource:
         """Return the source that the options name; exit if they name none or more than one."""
@@ -53,16 +53,15 @@ class SourceOptions:
     def nothing_but_scale(self, option: str) -> None:
         """Exit if they name any images; only the depth scale may be given with this option."""
         if replace(self, depth_scale=None) != SourceOptions():
-            wrong_use(
-                f"{option} takes no other images: leave out --scene, --rig, --color and what goes with them"
-            )
+            wrong_use(f"{option} takes no other images: leave out --scene, --rig, --color and their options")
 
     def _images(self) -> Demo | RigFolder | ImagePair:
         pair = (self.color, self.depth, self.intrinsics, self.depth_intrinsics, self.extrinsics)
         ways = [self.scene is not None, self.rig is not None, any(part is not None for part in pair)]
         if sum(ways) != 1:
             wrong_use(
-                "say what to reconstruct: --scene NAME, --rig DIR, or --color C --depth D --intrinsics K"
+                "give the images to reconstruct: --scene NAME, --rig DIR, or --color C --depth D "
+                "--intrinsics K"
             )
         from pipeline.sources import Demo, ImagePair, RigFolder
 

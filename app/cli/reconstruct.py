@@ -26,20 +26,20 @@ def reconstruct(
     baseline: Baseline | None = None,
     json: bool = False,
 ) -> None:
-    """Go the whole way from images to a surface before and after fusion.
+    """Reconstruct the surface from images, before and after fusion.
 
     Args:
-        images: What is reconstructed.
+        images: Images to reconstruct.
         out: Folder for config.json, metrics.json, poses.json, the clouds, the surfaces and report.html.
-        rigs: Instead of one: a folder of rigs and of recordings that `import` knows. Each gets a folder of
-            its own in OUT, and all a table (rigs.html, rigs.csv, rigs.json). The same command goes on where
-            it was stopped.
-        scheduler: Address of a Dask scheduler that does many rigs; this machine's cores without it. Its
+        rigs: Instead of one rig: a folder of rigs and of recordings that `import` can read. Each gets its
+            own folder in OUT, and all together a table (rigs.html, rigs.csv, rigs.json). The same command
+            resumes an interrupted run.
+        scheduler: Address of a Dask scheduler that runs many rigs; without it, this machine's cores do. Its
             workers must see the same folders.
         preset: Settings to start from.
         set: Settings to change, for example `--set depth.alignment=median surface.max_points=20000`.
-        baseline: Also the surface of another method over the same points: surface_poisson.ply and .glb, or
-            surface_alpha.ply and .glb.
+        baseline: Also compute the surface by another method from the same points: surface_poisson.ply and
+            .glb, or surface_alpha.ply and .glb.
         json: Print the metrics as one JSON object.
     """
     if rigs is not None and baseline is not None:
@@ -122,7 +122,7 @@ def say_places(placement: Placement) -> None:
         return
     if placement.agreements:
         share = placement.agreement.within_2pct_share
-        say(f"Of what two cameras both measured, {share:.1%} is within 2 %")
+        say(f"Where two cameras measured the same surface, {share:.1%} of the points agree within 2 %")
     for sentence in placement.sentences:
         say(sentence)
     if placement.apart:

@@ -14,13 +14,15 @@ def reproduce(
     full: bool = False,
     json: bool = False,
 ) -> None:
-    """Compute the thesis's claims and set ours beside its own numbers; then ours beyond the thesis.
+    """Compute the claims of the thesis and compare our numbers with its own; then our claims beyond it.
 
     Args:
-        out: Folder for reproduce.html and reproduce.json; keeps the trials: an interrupted run resumes.
-        only: Claims to compute (`--only C10 C16` or `--only C10,C16`); all without it.
+        out: Folder for reproduce.html and reproduce.json. It keeps the trials, so an interrupted run
+            resumes.
+        only: Claims to compute (`--only C10 C16` or `--only C10,C16`); all by default.
         scheduler: Address of a Dask scheduler that runs the trials; without it, this machine's cores do.
-        full: Also the trials that the claims about delivery (D01 to D07) leave out by default; takes hours.
+        full: Also run the trials of the delivery claims (D01 to D07) that are left out by default; takes
+            hours.
         json: Print the verdicts as one JSON object.
     """
     from app.reports.reproduction import write_reproduction_report

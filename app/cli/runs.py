@@ -137,8 +137,8 @@ def rigs_in(folder: Path) -> list[Path]:
     found = [path for path in sorted(folder.iterdir()) if is_rig(path) or is_recording(path)]
     if not found:
         raise InputError(
-            f"{folder} holds no rig (a folder with node_00/...) and no recording that import knows; "
-            "give the folder around them"
+            f"{folder} holds no rig (a folder with node_00/...) and no recording that `packetmesh import` "
+            "can read; give the folder that contains them"
         )
     return found
 
@@ -158,7 +158,7 @@ def iterate_rigs(
     try:
         for index, outcome in run_batch(reconstruct_one, tasks, scheduler, killed=_killed_outcome):
             outcomes[index] = outcome
-            summary = outcome.sentence or f"{outcome.no_hit_after:.1%} of the rays find no surface"
+            summary = outcome.sentence or f"{outcome.no_hit_after:.1%} of the rays miss the surface"
             yield Progress(f"{outcome.name} {outcome.state}: {summary}", len(outcomes) / len(tasks))
     finally:
         done = tuple(outcomes[index] for index in sorted(outcomes))
@@ -269,8 +269,8 @@ def _page(outcomes: tuple[RigOutcome, ...], out: Path) -> Iterator[Markup]:
     yield table((*HEADINGS[:-1], "state"), [(*rigs_row(outcome)[:-1], outcome.state) for outcome in outcomes])
     items = [Markup("<li><b>{}</b>: {}</li>").format(o.name, o.sentence) for o in outcomes if o.sentence]
     if items:
-        yield Markup("<h2>What there is to say</h2><ul>{}</ul>").format(Markup("").join(items))
-    yield Markup("<h2>Their surfaces, each as its first camera sees it</h2>")
+        yield Markup("<h2>Notes</h2><ul>{}</ul>").format(Markup("").join(items))
+    yield Markup("<h2>The surfaces as the first camera of each rig sees them</h2>")
     yield Markup('<p class="note">Magenta: the camera\'s ray meets no surface. A click opens the report.</p>')
     yield pictures(_figures(outcomes, out), 3)
 
@@ -287,7 +287,7 @@ def _figures(outcomes: tuple[RigOutcome, ...], out: Path) -> Iterator[Markup]:
 HEADINGS = (
     "rig",
     "nodes",
-    "missing rays before",
+    "no-hit rays before",
     "after",
     "within 2 % before",
     "after",

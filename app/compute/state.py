@@ -54,6 +54,10 @@ class BoardViews:
     columns: int = 11
     rows: int = 9
     spacing_m: float = 0.035
+    dictionary: str = ""
+    """Dictionary of a ChArUco board's markers; empty if any may be on the board."""
+    tag_spacing: float = 0.3
+    """Gap between two AprilTags over the side of a tag."""
     lens: Lens = "thesis"
     bent: bool = False
     """Whether the board's own shape is estimated too; only for the photographs of one camera."""

@@ -146,5 +146,5 @@ def _training() -> tuple[int, int]:
     import onnxruntime
 
     session = onnxruntime.InferenceSession(SHIPPED_COMPLETION, providers=["CPUExecutionProvider"])
-    told = session.get_modelmeta().custom_metadata_map
-    return int(told["images_seen"]), int(told["minutes"])
+    metadata = session.get_modelmeta().custom_metadata_map
+    return int(metadata["images_seen"]), int(metadata["minutes"])

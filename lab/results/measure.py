@@ -41,6 +41,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "bench_depth": ("packetmesh", "bench", "--only", "depth"),
     "bench_network": ("packetmesh", "bench", "--only", "network"),
     "real_frames": ("python", "-m", "lab.benchmarks.real_frames"),
+    "calibration_verdicts": ("python", "-m", "lab.verdicts", "--seed", "2026", "--sessions", "400"),
     "ns3_saturation": ("python", "tests/benchmarks/ns3_saturation.py"),
 }
 """Command of each record; ``bench_problems`` needs lists in runs/problems, written there by ``python -m
@@ -72,7 +73,7 @@ def measure(name: str, runs: Path = Path("runs/results")) -> Record:
     words = COMMANDS[name]
     if words[0] == "packetmesh":
         words = (*words, "--out", f"{runs / name}")
-    if "lab.benchmarks.real_frames" not in words:
+    if not any(word.startswith("lab.") for word in words):  # these print nothing but JSON
         words = (*words, "--json")
     answer = _run(words)
     if "reproduce" in words:

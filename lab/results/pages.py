@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from lab.benchmarks.filling import FLAT, OURS
 from lab.claims.claim import VERDICTS, is_beyond
 from lab.claims.registry import CLAIMS
-from lab.results import completion, tables
+from lab.results import completion, tables, verdicts
 from lab.results.markdown import Row, listed
 from lab.results.record import ROOT, Record, Records, read_records
 from packetmesh.files import atomic_path
@@ -26,6 +26,7 @@ SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "real_frames": ("What real frames keep", tables.real_frames),
     "bench_chain": ("Time and memory of the whole chain", tables.chain_speed),
     "calibration_claims": ("Calibration: the thesis's claims", tables.claims),
+    "calibration_verdicts": ("Calibration: how often the verdict is right", verdicts.calibration_verdicts),
     "board_claims": ("Boxes and biased sensors: what a calibration is worth", tables.claims),
     "outlier_claims": ("Outlier filter: the thesis's claim", tables.claims),
     "depth_claims": ("Inferred depth: the thesis's claims", completion.depth_claims),

@@ -374,5 +374,5 @@ def chain_speed(numbers: Row) -> str:
     if not stages:  # an older record
         return whole
     by_stage = [(case, *(run["elapsed_s"] for run in result["runs"])) for case, result in numbers.items()]
-    said = "Seconds of each stage; after and before are computed side by side:"
-    return f"{whole}\n\n{said}\n\n{table(('case', *stages), by_stage)}"
+    heading = "Seconds of each stage; after and before are computed side by side:"
+    return f"{whole}\n\n{heading}\n\n{table(('case', *stages), by_stage)}"

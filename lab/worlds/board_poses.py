@@ -94,10 +94,11 @@ def sees(
         return False
     seen_px = project(camera.intrinsics, points_m)
     high_px = np.array([camera.intrinsics.width_px, camera.intrinsics.height_px]) - 1.0
-    grid = seen_px.reshape(board.rows, board.columns, 2)
+    grid = seen_px.reshape(*board.grid[::-1], 2)
     spacing_px = min(float(np.linalg.norm(np.diff(grid, axis=axis), axis=2).min()) for axis in (0, 1))
     rim_px = MARGIN_PX + 0.5 * spacing_px
-    if ((seen_px < rim_px) | (seen_px > high_px - rim_px)).any() or spacing_px < LEAST_SPACING_PX:
+    inside = (seen_px >= rim_px) & (seen_px <= high_px - rim_px)  # False for NaN: no image
+    if not inside.all() or spacing_px < LEAST_SPACING_PX:
         return False
     if free_m is None:
         return True

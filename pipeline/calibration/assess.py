@@ -12,6 +12,7 @@ from packetmesh.errors import ReconstructionError
 from pipeline.calibration.board import Board
 from pipeline.calibration.diagnosis import Coverage, coverage
 from pipeline.calibration.estimate import LEAST_VIEWS, Calibration, View
+from pipeline.calibration.likely_error import likely_error
 from pipeline.calibration.next_view import NextView, next_view
 from pipeline.calibration.outliers import OutlierView, outlier_views
 from pipeline.calibration.trust import ErrorMap, HalfDifference, half_difference_px, projected_sd_px
@@ -39,9 +40,13 @@ class Trust:
             "range_m": judged.range_m,
             "accuracy_m": judged.accuracy_m,
             "passed": judged.passed,
+            "failed": judged.failed,
+            "probability": judged.probability,
             "sentence": judged.sentence,
             "share_within": judged.share,
             "error_of_most_m": judged.error_of_most_m,
+            "wrong_lens": judged.wrong_lens,
+            "bent_board": judged.bent,
             "uncertainty_px": _summary(sd.error_px),
             "uncertainty_m": _summary(sd.error_m),
             "halves": halves
@@ -89,7 +94,7 @@ def assess(
     if len(views) >= 2 * LEAST_VIEWS:
         try:
             halves = half_difference_px(views, calibration.size_px, range_m, calibration.lens)
-        except ReconstructionError:
+        except (ReconstructionError, np.linalg.LinAlgError):
             halves = None
     try:
         following = next_view(calibration, board, range_m)
@@ -101,7 +106,7 @@ def assess(
         coverage(calibration.views, calibration.size_px),
         outlier_views(calibration, views),
         following,
-        verdict(calibration, sd, halves, accuracy_m, following),
+        verdict(calibration, likely_error(calibration, range_m), accuracy_m, following),
     )
 
 

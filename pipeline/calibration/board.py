@@ -1,4 +1,4 @@
-"""Calibration boards with known points: grids of circles, chessboards, ChArUco (SPEC 1.2)."""
+"""Calibration boards with known points: grids of circles, chessboards, ChArUco, AprilGrid (SPEC 1.2)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from packetmesh.errors import InputError
+from pipeline.calibration.dictionaries import APRILGRID, FAMILIES, dictionary, known_dictionary, markers_in
 from pipeline.config import Pattern
 from pipeline.types import FloatArray
 
@@ -21,7 +22,8 @@ MARKER_SHARE = 0.75
 """Ratio of a ChArUco marker's side to that of its square."""
 MOST_POINTS = 50
 """Most points in a row or column."""
-MARKERS = cv2.aruco.DICT_5X5_1000
+TAG_SPACING = 0.3
+"""Gap between the tags of Kalibr's AprilGrid, over the side of a tag."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,10 +32,15 @@ class Board:
 
     pattern: Pattern = "circles"
     columns: int = 11
-    """Circles, or inner corners, per row."""
+    """Circles, inner corners or AprilTags per row."""
     rows: int = 9
     spacing_m: float = 0.035
-    """Pitch of circles, or side of a square. For asymmetric circles: half the distance of two in a row."""
+    """Pitch of circles, side of a square, or side of an AprilTag. For asymmetric circles: half the distance
+    of two in a row."""
+    dictionary: str = ""
+    """Dictionary of a ChArUco board's markers, such as 4X4_50; empty if any may be on the board."""
+    tag_spacing: float = TAG_SPACING
+    """Gap between two AprilTags over the side of a tag, which Kalibr calls tagSpacing."""
 
     def __post_init__(self) -> None:
         if self.pattern not in get_args(Pattern):
@@ -44,6 +51,47 @@ class Board:
                 raise InputError(f"A board with {count} {name} cannot be used; try 2 to {MOST_POINTS}")
         if not 0.0 < self.spacing_m < 10.0:
             raise InputError(f"A spacing of {self.spacing_m:g} m cannot be used; try 0.035")
+        if not 0.0 < self.tag_spacing <= 1.0:
+            raise InputError(
+                f"A tag spacing of {self.tag_spacing:g} cannot be used; try 0.3, the gap over the tag's side"
+            )
+        if self.dictionary:
+            object.__setattr__(self, "dictionary", known_dictionary(self.dictionary))
+            if self.pattern != "charuco":
+                raise InputError(
+                    f"A board of pattern {self.pattern} has no dictionary to choose; leave it out, or "
+                    "try the pattern charuco"
+                )
+        self._check_markers()
+
+    def _check_markers(self) -> None:
+        if self.pattern not in ("charuco", "aprilgrid"):
+            return
+        name = self.marker_dictionary
+        if self.markers > markers_in(name):
+            raise InputError(
+                f"A {self.pattern} board of {self.columns} x {self.rows} has {self.markers} markers, and the "
+                f"dictionary {name} has {markers_in(name)}; try fewer columns or rows"
+                + ("" if self.pattern == "aprilgrid" else f", or {FAMILIES[0]}")
+            )
+
+    @property
+    def marker_dictionary(self) -> str:
+        """Dictionary of the markers that are printed."""
+        return APRILGRID if self.pattern == "aprilgrid" else self.dictionary or FAMILIES[0]
+
+    @property
+    def markers(self) -> int:
+        """Number of markers on a ChArUco board or an AprilGrid."""
+        if self.pattern == "aprilgrid":
+            return self.columns * self.rows
+        return (self.columns + 1) * (self.rows + 1) // 2
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """Columns and rows of points: an AprilTag has two by two."""
+        times = 2 if self.pattern == "aprilgrid" else 1
+        return times * self.columns, times * self.rows
 
     @property
     def size(self) -> tuple[int, int]:
@@ -52,11 +100,14 @@ class Board:
 
     @property
     def points_m(self) -> FloatArray:
-        """(rows * columns, 3) points row by row from the upper left; the board's centre is the origin."""
-        row, column = np.divmod(np.arange(self.rows * self.columns), self.columns)
+        """(N, 3) points of ``grid`` row by row from the upper left; the board's centre is the origin."""
+        columns, rows = self.grid
+        row, column = np.divmod(np.arange(rows * columns), columns)
         x, y = column.astype(float), row.astype(float)
         if self.pattern == "circles-asymmetric":
             x = 2.0 * x + row % 2
+        if self.pattern == "aprilgrid":
+            x, y = (one // 2 * (1.0 + self.tag_spacing) + one % 2 for one in (column, row))
         flat = np.column_stack([x, y, np.zeros(len(x))]) * self.spacing_m
         return flat - 0.5 * (flat.min(axis=0) + flat.max(axis=0))
 
@@ -75,6 +126,8 @@ class Board:
         """Whether the points look the same upside down, so that only a mark shows the orientation."""
         if self.pattern == "circles":
             return True
+        if self.pattern == "circles-asymmetric":
+            return self.rows % 2 == 0
         return self.pattern == "chessboard" and (self.columns - self.rows) % 2 == 0
 
     @property
@@ -85,11 +138,21 @@ class Board:
             "circles-asymmetric": f"{self.columns} x {self.rows} circles in shifted rows, half pitch",
             "chessboard": f"chessboard of {self.columns} x {self.rows} inner corners, squares of",
             "charuco": f"ChArUco board of {self.columns} x {self.rows} inner corners, squares of",
+            "aprilgrid": f"AprilGrid of {self.columns} x {self.rows} tags, tag spacing "
+            f"{self.tag_spacing:g}, tags of",
         }
         return f"{kinds[self.pattern]} {1000.0 * self.spacing_m:g} mm"
 
-    def charuco(self) -> Any:
-        """Return OpenCV's board with the same squares and markers."""
+    def charuco(self, name: str = "", legacy: bool = False) -> Any:
+        """Return OpenCV's board with the same squares and markers.
+
+        Args:
+            name: dictionary; empty takes the board's own.
+            legacy: whether a board with an even number of rows of squares begins with a white square, as
+                OpenCV before 4.6 drew it.
+        """
         squares = (self.columns + 1, self.rows + 1)
-        dictionary = cv2.aruco.getPredefinedDictionary(MARKERS)
-        return cv2.aruco.CharucoBoard(squares, self.spacing_m, MARKER_SHARE * self.spacing_m, dictionary)
+        markers = dictionary(name or self.marker_dictionary)
+        made = cv2.aruco.CharucoBoard(squares, self.spacing_m, MARKER_SHARE * self.spacing_m, markers)
+        made.setLegacyPattern(legacy)
+        return made

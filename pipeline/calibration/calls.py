@@ -14,7 +14,11 @@ from pipeline.types import AnyPath
 
 
 def calibrate(
-    images: Sequence[AnyPath], board: Board | None = None, lens: Lens = "thesis", held_out: int = 2
+    images: Sequence[AnyPath],
+    board: Board | None = None,
+    lens: Lens = "thesis",
+    held_out: int = 2,
+    one_camera: bool = False,
 ) -> CameraReport:
     """Estimate one camera from images of a board.
 
@@ -23,9 +27,11 @@ def calibrate(
         board: the board in them; None uses a board.json next to them, or else the thesis's.
         lens: distortion model of the camera.
         held_out: number of folds of images that are left out and predicted; 0 leaves out none.
+        one_camera: whether one camera took all images even if their names or EXIF data tell several.
 
     Raises:
-        InputError: images are unreadable or differ in size, or too few show the board.
+        InputError: images are unreadable, differ in size or are of several cameras, or too few show the
+            board.
         ReconstructionError: the images do not determine the lens.
 
     >>> import packetmesh as pm
@@ -33,7 +39,7 @@ def calibrate(
     >>> round(report.intrinsics.fx_px), report.calibration.rms_px < 0.1
     (542, True)
     """
-    files = image_files([str(word) for word in images])
+    files = image_files([str(word) for word in images], one_camera)
     asked = board_beside(images) if board is None else board
     return drain(iterate_calibration(files, asked, lens, held_out))
 

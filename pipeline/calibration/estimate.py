@@ -23,8 +23,10 @@ LEAST_VIEWS = 3
 LEAST_POINTS = 4
 """Least number of points in a view to find its pose."""
 SETTLE_STEPS = 30
-MOST_RMS_SHARE = 0.1
-"""RMS as a share of the image's longer side above which the estimate is meaningless."""
+MOST_RMS_PX = 5.0
+"""RMS above which no camera is returned."""
+MOST_ASPECT = 1.4
+"""Largest ratio of the focal lengths along columns and rows: pixels of real sensors are nearly square."""
 LEAST_INFORMATION = 1e-14
 """Least eigenvalue of the information matrix scaled to unit diagonal; smaller ones are rounding errors."""
 LEAST_TILT_DEG = 5.0
@@ -132,8 +134,15 @@ def calibrate(views: Sequence[View], size_px: tuple[int, int], lens: Lens = "the
 
     Raises:
         InputError: there are too few views, or the lens model is unknown.
-        ReconstructionError: the views do not determine the lens.
+        ReconstructionError: the views do not determine the lens, or the camera that fits best cannot exist.
     """
+    found = best_fit(views, size_px, lens)
+    check_possible(found)
+    return found
+
+
+def best_fit(views: Sequence[View], size_px: tuple[int, int], lens: Lens = "thesis") -> Calibration:
+    """Estimate a camera as ``calibrate`` does, without the check that such a camera can exist."""
     if lens not in get_args(Lens):
         raise InputError(f"There is no lens '{lens}'; try one of {', '.join(get_args(Lens))}")
     if len(views) < LEAST_VIEWS:
@@ -143,16 +152,43 @@ def calibrate(views: Sequence[View], size_px: tuple[int, int], lens: Lens = "the
         )
     try:
         optics, poses = _fisheye(views, size_px) if lens == "fisheye" else _brown(views, size_px, lens)
-    except cv2.error:
+    except (cv2.error, np.linalg.LinAlgError):
         raise ReconstructionError(_UNEXPLAINED) from None
-    if not (np.isfinite(optics.matrix).all() and np.isfinite(optics.distortion).all()):
+    if not all(np.isfinite(one).all() for one in (optics.matrix, optics.distortion, *poses)):
         raise ReconstructionError(_DEGENERATE)
     if _tilt_deg(poses) < LEAST_TILT_DEG:
         raise ReconstructionError(_DEGENERATE)
-    found = calibration_of(views, poses, optics, size_px)
-    if not found.rms_px < MOST_RMS_SHARE * max(size_px):
-        raise ReconstructionError(_UNEXPLAINED)
-    return found
+    return calibration_of(views, poses, optics, size_px)
+
+
+def check_possible(found: Calibration) -> None:
+    """Check that a camera of these parameters can exist.
+
+    Raises:
+        ReconstructionError: a focal length is negative, pixels are far from square, the principal point is
+            outside the image, or the camera does not explain the views.
+    """
+    (fx, _, cx), (_, fy, cy) = found.matrix[:2].tolist()
+    width, height = found.size_px
+    wrong = ""
+    if not (fx > 0.0 and fy > 0.0):
+        wrong = f"has focal lengths of {fx:.5g} and {fy:.5g} px, which must be positive"
+    elif not 1.0 / MOST_ASPECT < fx / fy < MOST_ASPECT:
+        wrong = (
+            f"has focal lengths of {fx:.5g} px along rows and {fy:.5g} px along columns, which must be alike"
+        )
+    elif not (-0.5 <= cx <= width - 0.5 and -0.5 <= cy <= height - 0.5):
+        wrong = f"has its principal point at {cx:.5g}, {cy:.5g}, outside the image of {width} x {height} px"
+    elif not found.rms_px <= MOST_RMS_PX:
+        wrong = f"misses the points by {found.rms_px:.3g} px (RMS), more than {MOST_RMS_PX:g} px"
+    if not wrong:
+        return
+    worst = max(found.views, key=lambda view: view.rms_px)
+    raise ReconstructionError(
+        f"The camera that fits best {wrong}, so it cannot be right; show the board in more of the image, "
+        "tilted by 20 to 40° to different sides, try another --lens, or leave out the worst image "
+        f"(--without {worst.name}, {worst.rms_px:.2g} px)"
+    )
 
 
 def calibration_of(
@@ -266,7 +302,10 @@ def settle(
     off_px = (points_px - told.points_px).ravel()
     for _ in range(SETTLE_STEPS):
         normal = told.by_pose.T @ told.by_pose
-        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), told.by_pose.T @ off_px)
+        try:
+            step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), told.by_pose.T @ off_px)
+        except np.linalg.LinAlgError:  # the image does not depend on some motion: the board is far off
+            break
         nearer = optics.linearised(points_m, pose_of(pose[:3] + step[:3], pose[3:] + step[3:]))
         nearer_px = (points_px - nearer.points_px).ravel()
         if nearer_px @ nearer_px <= off_px @ off_px:
@@ -298,7 +337,7 @@ def held_out(
     told: dict[int, FittedView] = {}
     for fold in range(folds):
         rest = [view for index, view in enumerate(views) if index % folds != fold]
-        lens_of_rest = calibrate(rest, size_px, lens)
+        lens_of_rest = best_fit(rest, size_px, lens)
         for index in range(fold, len(views), folds):
             told[index] = place(views[index], lens_of_rest.matrix, lens_of_rest.distortion, lens_of_rest.lens)
     return tuple(told[index] for index in range(len(views)))

@@ -14,7 +14,8 @@ from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.calibration.board import Board
 from pipeline.calibration.depth_bias import DepthFit
-from pipeline.calibration.detect import Detection, detect
+from pipeline.calibration.detect import detect
+from pipeline.calibration.detection import Detection
 from pipeline.calibration.estimate import (
     LEAST_VIEWS,
     Calibration,
@@ -22,10 +23,12 @@ from pipeline.calibration.estimate import (
     Lens,
     View,
     calibrate,
+    check_possible,
     held_out,
     rms_px,
 )
 from pipeline.calibration.refine import refined_px
+from pipeline.calibration.series import check_one_camera
 from pipeline.calibration.shots import photographs
 from pipeline.calibration.warp import BoardWarp, board_warp
 from pipeline.io.images import read_color
@@ -70,17 +73,11 @@ class CameraReport:
 
     @property
     def intrinsics(self) -> CameraIntrinsics:
-        """Return the camera for the reconstruction.
-
-        Raises:
-            InputError: the lens is rational or fisheye, which the reconstruction does not support.
-        """
+        """Return the camera for the reconstruction."""
         found = self.calibration
-        if found.lens in ("rational", "fisheye"):
-            raise InputError(
-                f"The chain knows no {found.lens} lens; calibrate with the lens 'thesis' or 'brown' for it"
-            )
-        return CameraIntrinsics(found.matrix, found.distortion[:5].copy(), *found.size_px)
+        fisheye = found.lens == "fisheye"
+        kept = 4 if fisheye else 8 if found.lens == "rational" else 5
+        return CameraIntrinsics(found.matrix, found.distortion[:kept].copy(), *found.size_px, fisheye)
 
     def metrics(self) -> dict[str, Any]:
         """Return the values that ``--json`` prints."""
@@ -125,11 +122,15 @@ class CameraReport:
         }
 
 
-def image_files(given: Sequence[str]) -> list[Path]:
+def image_files(given: Sequence[str], one_camera: bool = False) -> list[Path]:
     """Return the images named by files, folders and patterns such as ``left*.jpg``, in order.
 
+    Args:
+        given: the arguments.
+        one_camera: whether one camera took all of them even if names or EXIF data tell several.
+
     Raises:
-        InputError: an argument names no image.
+        InputError: an argument names no image, or the images are of several cameras.
     """
     files: list[Path] = []
     for word in given:
@@ -145,7 +146,10 @@ def image_files(given: Sequence[str]) -> list[Path]:
                 f"{word} names no image; try files, a folder with images, or a pattern in quotes"
             )
         files += named
-    return list(dict.fromkeys(files))
+    files = list(dict.fromkeys(files))
+    if not one_camera:
+        check_one_camera(files)
+    return files
 
 
 def iterate_calibration(
@@ -175,7 +179,7 @@ def iterate_calibration(
     Raises:
         InputError: images are unreadable or differ in size, too few show the board, or an image to leave out
             does not exist.
-        ReconstructionError: the views do not determine the lens.
+        ReconstructionError: the views do not determine the lens, or the camera that fits best cannot exist.
     """
     detections, paths, size_px = yield from _detections(files, board)
     for name in without:
@@ -203,6 +207,7 @@ def iterate_calibration(
     folds = _folds(folds, len(views))
     bent = board_warp(views, size_px, board, max(folds, 2), lens) if warp else None
     if bent is not None and bent.helps:
+        check_possible(bent.calibration)
         views = [replace(view, board_m=bent.board_m) for view in views]
         return CameraReport(
             board, detections, tuple(views), bent.calibration, bent.held_out, tuple(without), bent
@@ -224,7 +229,10 @@ def _detections(
         sizes.setdefault((image.shape[1], image.shape[0]), path.name)
         if len(sizes) > 1:
             told = " and ".join(f"{name} of {width} x {height}" for (width, height), name in sizes.items())
-            raise InputError(f"The images are not of one size: {told}; calibrate each camera by itself")
+            raise InputError(
+                f"The images are not of one size: {told}; give each camera's images a folder of its own, and "
+                "hold a camera upright or sideways in all of them"
+            )
         name = path.name if path.name not in detections else str(path)
         detections[name], paths[name] = detect(image, board), path
     return detections, paths, next(iter(sizes))

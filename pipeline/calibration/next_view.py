@@ -90,7 +90,8 @@ def next_view(calibration: Calibration, board: Board, range_m: float) -> NextVie
         )
     after_m, T = best
     points_px = optics.project(points_m, T)
-    corners = [0, board.columns - 1, len(points_px) - 1, len(points_px) - board.columns]
+    columns = board.grid[0]
+    corners = [0, columns - 1, len(points_px) - 1, len(points_px) - columns]
     before_m = _error_m(calibration.covariance, cost)
     return NextView(T, points_px, points_px[corners], before_m, after_m)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from packetmesh.errors import ReconstructionError
-from pipeline.calibration.estimate import LEAST_VIEWS, Calibration, View, calibrate
+from pipeline.calibration.estimate import LEAST_VIEWS, Calibration, View, best_fit
 
 MOST_SDS = 3.5
 """A view stands out if log RMS is this many robust standard deviations above the median."""
@@ -60,7 +60,7 @@ def outlier_views(calibration: Calibration, views: Sequence[View]) -> tuple[Outl
             break
         left = [view for row, view in enumerate(left) if row != worst]
         try:
-            without = calibrate(left, calibration.size_px, calibration.lens)
+            without = best_fit(left, calibration.size_px, calibration.lens)
         except ReconstructionError:
             break
         moved = [

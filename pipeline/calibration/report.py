@@ -12,7 +12,6 @@ from pipeline.calibration.assess import Trust
 from pipeline.calibration.from_images import CameraReport
 from pipeline.io.camera_files import WRITERS, write_camera
 from pipeline.io.depth_correction import DEPTH_CORRECTION, write_depth_correction
-from pipeline.io.fisheye_files import FISHEYE_WRITERS, write_fisheye
 from pipeline.io.intrinsics import write_intrinsics
 
 
@@ -40,15 +39,7 @@ def write_camera_folder(report: CameraReport, folder: Path, trust: Trust | None 
 def _write_cameras(report: CameraReport, folder: Path) -> list[str]:
     if report.depth is not None:
         write_depth_correction(folder / DEPTH_CORRECTION, report.depth.correction)
-    found = report.calibration
-    if found.lens == "fisheye":
-        for name in FISHEYE_WRITERS:
-            write_fisheye(folder / name, found.matrix, found.distortion, found.size_px, name)
-    try:
-        camera = report.intrinsics
-    except InputError as error:
-        held = "" if found.lens != "fisheye" else f"; it is in {', '.join(FISHEYE_WRITERS)}"
-        return [f"intrinsics.json is not written: {error}{held}"]
+    camera = report.intrinsics
     write_intrinsics(folder / "intrinsics.json", camera)
     missing = []
     for name in WRITERS:

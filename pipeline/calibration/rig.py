@@ -186,7 +186,13 @@ def calibrate_rig(
         for moment, one in seen[name].items()
     ]
     begun, sightings = start(looks, optics, names, _turns(board))
-    adjusted = adjust(sightings, begun)
+    try:
+        adjusted = adjust(sightings, begun)
+    except np.linalg.LinAlgError:
+        raise ReconstructionError(
+            "The images do not determine the cameras together; show the board to two cameras at once more "
+            "often, tilted differently"
+        ) from None
     _check_fit(rms_px(np.concatenate(adjusted.residuals_px)), max(one.rms_px for one in cameras.values()))
     titles = [seen[names[one.camera]][moments[one.moment]].view.name for one in sightings]
     views = _views(names, titles, sightings, adjusted.bundle)
@@ -231,7 +237,8 @@ def _turns(board: Board) -> list[FloatArray]:
     """Return (4, 4) rotations in its plane that map the points of a board onto each other."""
     quarters = [0]
     if board.ambiguous:
-        quarters = [0, 1, 2, 3] if board.columns == board.rows else [0, 2]
+        square = board.columns == board.rows and board.pattern != "circles-asymmetric"
+        quarters = [0, 1, 2, 3] if square else [0, 2]
     return [rigid(rotation_exp(np.array([0.0, 0.0, 0.5 * np.pi * k])), np.zeros(3)) for k in quarters]
 
 

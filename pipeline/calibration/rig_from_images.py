@@ -7,17 +7,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from packetmesh.errors import InputError, PacketMeshError
+from packetmesh.errors import InputError, PacketMeshError, ReconstructionError
 from packetmesh.progress import Progress, part
 from pipeline.calibration.board import Board
 from pipeline.calibration.depth_from_images import with_depth
+from pipeline.calibration.estimate import check_possible
 from pipeline.calibration.from_images import CameraReport, iterate_calibration
 from pipeline.calibration.rig import RelativePose, RigCalibration, Seen, calibrate_rig
 from pipeline.calibration.shots import INFRARED, NodeShots, camera_images
 from pipeline.config import Lens
 from pipeline.io.calibrations import CalibratedNode
 from pipeline.kernels.geometry import LEVEL_POSE
-from pipeline.types import CameraIntrinsics, FloatArray
+from pipeline.types import FloatArray
 
 ALONE, DEPTH = 0.7, 0.85
 """Progress at the end of the cameras' own calibrations, and at the start of that of depth."""
@@ -44,12 +45,12 @@ class RigReport:
         for name, report in self.cameras.items():
             if name.endswith(INFRARED):
                 continue
-            node = CalibratedNode(_intrinsics(report), T_world_first @ poses[name])
+            node = CalibratedNode(report.intrinsics, T_world_first @ poses[name])
             beside = name + INFRARED
             if beside in self.cameras:
                 node = replace(
                     node,
-                    depth_intrinsics=_intrinsics(self.cameras[beside]),
+                    depth_intrinsics=self.cameras[beside].intrinsics,
                     T_color_depth=self.rig.relative(beside, name).T_reference_camera,
                 )
             made[name] = node
@@ -147,11 +148,16 @@ def cameras_together(
 
     Raises:
         InputError: there are fewer than two cameras, or some never see the board together.
-        ReconstructionError: the views do not determine the poses.
+        ReconstructionError: the views do not determine the poses, or a camera that fits best cannot exist.
     """
     images = camera_images(nodes)
     seen = {name: _seen(report, images[name]) for name, report in reports.items()}
     rig = calibrate_rig({name: one.calibration for name, one in reports.items()}, seen, board, folds)
+    for name, found in rig.cameras.items():
+        try:
+            check_possible(found)
+        except ReconstructionError as error:
+            raise ReconstructionError(f"{name}: {error}") from None
     together = {
         name: replace(
             one,
@@ -186,11 +192,3 @@ def _seen(report: CameraReport, files: Mapping[Path, str]) -> dict[str, Seen]:
     """Return the sightings of a camera by moment."""
     moments = {path.name: moment for path, moment in files.items()}
     return {moments[view.name]: Seen(view, report.detections[view.name].oriented) for view in report.views}
-
-
-def _intrinsics(report: CameraReport) -> CameraIntrinsics | None:
-    """Return the intrinsics; None for a lens that the reconstruction does not support."""
-    try:
-        return report.intrinsics
-    except InputError:
-        return None

@@ -7,14 +7,15 @@ photographs per camera. The moment is the last number in an image's name, or els
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
 from packetmesh.errors import InputError
 from packetmesh.files import read_json
-from pipeline.calibration.board import Board
+from pipeline.calibration.board import TAG_SPACING, Board
+from pipeline.calibration.series import camera_series
 from pipeline.config import Pattern
 from pipeline.types import AnyPath
 
@@ -81,6 +82,32 @@ def node_shots(folders: Sequence[AnyPath]) -> tuple[NodeShots, ...]:
     )
 
 
+def series_shots(files: Sequence[Path]) -> tuple[NodeShots, ...]:
+    """Return the images of several cameras in one folder, told apart by their names: node_00 and so on, in
+    the order of the cameras' names.
+
+    Raises:
+        InputError: the names tell no cameras apart, or two images are of one moment.
+    """
+    series = camera_series(files)
+    if not series:
+        raise InputError(
+            f"The names of the images ({files[0].name} and so on) do not tell cameras apart; name them as "
+            "left-0000.png and right-0000.png or cam0_00.png and cam1_00.png, or give a folder for each "
+            "camera"
+        )
+    if len(series) > MOST_CAMERAS:
+        raise InputError(f"The images are of {len(series)} cameras, and a rig has at most {MOST_CAMERAS}")
+    return tuple(
+        NodeShots(
+            f"node_{index:02d}",
+            next(iter(paths)).parent,
+            tuple(Shot(moment, path) for moment, path in _by_moment(paths).items()),
+        )
+        for index, paths in enumerate(series.values())
+    )
+
+
 def camera_images(nodes: Iterable[NodeShots]) -> dict[str, dict[Path, str]]:
     """Return the moments of images by camera: node_00 and, for a separate depth camera, node_00/infrared."""
     found: dict[str, dict[Path, str]] = {}
@@ -103,9 +130,11 @@ def board_beside(
     columns: int | None = None,
     rows: int | None = None,
     spacing_mm: float | None = None,
+    dictionary: str | None = None,
+    tag_spacing: float | None = None,
 ) -> Board:
     """Return the board in images: the given values, else those of a board.json in or above their folder, else
-    the thesis's.
+    the thesis's. A dictionary in the file counts for its own pattern only.
 
     Raises:
         InputError: the file lacks pattern, columns, rows or spacing_mm, or the board is impossible.
@@ -115,11 +144,15 @@ def board_beside(
         if path.is_file():
             known = read_board(path)
             break
+    if dictionary is None:
+        dictionary = known.dictionary if pattern in (None, known.pattern) else ""
     return Board(
         pattern or known.pattern,
         known.columns if columns is None else columns,
         known.rows if rows is None else rows,
         known.spacing_m if spacing_mm is None else spacing_mm / 1000.0,
+        dictionary,
+        known.tag_spacing if tag_spacing is None else tag_spacing,
     )
 
 
@@ -133,12 +166,14 @@ def read_board(path: AnyPath) -> Board:
     try:
         pattern, columns, rows = str(values["pattern"]), int(values["columns"]), int(values["rows"])
         spacing_m = float(values["spacing_mm"]) / 1000.0
+        dictionary = str(values.get("dictionary", ""))
+        tag_spacing = float(values.get("tag_spacing", TAG_SPACING))
     except (ValueError, KeyError, TypeError, OverflowError):
         raise InputError(
             f"The board file {path} does not say what the board is; try pattern, columns, rows and spacing_mm"
         ) from None
     try:
-        return Board(cast(Pattern, pattern), columns, rows, spacing_m)
+        return Board(cast(Pattern, pattern), columns, rows, spacing_m, dictionary, tag_spacing)
     except InputError as error:
         raise InputError(f"The board file {path} is of no board: {error}") from None
 
@@ -153,11 +188,11 @@ def _images(folder: Path) -> list[Path]:
 
 
 def _shots(folder: Path) -> tuple[Shot, ...]:
-    color = _by_moment(photographs(folder))
+    color = _by_moment({path: path.stem for path in photographs(folder)})
     if not color:
         raise InputError(f"{folder} holds no image of a camera; try color_00.png, color_01.png and so on")
     depth, infrared = (
-        _by_moment(path for path in _images(folder) if path.stem.startswith(f"{kind}_"))
+        _by_moment({path: path.stem for path in _images(folder) if path.stem.startswith(f"{kind}_")})
         for kind in ("depth", "infrared")
     )
     return tuple(
@@ -165,14 +200,15 @@ def _shots(folder: Path) -> tuple[Shot, ...]:
     )
 
 
-def _by_moment(images: Iterable[Path]) -> dict[str, Path]:
+def _by_moment(images: Mapping[Path, str]) -> dict[str, Path]:
+    """Return images by moment, from the part of each name that holds it."""
     found: dict[str, Path] = {}
-    for path in images:
-        moment = _moment(path.stem)
+    for path, stem in images.items():
+        moment = _moment(stem)
         if moment in found:
             raise InputError(
-                f"{found[moment]} and {path.name} are both of moment {moment}; keep to the images of one "
-                "camera, numbered by moments"
+                f"{found[moment]} and {path.name} are both of moment {moment}; give each camera's images a "
+                "folder of its own, numbered by moments"
             )
         found[moment] = path
     return found

@@ -12,7 +12,9 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path
-from pipeline.calibration.board import MARKER_SHARE, MARKERS, RING, Board
+from pipeline.calibration.aprilgrid import BORDERS, tag_points
+from pipeline.calibration.board import MARKER_SHARE, RING, Board
+from pipeline.calibration.dictionaries import dictionary
 from pipeline.types import ByteArray, FloatArray
 
 MARGIN_MM = 15.0
@@ -72,6 +74,8 @@ def sheet(board: Board) -> Sheet:
     shapes: list[Disc | Box | Text]
     if board.pattern in ("chessboard", "charuco"):
         shapes = [*_squares(board, places_mm[0] - spacing_mm)]
+    elif board.pattern == "aprilgrid":
+        shapes = [*_tags(board, places_mm)]
     else:
         shapes = [Disc(float(x), float(y), radius_mm) for x, y in places_mm]
         if board.ambiguous:
@@ -91,6 +95,8 @@ def place_of_first_mm(board: Board) -> FloatArray:
 
 def _around_mm(board: Board) -> float:
     """Return the distance from the outermost points to the board's edge; circles have white paper around."""
+    if board.pattern == "aprilgrid":
+        return 1000.0 * board.tag_spacing * board.spacing_m
     squares = board.pattern in ("chessboard", "charuco")
     return 1000.0 * (board.spacing_m if squares else 2.0 * board.radius_m)
 
@@ -108,18 +114,42 @@ def _squares(board: Board, corner_mm: np.ndarray) -> Iterator[Box]:
 
 
 def _markers(board: Board, corner_mm: np.ndarray) -> Iterator[Box]:
-    """Yield the black cells of every marker, joined to as few boxes per row as possible."""
-    made, dictionary = board.charuco(), cv2.aruco.getPredefinedDictionary(MARKERS)
-    cells = dictionary.markerSize + 2
+    """Yield the black cells of every marker."""
+    made, markers = board.charuco(), dictionary(board.marker_dictionary)
+    cells = markers.markerSize + 2
     cell_mm = 1000.0 * MARKER_SHARE * board.spacing_m / cells
     for number, corners in zip(made.getIds().ravel().tolist(), made.getObjPoints(), strict=True):
-        x_mm, y_mm = corner_mm + 1000.0 * np.asarray(corners)[:, :2].min(axis=0)
-        picture = cv2.aruco.generateImageMarker(dictionary, number, cells, borderBits=1)
-        for row, line in enumerate(picture == 0):
-            edges = np.flatnonzero(np.diff(np.concatenate(([0], line.astype(int), [0]))))
-            for begin, end in edges.reshape(-1, 2).tolist():
-                width_mm = (end - begin) * cell_mm
-                yield Box(float(x_mm) + begin * cell_mm, float(y_mm) + row * cell_mm, width_mm, cell_mm)
+        upper_left_mm = corner_mm + 1000.0 * np.asarray(corners)[:, :2].min(axis=0)
+        yield from _cells(
+            cv2.aruco.generateImageMarker(markers, number, cells, borderBits=1), upper_left_mm, cell_mm
+        )
+
+
+def _tags(board: Board, places_mm: FloatArray) -> Iterator[Box]:
+    """Yield the black cells of every tag as Kalibr prints them, half a turn from OpenCV's orientation, and a
+    black square at each of their corners.
+    """
+    tags = dictionary(board.marker_dictionary)
+    cells = tags.markerSize + 2 * BORDERS[0]
+    side_mm = 1000.0 * board.spacing_m
+    gap_mm = board.tag_spacing * side_mm
+    for number, points in enumerate(tag_points(board).tolist()):
+        picture = cv2.aruco.generateImageMarker(tags, number, cells, borderBits=BORDERS[0])
+        yield from _cells(np.rot90(picture, 2), places_mm[points[0]], side_mm / cells)
+    for row in range(board.rows + 1):
+        for column in range(board.columns + 1):
+            x_mm, y_mm = places_mm[0] - gap_mm + (side_mm + gap_mm) * np.array([column, row])
+            yield Box(float(x_mm), float(y_mm), gap_mm, gap_mm)
+
+
+def _cells(picture: ByteArray, upper_left_mm: FloatArray, cell_mm: float) -> Iterator[Box]:
+    """Yield the black cells of a marker, joined to as few boxes per row as possible."""
+    x_mm, y_mm = upper_left_mm
+    for row, line in enumerate(picture == 0):
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], line.astype(int), [0]))))
+        for begin, end in edges.reshape(-1, 2).tolist():
+            width_mm = (end - begin) * cell_mm
+            yield Box(float(x_mm) + begin * cell_mm, float(y_mm) + row * cell_mm, width_mm, cell_mm)
 
 
 def _foot(board: Board, top_mm: float) -> Iterator[Box | Text]:

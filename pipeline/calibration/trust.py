@@ -19,7 +19,7 @@ from pipeline.calibration.estimate import (
     LEAST_VIEWS,
     Calibration,
     View,
-    calibrate,
+    best_fit,
     settle,
 )
 from pipeline.calibration.lens import FREE, Optics
@@ -190,7 +190,7 @@ def half_difference_px(
         raise InputError(
             f"{len(views)} views cannot be halved, for each half takes {LEAST_VIEWS}; take more images"
         )
-    whole, *halves = (calibrate(some, size_px, lens) for some in (views, views[0::2], views[1::2]))
+    whole, *halves = (best_fit(some, size_px, lens) for some in (views, views[0::2], views[1::2]))
     seen = sight(whole.optics, size_px, range_m)
     boards = [(view.board_m, view.T_camera_board) for view in whole.views]
     known = np.isfinite(seen.points_m[:, 2])

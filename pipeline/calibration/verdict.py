@@ -8,50 +8,77 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from pipeline.calibration.estimate import Calibration
+from pipeline.calibration.likely_error import LikelyError
 from pipeline.calibration.next_view import NextView
-from pipeline.calibration.trust import CIRCLE95, ErrorMap, HalfDifference
 from pipeline.config import Lens
 from pipeline.types import FloatArray
 
 LEAST_SHARE = 0.95
 """Share of the image in which points must be accurate enough."""
-RICHER: dict[Lens, Lens] = {"thesis": "brown", "brown": "rational"}
-"""Lens models with more parameters."""
+LEVEL = 0.95
+"""Probability with which stated errors are not exceeded."""
+PASS, FAIL = 0.75, 0.25
+"""A camera passes from the first probability on that it is accurate enough, and fails up to the second;
+between them its views do not decide (chosen by the sessions of seed 100 of ``python -m lab.verdicts``)."""
+CERTAIN = 0.95
+"""Probability from which on a wrong lens model or a bent board is named."""
+OTHER_LENS: dict[Lens, Lens] = {
+    "thesis": "brown",
+    "brown": "rational",
+    "rational": "fisheye",
+    "fisheye": "rational",
+}
+"""Lens model to try if one is wrong: with more parameters, or of another kind."""
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """Whether a camera is accurate enough."""
 
-    passed: bool
+    probability: float
+    """Probability that points are within ``accuracy_m`` over ``LEAST_SHARE`` of the image."""
     range_m: float
     accuracy_m: float
     error_m: FloatArray
-    """(R, C) error in the map's cells that is not exceeded in 95 of 100 cases; NaN without a ray."""
+    """(R, C) error in the map's cells that is not exceeded with the probability ``LEVEL``; NaN without a
+    ray.
+    """
     share: float
-    """Share of the image in which this error is at most ``accuracy_m``."""
+    """Share of the image in which points are within ``accuracy_m``, with the probability ``LEVEL``."""
     error_of_most_m: float
-    """Error that is not exceeded over ``LEAST_SHARE`` of the image; infinite if too much has no rays."""
+    """Error that is not exceeded over ``LEAST_SHARE`` of the image, with the probability ``LEVEL``; infinite
+    if too much has no rays."""
+    wrong_lens: float
+    """Probability that the lens model cannot hold the lens."""
+    bent: float
+    """Probability that the board is bent."""
     sentence: str
     """Summary and advice."""
 
+    @property
+    def passed(self) -> bool:
+        """Whether the camera is accurate enough."""
+        return self.probability >= PASS
+
+    @property
+    def failed(self) -> bool:
+        """Whether it is not; False also if the views do not decide."""
+        return self.probability <= FAIL
+
+    @property
+    def word(self) -> str:
+        """The verdict in a word or two."""
+        return _word(self.probability)
+
 
 def verdict(
-    calibration: Calibration,
-    sd: ErrorMap,
-    halves: HalfDifference | None,
-    accuracy_m: float,
-    following: NextView | None = None,
+    calibration: Calibration, likely: LikelyError, accuracy_m: float, following: NextView | None = None
 ) -> Verdict:
-    """Judge a camera at the distance of its maps.
-
-    The error of a cell is that of noise; if the two halves of the views differ by more than noise, it is at
-    least their difference.
+    """Judge a camera at the distance of its likely error.
 
     Args:
         calibration: the camera.
-        sd: result of ``projected_sd_px``.
-        halves: result of ``half_difference_px``; None with too few views.
+        likely: result of ``likely_error``.
         accuracy_m: largest error of a point that is accepted.
         following: the best view to take next, for the advice.
 
@@ -60,31 +87,50 @@ def verdict(
     """
     if not accuracy_m > 0.0:
         raise InputError(f"An accuracy of {1000.0 * accuracy_m:g} mm cannot be met; try 5")
-    error_m = CIRCLE95 * sd.error_m
-    differ = halves is not None and halves.beyond_noise
-    if halves is not None and differ:
-        error_m = np.maximum(error_m, halves.map.error_m)
-    placed = np.where(np.isfinite(error_m), error_m, np.inf)
-    share = float((placed <= accuracy_m).mean())
-    of_most_m = float(np.quantile(placed, LEAST_SHARE, method="higher"))
-    passed = share >= LEAST_SHARE
+    probability = likely.within(accuracy_m, LEAST_SHARE)
+    of_most_m = likely.of_share_m(LEAST_SHARE, LEVEL)
     told = (
-        f"At {sd.range_m:g} m a point is placed within {_mm(accuracy_m)} (95 %) over {100.0 * share:.0f} % "
-        f"of the image, {_over_most(placed, of_most_m)}: {'pass' if passed else 'fail'}."
+        f"At {likely.range_m:g} m a point is placed within {_mm(accuracy_m)} over "
+        f"{100.0 * LEAST_SHARE:.0f} % of "
+        f"the image with a probability of {percent(probability)}, {_over_most(likely, of_most_m)}: "
+        f"{_word(probability)}."
     )
-    advice = [] if passed else _advice(calibration, halves, following)
-    return Verdict(passed, sd.range_m, accuracy_m, error_m, share, of_most_m, " ".join([told, *advice]))
+    advice = [] if probability >= PASS else _advice(calibration, likely, following)
+    return Verdict(
+        *(probability, likely.range_m, accuracy_m, likely.map_m(LEVEL)),
+        *(likely.share_within(accuracy_m, LEVEL), of_most_m, likely.wrong_lens, likely.bent),
+        " ".join([told, *advice]),
+    )
 
 
-def _advice(calibration: Calibration, halves: HalfDifference | None, following: NextView | None) -> list[str]:
-    if halves is not None and halves.beyond_noise:
-        richer = RICHER.get(calibration.lens)
-        lens = f"--lens {richer}, " if richer else ""
-        return [
-            f"Two halves of the views differ by {halves.ratio:.1f} times what noise explains (by chance up "
-            f"to {halves.most_by_noise:.1f}): try {lens}--board-warp (one camera at a time), or leave out "
-            "views that stand out."
-        ]
+def percent(probability: float) -> str:
+    """Return a probability from random draws in whole per cent, never as certain."""
+    if probability < 0.01:
+        return "below 1 %"
+    return "above 99 %" if probability > 0.99 else f"{100.0 * probability:.0f} %"
+
+
+def _word(probability: float) -> str:
+    return "pass" if probability >= PASS else "fail" if probability <= FAIL else "not decided"
+
+
+def _advice(calibration: Calibration, likely: LikelyError, following: NextView | None) -> list[str]:
+    """Return sentences on what to change: the lens model, the board, or the views."""
+    said = []
+    if likely.wrong_lens >= CERTAIN:
+        other = OTHER_LENS[calibration.lens]
+        said.append(
+            f"The residuals show a lens that the model '{calibration.lens}' cannot hold: try --lens {other}."
+        )
+    if likely.bent >= CERTAIN:
+        remedy = (
+            "glue it onto a flat plate"
+            if calibration.lens == "fisheye"
+            else ("glue it onto a flat plate, or try --board-warp (one camera at a time)")
+        )
+        said.append(f"The residuals show a bent board: {remedy}.")
+    if said:
+        return said
     if following is None:
         return ["Take more views, near the edges of the image."]
     x, y = following.points_px.mean(axis=0) / calibration.size_px
@@ -96,10 +142,11 @@ def _advice(calibration: Calibration, halves: HalfDifference | None, following: 
     ]
 
 
-def _over_most(placed_m: FloatArray, of_most_m: float) -> str:
+def _over_most(likely: LikelyError, of_most_m: float) -> str:
     if np.isfinite(of_most_m):
-        return f"and within {_mm(of_most_m)} over {100.0 * LEAST_SHARE:.0f} % of it"
-    return f"and not at all in {100.0 * np.isinf(placed_m).mean():.0f} % of it, where this lens has no rays"
+        return f"and within {_mm(of_most_m)} with {100.0 * LEVEL:.0f} %"
+    missing = np.isnan(likely.map_m(LEVEL)).mean()
+    return f"and not at all in {100.0 * missing:.0f} % of it, where this lens has no rays"
 
 
 def _third(share: float, low: str, high: str) -> str:

@@ -77,7 +77,7 @@ def board_warp(
     """
     if lens == "fisheye":
         raise InputError("A board's warp cannot be found with a fisheye lens; try the lens 'rational'")
-    if any(len(view.points_px) != board.columns * board.rows for view in views):
+    if any(len(view.points_px) != len(board.points_m) for view in views):
         raise InputError("A board's warp takes views of the whole board; leave out those of a part of it")
     flat = held_out(views, size_px, folds, lens)
     calibration, board_m = _released(views, size_px, board, lens)
@@ -102,7 +102,7 @@ def _released(
     views: Sequence[View], size_px: tuple[int, int], board: Board, lens: Lens
 ) -> tuple[Calibration, FloatArray]:
     """Estimate the camera and the (N, 3) points of the board."""
-    upper_right = board.columns - 1
+    upper_right = board.grid[0] - 1
     try:
         with one_thread():
             _, matrix, distortion, turns, moves, board_m, *_ = cv2.calibrateCameraROExtended(

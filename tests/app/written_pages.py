@@ -25,7 +25,7 @@ from packetmesh.progress import drain
 from packetmesh.settings import with_settings
 from pipeline.calibration.assess import assess
 from pipeline.calibration.board import Board
-from pipeline.calibration.detect import Detection
+from pipeline.calibration.detection import Detection
 from pipeline.calibration.estimate import calibrate, held_out
 from pipeline.calibration.from_images import CameraReport
 from pipeline.calibration.outliers import OutlierView

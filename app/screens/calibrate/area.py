@@ -14,7 +14,7 @@ from app.window.ui import Ui
 
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
 QUALITY = 92
-MISSING = "not there for this view"
+MISSING = "not available for this view"
 START = (PAIRS[STRAIGHTENED].left, PAIRS[STRAIGHTENED].right, 50.0)
 """The first two pictures, and the line between them in %."""
 
@@ -28,10 +28,10 @@ class PictureArea:
         self._on_pair = on_pair
         self._drawn: tuple[object, ...] = ()
         self._pair = ui.gui.add_dropdown(
-            "Compare", list(PAIRS), hint="What stands left and right of the line."
+            "Compare", list(PAIRS), hint="Pictures to the left and right of the line."
         )
         self._split = ui.gui.add_slider(
-            "Split (%)", 0.0, 100.0, 1.0, 50.0, hint="Where the line is, in % of the picture's width."
+            "Split (%)", 0.0, 100.0, 1.0, 50.0, hint="Position of the line, in % of the picture's width."
         )
         self._image = ui.gui.add_image(EMPTY, format="jpeg", jpeg_quality=QUALITY)
         self._captions = ui.gui.add_html(Markup(""))

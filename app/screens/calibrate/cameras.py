@@ -26,7 +26,8 @@ from packetmesh.errors import PacketMeshError
 from packetmesh.progress import Progress, part
 from pipeline.calibration.board import Board
 from pipeline.calibration.depth_bias import DepthFit
-from pipeline.calibration.detect import Detection, detect
+from pipeline.calibration.detect import detect
+from pipeline.calibration.detection import Detection
 from pipeline.calibration.estimate import FittedView, View, place
 from pipeline.calibration.from_images import CameraReport, iterate_calibration
 from pipeline.calibration.rig import RigCalibration
@@ -152,7 +153,7 @@ def _camera_of(
 
 def _warp(found: BoardWarp, board: Board) -> WarpView:
     """Return the board's shape for the panel."""
-    off_plane_m = found.off_plane_m.reshape(board.rows, board.columns)
+    off_plane_m = found.off_plane_m.reshape(board.grid[::-1])
     return WarpView(off_plane_m, found.helps, found.rms_px, found.flat_rms_px)
 
 
@@ -276,14 +277,14 @@ def _bias(node: NodeShots, cameras: CamerasFound) -> DepthFound | str:
     if node.name not in cameras.reports:
         camera = cameras.view.camera(node.name)
         reason = "" if camera is None else camera.reason
-        return f"{node.name} has no lens yet, and depth is judged through it; {reason}"
+        return f"{node.name} has no lens yet, and the depth bias cannot be estimated without one; {reason}"
     report = node_with_depth(node, cameras.reports)
     if report.depth is not None:
         note = " ".join((*report.depth_notes, report.depth.note)).strip()
         return DepthFound(report.depth.correction, _view(report.depth, note))
     return report.depth_reason or (
-        f"There are no depth images beside the photographs of {node.name}; add depth_00.png beside "
-        "color_00.png and so on"
+        f"There are no depth images for the photographs of {node.name}; add depth_00.png for color_00.png "
+        "and so on"
     )
 
 

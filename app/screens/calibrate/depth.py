@@ -11,9 +11,9 @@ from app.window.tables import number, table
 from app.window.ui import Ui
 
 TEXT = Markdown(
-    """No registration repairs a sensor that measures everything too near. The board's plane says how deep
-each of its pixels truly is, so the photographs that calibrate the lens calibrate the depth as well. Under
-**Compare** is the picture of it."""
+    """Registration cannot correct a sensor that measures everything too near. The board's plane gives the
+true depth of each of its pixels, so the photographs that calibrate the lens also calibrate the depth.
+**Compare** has the picture of the error."""
 )
 
 
@@ -23,7 +23,7 @@ class DepthFolder:
     def __init__(self, ui: Ui) -> None:
         """Add the folder."""
         gui = ui.gui
-        with gui.add_folder("What the depth sensor is off by", expand_by_default=False):
+        with gui.add_folder("Bias of the depth sensor", expand_by_default=False):
             gui.add_markdown(TEXT)
             self._table = gui.add_html(Markup(""))
             self._plot = gui.add_plotly(
@@ -46,22 +46,24 @@ class DepthFolder:
 def bias_table(view: BiasView) -> Markup:
     """Return a table in HTML of the terms that held-out views justify, and their effect."""
     meaning = {
-        "Offset": "Added to every depth; with its 95 % interval.",
-        "Scale": "How much longer depth truly is than measured; with its 95 % interval.",
-        "Curvature": "Grows with the square of the depth; with its 95 % interval.",
+        "Offset": "Constant that is added to every depth; with its 95 % interval.",
+        "Scale": "Share of the depth that is added to it; with its 95 % interval.",
+        "Curvature": "Added in proportion to the square of the depth; with its 95 % interval.",
     }
     rows = [
         (name, meaning[name], f"{value:+.2f} {unit}", f"{low:+.2f} to {high:+.2f}")
         for name, value, low, high, unit in view.rows
     ]
     if "map" in view.terms:
-        rows.append(("Map", "A smooth map over the image, as a share of the depth.", "3 × 4 knots", ""))
+        rows.append(
+            ("Map", "Smooth map of corrections over the image, as a share of the depth.", "3 × 4 knots", "")
+        )
     if not view.terms:
-        rows.append(("Terms", "None makes views that had no part in the fit better.", "none", ""))
+        rows.append(("Terms", "No term improves the prediction of held-out views.", "none", ""))
     rows.append(
         (
             "Error",
-            "Root mean square of depth less the board's plane, views counted alike: measured, then "
+            "Root mean square of depth minus the board's plane, all views with equal weight: measured → "
             "corrected.",
             number(view.rms_before_m, 1, "mm", 1000.0),
             "→ " + number(view.rms_after_m, 1, "mm", 1000.0),

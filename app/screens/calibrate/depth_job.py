@@ -41,12 +41,12 @@ def depth_job(store: Store, spec: Spec, name: str, view: str) -> Generator[Progr
     most_m = max(float(np.quantile(off_most_m, 0.95)), LEAST_SCALE_M) if len(off_most_m) else LEAST_SCALE_M
     zoom = camera.photographs[0].zoom
     pictures: dict[str, Picture] = {
-        "off-before": off_picture(off_m, most_m, zoom, "Depth as measured, less the board's plane"),
+        "off-before": off_picture(off_m, most_m, zoom, "Measured depth minus the board's plane"),
     }
     if not isinstance(found, str):
         corrected_m = found.correction.apply(depth).z_m - depth.z_m
         pictures["off-after"] = off_picture(
-            off_m + corrected_m, most_m, zoom, "Corrected depth, less the plane"
+            off_m + corrected_m, most_m, zoom, "Corrected depth minus the board's plane"
         )
     return DepthErrorView(name, view, pictures)
 

@@ -8,13 +8,13 @@ from typing import Literal
 from app.web.markup import Markdown
 
 TEXT = Markdown(
-    """**What you see.** Photographs of a board of known size tell how each camera bends what it sees, and
-where the board stood: click a bar or a board. What counts is not how well the lens explains these views, but
-how sure it is of **others**. Go on with **Depth**."""
+    """**What you see.** Photographs of a board of known size give each camera's lens and the place of the
+board in each view: click a bar or a board. What counts is not the error on these views, but how well the
+lens predicts **other views**. Go on with **Depth**."""
 )
 NOTHING = Markdown(
-    """This scene comes **without photographs of a board**: its cameras are taken at their word. Open a
-scene whose cameras need calibration, or use your own photographs below."""
+    """This scene comes **without photographs of a board**: the app uses the calibration that came with it.
+Open a scene whose cameras need calibration, or use your own photographs below."""
 )
 
 PictureName = Literal[
@@ -49,32 +49,35 @@ AROUND: dict[str, Around] = {
 
 
 RMS = (
-    "Root mean square distance between where a point was seen and where the lens puts it (reprojection), "
-    "over all points that the lens was made from. A low one says that the lens explains these views, not "
-    "that it is right."
+    "Root mean square distance between each detected point and its reprojection through the lens, over "
+    "all points of the fit. A low value shows that the lens explains these views, not that it is right."
 )
 HELD_OUT = (
-    "The same for views by a lens that has not seen them: each is left out in turn, and only its pose is "
-    "fitted to it."
+    "The same error for views that the lens was not fitted to: each view is left out in turn, the lens "
+    "is fitted to the others, and only the pose is fitted to the view left out."
 )
-VIEWS = "Photographs in which the board was found and that are used, of all there are."
+VIEWS = (
+    "Number of photographs that the calibration uses, of all photographs. The board must have been "
+    "found in them."
+)
 STANDARD_ERROR = (
-    "How far a number would scatter if the same views were taken again, by the noise that is left in them: "
-    "one standard deviation. A lens of the wrong kind does not show in it."
+    "Standard deviation of the number if the same views were taken again with the same noise. It does "
+    "not reveal a wrong lens model."
 )
 INTERVAL = (
-    "1.96 standard errors to either side: it holds the truth 95 times in 100, if the lens is of this kind."
+    "1.96 standard errors to either side: it contains the true value in 95 of 100 cases, if the lens "
+    "model is right."
 )
-TRUTH = "What the photographs were rendered with."
+TRUTH = "True value, with which the photographs were rendered."
 TWO_HALVES = (
-    "The camera is estimated from every other view and from the others. If noise were all that is wrong, "
-    "both would agree as well as their standard errors say."
+    "The camera is estimated twice, from the odd and from the even views. If noise is the only error, "
+    "the two results agree within their standard errors."
 )
 CORRELATION = (
-    "How two numbers' errors go together, from −1 to 1. Near 0 the views tell one from the other; near 1 one "
-    "can be too large unseen if the other is, near −1 if the other is too small."
+    "Correlation of the errors of two parameters, from −1 to 1. Near 0 the views separate the two; near "
+    "1 both can be too large unnoticed, near −1 one too large and the other too small."
 )
 BENT = (
-    "From the deepest point of the board to the highest, found with the camera. It is used where views that "
-    "had no part in it are predicted better than by a flat board."
+    "Difference between the board's highest and deepest point, estimated with the camera. It is used "
+    "only if it predicts held-out views better than a flat board."
 )

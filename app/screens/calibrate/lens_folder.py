@@ -15,16 +15,16 @@ from app.window.ui import Ui
 from pipeline.config import Lens
 
 ABOUT_LENS = (
-    "Distortions that the camera may have: k1 and k2 (thesis), also p1, p2, k3 (brown), or k4 to k6 as well "
-    "(rational); or those of a fisheye, a lens so wide that straight lines cannot stay straight."
+    "Distortion parameters of the model: k1 and k2 (thesis), also p1, p2, k3 (brown), also k4 to k6 "
+    "(rational). fisheye is for lenses so wide that straight lines cannot stay straight."
 )
 ABOUT_BENT = (
-    "Estimates where every point of the board truly is, with the camera, and uses that if views that had no "
-    "part in it are predicted better. Off: the board is as flat as it was printed."
+    "Estimates the board's shape together with the camera, and uses it if it predicts held-out views "
+    "better. Off: the board is assumed to be flat."
 )
 NOT_BENT = Markdown(
-    """Only with the photographs of **one camera**: several are placed by a board that is taken as
-flat. Use those of one of them alone to see whether the board is bent."""
+    """Only with the photographs of **one camera**: for several cameras the board is assumed to be flat. To
+check whether it is bent, use the photographs of one camera alone."""
 )
 EMPTY = np.full((48, 64, 3), 235, np.uint8)
 

@@ -49,7 +49,7 @@ class CalibrateLook:
 def _noise(look: CalibrateLook, text: str) -> CalibrateLook:
     amount, _, lens = text.partition(" through ")
     if lens not in ("", "another lens"):
-        raise ValueError("try such as '0.1 px' or '0.1 px through another lens'")
+        raise ValueError("try for example '0.1 px' or '0.1 px through another lens'")
     return replace(look, noise_px=quantity("px", 1.0)(amount), other_lens=bool(lens))
 
 

@@ -57,9 +57,9 @@ def coverage_picture(
         _dots(rgb, view.points_px * zoom, SOURCE, 1)
     return Picture(
         rgb,
-        f"Points of all views, in {coverage.share:.0%} of the cells; grey: none, "
-        "so the lens is guessed there",
-        ColorBar(DISTANCE_STOPS, ("1", f"{most:,} points a cell")),
+        f"Points of all views, in {coverage.share:.0%} of the cells; grey: none, so the lens is "
+        "extrapolated there",
+        ColorBar(DISTANCE_STOPS, ("1", f"{most:,} points per cell")),
     )
 
 
@@ -74,8 +74,8 @@ def next_picture(following: NextView, lens: Calibration, zoom: float, size_px: t
     _dots(rgb, following.points_px[:1] * zoom, LOSS, 7)
     return Picture(
         rgb,
-        f"Hold the board so next (green, its first circle red; grey: points so far): "
-        f"{following.distance_m:.2f} m away, tilted by {following.tilt_deg:.0f}°. Predicted: "
+        "Best next view of the board (green, its first circle red; grey: points so far): "
+        f"{following.distance_m:.2f} m away, tilted by {following.tilt_deg:.0f}°. Predicted error: "
         f"{1000.0 * following.error_before_m:.2g} mm → {1000.0 * following.error_after_m:.2g} mm",
     )
 
@@ -105,9 +105,9 @@ def warp_picture(warp: WarpView) -> Picture:
     most = f"{1000.0 * most_m:.2g} mm"
     return Picture(
         rgb,
-        f"Board bent by {1000.0 * warp.bend_m:.2g} mm from its deepest point to its highest; blue stands out "
-        f"towards the camera, orange lies behind. {'Used' if warp.used else 'Not used'}: views held out have "
-        f"{warp.rms_px:.4f} px with it, {warp.flat_rms_px:.4f} px with a flat board",
+        f"Board bent by {1000.0 * warp.bend_m:.2g} mm from its deepest to its highest point; blue is "
+        f"nearer to the camera, orange farther away. {'Used' if warp.used else 'Not used'}: RMS error of "
+        f"held-out views {warp.rms_px:.4f} px with this shape, {warp.flat_rms_px:.4f} px with a flat board",
         ColorBar((NEARER, EQUAL, FARTHER), (f"−{most}", "0", f"+{most}")),
     )
 

@@ -13,13 +13,14 @@ from app.web.markup import Markdown
 from app.window.ui import Ui
 
 TEXT = Markdown(
-    """What if every circle were seen a little beside its place? The calibration above is taken as the
-**truth**, its views are seen again with this noise on every point, and the camera is estimated anew, 200
-times; the scatter is shown below, across the window. Table 4.1 of the thesis has one value for each noise."""
+    """How much do noisier points change the calibration? The app takes the calibration above as the
+**truth**, adds this noise to every point of its views, and estimates the camera again, 200 times; the
+scatter is shown at the lower edge of the window. Table 4.1 of the thesis has one value for each noise
+level."""
 )
-THIS, OTHER = "this lens", "one of another kind"
-READY = Markdown("Drag the slider to begin.")
-STOPPED = Markdown("Stopped. Drag the slider to begin anew.")
+THIS, OTHER = "this lens", "a lens of another kind"
+READY = Markdown("Drag the slider to start.")
+STOPPED = Markdown("Stopped. Drag the slider to start again.")
 REST_S = 0.25
 """Time that the slider must be still before the experiment starts, seconds."""
 
@@ -56,14 +57,14 @@ class NoiseFolder:
             self._through = gui.add_dropdown(
                 "Seen through",
                 [THIS, OTHER],
-                hint="The lens through which the views are seen: the one that was found, or one with "
-                "distortions (p1, p2, k3) that the lens thesis does not know.",
+                hint="Lens that projects the points: the estimated one, or one with distortions (p1, p2, "
+                "k3) that the lens model *thesis* does not have.",
             )
             ui.when_changed(self._through, self._moved)
             ui.buttons(
                 "Experiment",
                 {"Replay": self._rested, "Stop": self.stop},
-                "Replay: begin anew with this noise. Stop: keep what there is.",
+                "Replay: start again with this noise. Stop: stop and keep the trials so far.",
             )
             self._status = gui.add_markdown(READY)
         self._dock = PlotDock(ui)
@@ -115,7 +116,7 @@ class NoiseFolder:
 
     def _rested(self) -> None:
         self._running, self._view = (float(self._sigma.value), self._through.value == OTHER), None
-        self._status.content = Markdown("The first trials are coming …")
+        self._status.content = Markdown("Waiting for the first trials …")
         self._dock.begin()
         self._on_replay(*self._running)
 
@@ -141,4 +142,6 @@ def noise_line(view: NoiseView) -> Markdown:
     if not view.halved:
         return result
     beyond = f"{view.beyond_noise} of {view.halved}"
-    return Markdown("{} Two halves of the views differ beyond noise in **{}** trials.").format(result, beyond)
+    return Markdown(
+        "{} In **{}** trials the two halves of the views differ by more than noise explains."
+    ).format(result, beyond)

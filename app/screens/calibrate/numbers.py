@@ -27,15 +27,17 @@ from pipeline.calibration.estimate import Calibration, rms_px
 
 UNITS = {"fx": "px", "fy": "px", "cx": "px", "cy": "px"}
 MEANING = {
-    "fx": "Focal length in widths of a pixel: how many pixels an angle takes.",
-    "fy": "Focal length in heights of a pixel.",
+    "fx": "Focal length in pixel widths: pixels per radian near the optical axis.",
+    "fy": "Focal length in pixel heights.",
     "cx": "Column of the principal point, where the optical axis meets the image.",
     "cy": "Row of the principal point.",
-    "k1": "Radial distortion that grows with the square of the distance from the axis; negative is a barrel.",
-    "k2": "Radial distortion with the fourth power.",
-    "k3": "Radial distortion with the sixth power.",
-    "p1": "Tangential distortion, of a lens that is tilted against the sensor.",
-    "p2": "Tangential distortion in the other direction.",
+    "k1": (
+        "Radial distortion, term with the square of the distance from the axis; negative: barrel distortion."
+    ),
+    "k2": "Radial distortion, term with the fourth power of the distance.",
+    "k3": "Radial distortion, term with the sixth power of the distance.",
+    "p1": "Tangential distortion of a lens that is tilted against the sensor, vertical.",
+    "p2": "Tangential distortion, horizontal.",
 }
 
 
@@ -95,7 +97,7 @@ def parameter_table(camera: CameraView) -> Markup:
     for name, error in found.standard_errors.items():
         digits, unit = (3, ", px") if name in UNITS else (5, "")
         low, high = found.intervals[name]
-        meaning = MEANING.get(name, "Part of the denominator of a rational lens.")
+        meaning = MEANING.get(name, "Term in the denominator of the rational model.")
         values = [f"{found.parameters[name]:.{digits}f}", f"{error:.{digits}f}"]
         values.append(f"{low:.{digits}f} to {high:.{digits}f}")
         if camera.truth:
@@ -109,7 +111,7 @@ WEAK = 0.8
 """Least correlation for which the sentence gives a reason."""
 DARK = -0.6
 """Correlation below which its blue is dark enough for white text."""
-SHORT, AWAY = "dist.", "The board's distance from the camera, the mean over the views."
+SHORT, AWAY = "dist.", "Mean distance of the board from the camera over the views."
 FOCAL, CENTER, LEANING = ("fx", "fy"), ("cx", "cy"), ("p1", "p2")
 
 
@@ -118,7 +120,7 @@ class ParameterFolder:
 
     def __init__(self, ui: Ui) -> None:
         """Add the folder."""
-        with ui.gui.add_folder("Every parameter, and how sure it is", expand_by_default=False):
+        with ui.gui.add_folder("All parameters and their uncertainty", expand_by_default=False):
             self._table = ui.gui.add_html(Markup(""))
             self._together = ui.gui.add_html(Markup(""))
 
@@ -187,24 +189,27 @@ def strongest_sentence(pair: Pair) -> str:
     size = signed(abs(pair.correlation))
     if abs(pair.correlation) < WEAK:
         return (
-            f"the views tell all numbers apart; the nearest to each other are {one} and {other}, at {size}."
+            f"the views separate all parameters; the strongest correlation is {size}, of {one} and {other}."
         )
-    way = "together" if pair.correlation > 0.0 else "against each other"
-    return f"{one} and {other} go {way} at {size}: {separating_views(pair)}."
+    way = "positively" if pair.correlation > 0.0 else "negatively"
+    return f"{one} and {other} are correlated {way} ({size}): {separating_views(pair)}."
 
 
 def separating_views(pair: Pair) -> str:
     """Return the kind of views that separates a pair of parameters."""
     names = (pair.first, pair.second)
     if all(name in (*FOCAL, DISTANCE) for name in names):
-        return "a longer lens on a board farther away looks nearly the same; more tilted views part them"
+        return (
+            "a longer focal length with a board farther away looks nearly the same; more tilted views "
+            "separate them"
+        )
     if all(name in (*CENTER, *LEANING) for name in names):
         return (
-            "a lens that leans looks nearly like one that is moved aside; boards in all corners, some of "
-            "them turned by 90°, part them"
+            "a tilted lens looks nearly like a shifted one; boards in all corners, some of them turned "
+            "by 90°, separate them"
         )
     if any(name in (*CENTER, *LEANING) for name in names):
-        return "views tilted to the opposite sides part them"
+        return "views tilted to opposite sides separate them"
     if DISTANCE in names or any(name in FOCAL for name in names):
-        return "points from the middle out to the corners of the image part them"
-    return "both bend the rim of the image; points nearer to its corners part them"
+        return "points from the centre to the corners of the image separate them"
+    return "both bend the edge of the image; points nearer to its corners separate them"

@@ -64,12 +64,14 @@ class CalibratePanel(Panel):
         self._open = ui.buttons(
             "Open",
             {DEMO_SCENES[name].title: partial(self._open_scene, name) for name in with_boards()},
-            "A scene with views of a board.",
+            "Scene with photographs of a board.",
             visible=False,
         )
         self._verdict = gui.add_html(Markup(""))
         self._use = UseRow(ui, self._use_it, self._as_before)
-        self._cameras = gui.add_dropdown("Camera", ["node_00"], hint="Whose views are shown.", visible=False)
+        self._cameras = gui.add_dropdown(
+            "Camera", ["node_00"], hint="Camera whose views are shown.", visible=False
+        )
         self._camera = Awaited(ui, self._cameras, self._picked_camera)
         self._photographs = Photographs(
             ui, self._answers, self._pick, self._show_view, self._drop, self._keep_all
@@ -77,7 +79,7 @@ class CalibratePanel(Panel):
         self.in_address |= {STOP: self._lesson, "node": self._camera}
         self.in_address |= {"photo": self._photographs, "pictures": self._photographs.area}
         self._around = gui.add_dropdown(
-            "In space", list(AROUND), hint="What stays in its place in the 3-D scene."
+            "In space", list(AROUND), hint="Object that is fixed in the 3-D scene."
         )
         ui.when_changed(self._around, self._draw)
         self._numbers = gui.add_html(Markup(""))
@@ -345,8 +347,7 @@ class CalibratePanel(Panel):
         fresh = session.results.fresh("calibrate", session.spec) and self._look is None
         if scene is None or view is None or camera is None or not fresh:
             return {}
-        columns, rows = view.board.size
-        return numbers(scene.title, columns * rows, camera)
+        return numbers(scene.title, len(view.board.points_m), camera)
 
     # Drawing.
 

@@ -55,8 +55,8 @@ class Photographs:
         self._row = ui.buttons(
             "View",
             {"Back": partial(self._go, -1), "Next": partial(self._go, 1), "Drop": on_drop, "All": on_all},
-            "Back, Next: the view before or after. Drop: leave this one out, or take it in again. All: leave "
-            "none out.",
+            "Back, Next: previous or next view. Drop: leave this view out, or use it again. All: use all "
+            "views.",
             visible=False,
         )
         self.area = PictureArea(ui, on_pair)
@@ -126,7 +126,7 @@ def found_picture(photograph: Photograph, fitted: FittedView | None) -> Picture:
     lines = np.stack([photograph.points_px, ends_px], axis=1) * photograph.zoom
     fixed = [np.rint(line * (1 << SHIFT)).astype(np.int32) for line in lines]
     cv2.polylines(rgb, fixed, False, SOURCE, 1, cv2.LINE_AA, shift=SHIFT)
-    return Picture(rgb, f"{caption}; orange: to where the lens puts them, × {times:,.0f}")
+    return Picture(rgb, f"{caption}; orange: towards their reprojection, × {times:,.0f}")
 
 
 def decoded(photograph: Photograph) -> ByteArray:
@@ -245,8 +245,8 @@ def bars_html(bars: tuple[Bar, ...], chosen: str) -> Markup:
         return Markup('<div class="{}" data-packetmesh-field>{}</div>').format(MARK, hide)
     kept = [bar.rms_px for bar in bars if bar.rms_px is not None and not bar.dropped]
     meaning = Markup(
-        "Error of each of {} views, px ({}): bar by the lens that has seen it, "
-        "line by one that has not ({}). Click one."
+        "Error of each of {} views, px. Bar: lens fitted to the view ({}); line: lens fitted without it "
+        "({}). Click a bar."
     ).format(len(bars), term("RMS", RMS), term("held out", HELD_OUT))
     if len(kept) < len(bars):
         meaning += " ✕ no board found, pale: dropped."
@@ -269,8 +269,8 @@ def _column(bar: Bar, most: float, chosen: bool) -> Markup:
     else:
         label = f"View {name}: {bar.rms_px:.3f} px"
         if bar.unseen_rms_px is not None and not bar.dropped:
-            label += f", {bar.unseen_rms_px:.3f} px by a lens that has not seen it"
-        label += ", dropped" if bar.dropped else ", out of line" if bar.suspect else ""
+            label += f", {bar.unseen_rms_px:.3f} px held out"
+        label += ", dropped" if bar.dropped else ", outlier" if bar.suspect else ""
         color = css(SOURCE) if chosen else css(LOSS) if bar.suspect else css(BRAND)
         tall = max(LEAST_PX, round(HEIGHT_PX * bar.rms_px / most))
         faint = "opacity: 0.3;" if bar.dropped else ""

@@ -25,12 +25,14 @@ def views_in(folder: Path) -> BoardViews:
     """
     path = folder / BOARD_FILE
     board = read_board(path) if path.exists() else Board()
-    return BoardViews(str(folder), 0, board.pattern, board.columns, board.rows, board.spacing_m)
+    size = board.columns, board.rows, board.spacing_m
+    return BoardViews(str(folder), 0, board.pattern, *size, board.dictionary, board.tag_spacing)
 
 
 def board_of(views: BoardViews) -> Board:
     """Return the photographed board."""
-    return Board(views.pattern, views.columns, views.rows, views.spacing_m)
+    size = views.columns, views.rows, views.spacing_m
+    return Board(views.pattern, *size, views.dictionary, views.tag_spacing)
 
 
 def shots_of(views: BoardViews) -> tuple[NodeShots, ...]:
@@ -66,6 +68,10 @@ def calibrate_command(views: BoardViews, source: Source) -> str:
     words = ["packetmesh", "calibrate", folder, "--pattern", board.pattern]
     words += ["--columns", str(board.columns), "--rows", str(board.rows)]
     words += ["--spacing-mm", f"{1000.0 * board.spacing_m:g}", "--lens", views.lens, "--held-out", str(FOLDS)]
+    if board.dictionary:
+        words += ["--dictionary", board.dictionary]
+    if board.pattern == "aprilgrid":
+        words += ["--tag-spacing", f"{board.tag_spacing:g}"]
     if views.bent:
         words.append("--board-warp")
     images = camera_images(nodes)

@@ -10,12 +10,13 @@ from app.window.tables import number, table
 from app.window.ui import Ui
 
 TEXT = Markdown(
-    """Moments at which several cameras see the board tell where these stand to each other. Choose
-**cameras of the rig** under *In space*: grey is where the scene had them, blue where the board puts them."""
+    """Photographs that several cameras took of the board at the same moment give their poses relative to
+each other. Choose **cameras of the rig** under *In space*: grey are the scene's poses, blue the estimated
+ones."""
 )
 MEANING = (
-    "Distance from the first camera with its standard error, then the error of the rotation, and the moments "
-    "at which both see the board."
+    "Distance from the first camera, standard errors of position and rotation, and the number of moments "
+    "at which both cameras see the board."
 )
 
 
@@ -62,6 +63,6 @@ def rig_line(rig: RigView) -> Markdown:
         return Markdown("{}; there are too few shared moments to hold some out.").format(rms_text)
     moved = [one.held_out_position_m for one in rig.cameras[1:] if one.held_out_position_m is not None]
     return Markdown(
-        "{}, {:.3f} px in moments that were held out; without a quarter of the "
-        "moments no camera moves by more than {:.2f} mm."
+        "{}, {:.3f} px at held-out moments; leaving out a quarter of the moments moves no camera by more "
+        "than {:.2f} mm."
     ).format(rms_text, rig.held_out_rms_px, 1000.0 * max(moved, default=0.0))

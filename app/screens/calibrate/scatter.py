@@ -22,13 +22,11 @@ TEXT_PX, TICK_PX, DOT_PX = 17, 15, 8
 REACH = 3.5
 """Least extent of the plot to each side of the truth, in standard errors."""
 INK = "#111"
-ERROR = "Root mean square of the trials' difference from the truth."
-PREDICTED = (
-    "The standard error that each trial gives itself, in the mean; like the error if it can be trusted."
-)
+ERROR = "Root mean square difference of the trials from the truth."
+PREDICTED = "Mean of the standard errors that the trials report; close to the error if they are reliable."
 THESIS = (
-    "What the thesis's value is off by at the noise of Table 4.1 that is nearest: of f and c the same "
-    "share of this camera's, of k1 and k2 the same difference."
+    "Error of the thesis's value at the nearest noise level of Table 4.1: for f and c as the same share "
+    "of this camera's value, for k1 and k2 as the same difference."
 )
 
 

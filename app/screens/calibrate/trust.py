@@ -7,17 +7,17 @@ from collections.abc import Callable, Sequence
 import plotly.graph_objects as go
 
 from app.drawing.calibration_plots import distortion_figure, radial_residuals_figure
-from app.drawing.colors import DELIVERED, LOSS, css
+from app.drawing.colors import DELIVERED, LOSS, NEUTRAL, css
 from app.screens.calibrate.labels import TWO_HALVES
 from app.screens.calibrate.view import TrustRequest, TrustView
 from app.web.markup import Markdown, Markup, escape
-from app.window.tables import number, table, term
+from app.window.tables import number, table
 from app.window.ui import Ui
 
 REST_S = 0.3
 OWN_M = 2.0
 """Range until a scene sets another."""
-CURVES = {"distortion": "How far the lens moves a point", "left": "What it leaves along the radius"}
+CURVES = {"distortion": "Distortion of a point", "left": "Residuals along the radius"}
 
 
 class TrustFolder:
@@ -31,10 +31,15 @@ class TrustFolder:
         gui = ui.gui
         with gui.add_folder("Good enough for what?", expand_by_default=False):
             gui.add_markdown(
-                Markdown("Say how far away things will be, and how well they are to be placed there.")
+                Markdown("Set the distance at which you will measure, and the accuracy that you need there.")
             )
             self._range = gui.add_slider(
-                "Range (m)", 0.3, 6.0, 0.1, OWN_M, hint="Distance of what will be measured, from the camera."
+                "Range (m)",
+                0.3,
+                6.0,
+                0.1,
+                OWN_M,
+                hint="Distance from the camera at which you will measure.",
             )
             self._accuracy = gui.add_slider(
                 "Accuracy (mm)",
@@ -42,12 +47,12 @@ class TrustFolder:
                 20.0,
                 0.5,
                 5.0,
-                hint="Within which a point at that range must be placed, across the line of sight.",
+                hint="Largest allowed error of a point at that range, across the line of sight.",
             )
             self._table = gui.add_html(Markup(""))
-        with gui.add_folder("How the lens bends", expand_by_default=False):
+        with gui.add_folder("Distortion of the lens", expand_by_default=False):
             self._curve = gui.add_dropdown(
-                "Curve", list(CURVES.values()), hint="Over the radius in the image."
+                "Curve", list(CURVES.values()), hint="Curve to plot over the radius in the image."
             )
             self._plot = gui.add_plotly(
                 go.Figure(), aspect=0.75, config={"displayModeBar": False}, visible=False
@@ -90,9 +95,9 @@ def verdict_html(view: TrustView | None) -> Markup:
     """Return HTML of the verdict: a sign and its sentences."""
     if view is None:
         return Markup("")
-    sign, color = ("✓ PASS", DELIVERED) if view.passed else ("✗ FAIL", LOSS)
+    undecided = "? NOT DECIDED", NEUTRAL
+    sign, color = ("✓ PASS", DELIVERED) if view.passed else ("✗ FAIL", LOSS) if view.failed else undecided
     first, *rest = (escape(line) for line in view.lines)
-    rest = [line.replace("Two halves", term("Two halves", TWO_HALVES)) for line in rest]
     more = Markup("").join(Markup("<div style='margin-top: 0.4em'>{}</div>").format(line) for line in rest)
     return Markup(
         "<div style='margin: 0 0.8em 0.6em; padding: 0.5em 0.8em; font-size: 13px; border-radius: 4px; "
@@ -107,26 +112,26 @@ def trust_table(view: TrustView) -> Markup:
         [
             (
                 "Noise, 95 %",
-                "Within which noise in the views leaves a point at the range 95 times in 100; root mean "
-                "square over the image. A lens of the wrong kind does not show in it.",
+                "Error of a point at the range that noise in the views exceeds in only 5 of 100 cases; "
+                "root mean square over the image. It does not reveal a wrong lens model.",
                 number(view.uncertainty_m, 2, "mm", 1000.0),
             ),
             (
                 "Two halves apart",
-                f"{TWO_HALVES} This is how far apart both put a point at the range, root mean square over "
-                "the image. A lens of the wrong kind shows here.",
+                f"{TWO_HALVES} This is the distance between the two results for a point at the range, "
+                "root mean square over the image; it reveals a wrong lens model.",
                 number(view.difference_m, 2, "mm", 1000.0),
             ),
             (
-                "Over what noise explains",
-                "The difference of the halves over what noise alone lets one expect: near 1 if the lens is "
-                "right.",
+                "Ratio to noise",
+                "Difference of the halves divided by the difference that noise alone explains; near 1 if "
+                "the lens model is right.",
                 "–" if view.halves is None else f"{view.halves[0]:.2f} ×",
             ),
             (
-                "By chance up to",
-                "Noise alone makes that ratio smaller in 95 of 100 cases; what is more is a lens, a view or "
-                "a board that is wrong.",
+                "Limit of the ratio",
+                "Noise alone keeps the ratio below this limit in 95 of 100 cases. A larger ratio means "
+                "that the lens model, a view or the board is wrong.",
                 "–" if view.halves is None else f"{view.halves[1]:.2f} ×",
             ),
         ]

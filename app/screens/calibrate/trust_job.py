@@ -19,6 +19,7 @@ from pipeline.calibration.correlation import correlations
 from pipeline.calibration.diagnosis import radial_curve, radial_residuals
 from pipeline.calibration.estimate import Calibration, View
 from pipeline.calibration.trust import CIRCLE95
+from pipeline.calibration.verdict import CERTAIN, percent
 from pipeline.types import FloatArray
 
 
@@ -55,20 +56,19 @@ def _trust_view(camera: CameraView, request: TrustRequest, board: Board, may_ben
     most_m = _most_m(noise_m, apart_m)
     at = f"at {request.range_m:g} m"
     pictures = {
-        "uncertainty": map_picture(
-            noise_m, most_m, size_px, f"95 times in 100 noise moves a point {at} less than"
-        ),
+        "uncertainty": map_picture(noise_m, most_m, size_px, f"Error of a point {at} from noise (95 %):"),
         "coverage": coverage_picture(trust.coverage, lens.views, zoom, size_px),
     }
     if apart_m is not None:
         pictures["halves"] = map_picture(
-            apart_m, most_m, size_px, f"Two halves of the views put a point {at} apart by"
+            apart_m, most_m, size_px, f"Difference of the two halves for a point {at}:"
         )
     if trust.following is not None:
         pictures["next"] = next_picture(trust.following, lens, zoom, size_px)
     return TrustView(
         request,
         trust.verdict.passed,
+        trust.verdict.failed,
         tuple(_lines(trust, lens, may_bend)),
         tuple(one.name for one in trust.outliers),
         pictures,
@@ -83,32 +83,37 @@ def _trust_view(camera: CameraView, request: TrustRequest, board: Board, may_ben
 
 def _lines(trust: Trust, lens: Calibration, may_bend: bool) -> Iterator[str]:
     """Yield the verdict and the advice, as the screen shows them."""
-    judged, halves, following = trust.verdict, trust.halves, trust.following
+    judged, following = trust.verdict, trust.following
     target = f"{1000.0 * judged.accuracy_m:g} mm at {judged.range_m:g} m"
     most = 1000.0 * judged.error_of_most_m
-    reached = f"within {most:.2g} mm" if np.isfinite(most) else "nowhere, as the lens folds back,"
-    yield (
-        f"{'Good enough' if judged.passed else 'Not good enough'} for {target}: a point is placed that well "
-        f"over {100.0 * judged.share:.0f} % of the image, and {reached} over 95 % of it."
+    reached = (
+        f"and within {most:.2g} mm with 95 %"
+        if np.isfinite(most)
+        else "but more than 5 % of it has no rays, where the lens model folds back"
     )
-    if halves is not None and halves.beyond_noise and not judged.passed:
-        bent = ", say there that the board may be bent," if may_bend else ""
-        yield (
-            f"Two halves of the views differ by {halves.ratio:.1f} times what noise explains (by chance up "
-            f"to {halves.most_by_noise:.1f}): the lens is of the wrong kind, or a view or the board is "
-            f"wrong. Try another lens under Advanced{bent} or drop the views that stand out."
-        )
+    good = "Good" if judged.passed else "Not good" if judged.failed else "Not known to be good"
+    yield (
+        f"{good} enough for {target}: points are within that over 95 % of the image with a probability of "
+        f"{percent(judged.probability)}, {reached}."
+    )
+    lens_wrong, bent = judged.wrong_lens >= CERTAIN, judged.bent >= CERTAIN
+    if (lens_wrong or bent) and not judged.passed:
+        if lens_wrong:
+            yield "The residuals show a lens that this model cannot describe: try another lens under Advanced."
+        if bent:
+            allow = ", or allow a bent board under Advanced" if may_bend else ""
+            yield f"The residuals show a bent board: glue it onto a flat plate{allow}."
     elif following is not None and not judged.passed:
         yield (
-            "The next view to take (under Compare) is predicted to bring "
+            "The next view to take (under Compare) is predicted to reduce the error from "
             f"{1000.0 * following.error_before_m:.2g} mm to {1000.0 * following.error_after_m:.2g} mm."
         )
     if trust.outliers:
         names = ", ".join(one.name for one in trust.outliers)
         worst = trust.outliers[0]
         yield (
-            f"Out of line: view {names}, red below; {worst.name} has {worst.rms_px:.2f} px where the others "
-            f"have {worst.others_px:.2f}. Look at it, then drop it or not."
+            f"Outlier: view {names}, red below; {worst.name} has {worst.rms_px:.2f} px, the others "
+            f"{worst.others_px:.2f} px. Look at its photograph, and drop it if it is bad."
         )
 
 

@@ -22,9 +22,9 @@ from pipeline.config import Pattern
 
 TEXT = Markdown(
     """Photograph a flat board of circles or squares from eight or more directions, tilted by 20 to 40°,
-also into the corners of the image. `packetmesh target` prints one. Add the photographs one by one, or all in
-a ZIP, with a folder for each camera (node_00, node_01 …) if there are several; depth images beside them
-(depth_05.png of color_05.png) tell what the depth sensor is off by."""
+also in the corners of the image. `packetmesh target` draws one to print. Add the photographs one by one, or
+all in a ZIP, with a folder for each camera (node_00, node_01 …) if there are several; depth images in the
+same folder (depth_05.png for color_05.png) also calibrate the depth sensor."""
 )
 ENDINGS = (".png", ".jpg", ".jpeg")
 UPLOAD_LIMIT_BYTES = 64 << 20
@@ -52,29 +52,32 @@ class UploadFolder:
         with gui.add_folder("Use your own photographs", expand_by_default=False):
             gui.add_markdown(TEXT)
             self._node = gui.add_dropdown(
-                "Taken by", ["node_00"], hint="The camera of the single photographs."
+                "Taken by", ["node_00"], hint="Camera that took the photographs that you add one by one."
             )
             mime = "image/png,image/jpeg,application/zip,.zip"
             button = gui.add_upload_button("Photograph or ZIP …", icon=viser.Icon.UPLOAD, mime_type=mime)
             button.on_upload(lambda event: ui.post(self._keep, event.target.value))
             self._have = gui.add_markdown(NONE)
-            self._pattern = gui.add_dropdown("Board", list(get_args(Pattern)), hint="What is printed on it.")
+            self._pattern = gui.add_dropdown("Board", list(get_args(Pattern)), hint="Pattern on the board.")
             self._columns = gui.add_number(
-                "Columns", 11, min=2, max=50, step=1, hint="Circles, or inner corners."
+                "Columns", 11, min=2, max=50, step=1, hint="Circles, inner corners or AprilTags."
             )
-            self._rows = gui.add_number("Rows", 9, min=2, max=50, step=1, hint="Circles, or inner corners.")
+            self._rows = gui.add_number(
+                "Rows", 9, min=2, max=50, step=1, hint="Circles, inner corners or AprilTags."
+            )
             self._spacing = gui.add_number(
                 "Spacing (mm)",
                 35.0,
                 min=1.0,
                 max=1000.0,
                 step=0.1,
-                hint="Pitch of circles, or side of a square.",
+                hint="Pitch of circles, or side of a square or of an AprilTag.",
             )
             ui.buttons(
                 "Photographs",
                 {"Find the cameras": self._use, "Forget them": self.forget},
-                "Find the cameras: from these photographs. Forget them: go back to those of the scene.",
+                "Find the cameras: calibrate with these photographs. Forget them: go back to the scene's "
+                "photographs.",
             )
 
     def cameras(self, names: Sequence[str]) -> None:
@@ -111,6 +114,7 @@ class UploadFolder:
     def _use(self) -> None:
         if self._folder is None or not self._folder.exists():
             raise InputError("There is no photograph to look at; add some first.")
+        known = views_in(self._folder)
         self._on_views(
             BoardViews(
                 str(self._folder),
@@ -119,6 +123,8 @@ class UploadFolder:
                 int(self._columns.value),
                 int(self._rows.value),
                 self._spacing.value / 1000.0,
+                known.dictionary if known.pattern == self._pattern.value else "",
+                known.tag_spacing,
             )
         )
 

@@ -22,8 +22,8 @@ class UseRow:
         self._row = ui.buttons(
             "In the chain",
             {USE: on_use, BEFORE: on_before},
-            "Use this calibration: all later steps are computed with it, and the surface changes. As before: "
-            "with what the rig came with.",
+            "Use this calibration: compute all later steps with it. As before: compute them with the "
+            "calibration that came with the rig.",
             visible=False,
         )
         self._text = ui.gui.add_markdown(Markdown(""))
@@ -41,7 +41,7 @@ class UseRow:
     def used(self, folder: str | None) -> None:
         """Show that the chain uses a calibration's folder; None: that it uses none."""
         name = "" if folder is None else Path(folder).name
-        in_use = Markdown("**In use** ({}): every later step computes with it.").format(name)
+        in_use = Markdown("**In use** ({}): every later step uses it.").format(name)
         self._text.content = in_use if name else Markdown("")
         if folder is not None:
             self._surfaces.pop(True, None)

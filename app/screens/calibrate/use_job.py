@@ -27,8 +27,7 @@ def use_job(store: Store, spec: Spec, folder: str) -> Generator[Progress, None, 
         The folder.
 
     Raises:
-        InputError: no camera has a lens, a lens is unknown to the chain, or the cameras are not those of the
-            rig.
+        InputError: no camera has a lens, or the cameras are not those of the rig.
     """
     views, source = spec.views, spec.source
     assert views is not None
@@ -68,12 +67,12 @@ def _check(name: str, camera: CameraIntrinsics, rig: Rig) -> None:
     sizes_px = {frame.name: (frame.intrinsics.width_px, frame.intrinsics.height_px) for frame in rig.frames}
     if name not in sizes_px:
         raise InputError(
-            f"The scene has no {name}, only {', '.join(sizes_px)}; choose under 'Taken by' whose photographs "
-            "these are"
+            f"The scene has no {name}, only {', '.join(sizes_px)}; choose under 'Taken by' the camera "
+            "that took these photographs"
         )
     if sizes_px[name] != (camera.width_px, camera.height_px):
         width, height = sizes_px[name]
         raise InputError(
             f"{name} of the scene has {width} x {height} pixels and the photographs {camera.width_px} x "
-            f"{camera.height_px}; a calibration is good for one size only"
+            f"{camera.height_px}; a calibration is valid for one image size only"
         )

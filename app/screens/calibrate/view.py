@@ -164,6 +164,8 @@ class TrustView:
 
     request: TrustRequest
     passed: bool
+    failed: bool
+    """False also if the views do not decide."""
     lines: tuple[str, ...]
     """The verdict in a sentence, and advice in some more."""
     outliers: tuple[str, ...]

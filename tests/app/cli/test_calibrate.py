@@ -53,7 +53,7 @@ def test_a_pattern_names_images_and_text_says_how_sure_each_number_is(folder, tm
     said = capsys.readouterr().err
     assert "fx" in said
     assert "95 %" in said
-    assert "in images that it has not seen" in said
+    assert "in held-out images" in said
 
 
 def test_what_cannot_be_calibrated_is_one_sentence_and_leaves_no_folder(folder, tmp_path, capsys):
@@ -65,7 +65,8 @@ def test_what_cannot_be_calibrated_is_one_sentence_and_leaves_no_folder(folder, 
     cv2.imwrite(str(small), np.zeros((48, 64), np.uint8))
     assert "not of one size" in failure(["calibrate", *two, str(small), *ASKED, *out], capsys)
     wrong = [*ASKED[:3], "7", *ASKED[4:]]
-    assert "count the corners" in failure(["calibrate", str(folder), *wrong, *out], capsys)
+    told = failure(["calibrate", str(folder), *wrong, *out], capsys)
+    assert "A chessboard of 9 x 6 inner corners is seen, not of 7 x 6; try --columns 9 --rows 6" in told
     assert "leaves no view" in failure(["calibrate", str(folder), *ASKED, "--held-out", "1", *out], capsys)
     same = [str(tmp_path / f"same{index}.png") for index in range(3)]
     for path in same:
@@ -92,7 +93,10 @@ def test_a_verdict_is_given_at_the_range_and_accuracy_that_one_names(folder, tmp
     main([*words, "--accuracy-mm", "0.01"])
     bad = json.loads(capsys.readouterr().out)["trust"]
     assert (good["passed"], bad["passed"]) == (True, False)
-    assert good["sentence"].startswith("At 1 m a point is placed within 50 mm (95 %)")
+    assert good["sentence"].startswith(
+        "At 1 m a point is placed within 50 mm over 95 % of the image with a prob"
+    )
+    assert (good["probability"], bad["probability"], bad["failed"]) == (1.0, 0.0, True)
     assert good["error_of_most_m"] == pytest.approx(bad["error_of_most_m"])
     assert 0.0 < good["coverage"] <= 1.0
     assert good["next_view"]["error_after_m"] < good["next_view"]["error_before_m"]
@@ -116,13 +120,15 @@ def test_images_are_left_out_by_name_and_the_board_bent_only_on_demand(folder, t
     assert warp["used"] == (warp["held_out_rms_px"] < warp["held_out_rms_px_flat"])
 
 
-def test_a_fisheye_is_written_where_it_is_known_and_the_chain_is_told(folder, tmp_path, capsys):
+def test_a_fisheye_is_written_where_it_is_known_and_read_by_the_chain(folder, tmp_path, capsys):
     main(["calibrate", str(folder), *ASKED, "--lens", "fisheye", "--out", str(tmp_path / "camera")])
     said = capsys.readouterr().err
-    assert "The chain knows no fisheye lens" in said
+    assert "matlab.txt is not written: MATLAB's file cannot hold a fisheye" in said
     written = {path.name for path in (tmp_path / "camera").iterdir()}
     assert {"camera.yaml", "camera_info.yaml", "cameras.txt", "camchain.yaml", "report.html"} <= written
-    assert "intrinsics.json" not in written
+    assert not {"matlab.txt", "open3d.json"} & written
+    camera = read_intrinsics(tmp_path / "camera" / "intrinsics.json")
+    assert (camera.fisheye, len(camera.distortion)) == (True, 4)
 
 
 def test_few_images_are_held_out_one_by_one(folder, tmp_path, capsys):
@@ -191,7 +197,7 @@ def test_a_wrong_spacing_cannot_be_seen_but_the_distances_can_be_checked(circles
     for spacing_mm in ("35", "70"):
         out = ["--out", str(tmp_path / spacing_mm), "--spacing-mm", spacing_mm]
         main(["calibrate", str(circles), "--held-out", "0", *out])
-        assert "if that is wrong, so is --spacing-mm" in capsys.readouterr().err
+        assert "if that is wrong, correct --spacing-mm" in capsys.readouterr().err
     cameras = [read_intrinsics(tmp_path / mm / "intrinsics.json") for mm in ("35", "70")]
     assert cameras[0].fx_px == pytest.approx(cameras[1].fx_px, rel=1e-4)
 
@@ -237,7 +243,7 @@ def test_two_cameras_in_words(pair, tmp_path, capsys):
     said = capsys.readouterr().err
     assert "node_01 from node_00: turned by" in said
     assert "6 moments in common" in said
-    assert "at moments that it has not seen" in said
+    assert "at held-out moments" in said
 
 
 def test_cameras_that_cannot_be_placed_are_one_sentence_and_leave_no_folder(pair, tmp_path, capsys):

@@ -40,7 +40,7 @@ def test_the_bias_is_told_and_written_where_a_rig_looks_for_it(folder, tmp_path,
     flat = DepthMap(np.full((CAMERA.height_px, CAMERA.width_px), away_m, np.float32))
     assert np.nanmean(correction.apply(flat).z_m) == pytest.approx(SCALE * away_m, rel=0.003)
     page = (tmp_path / "report.html").read_text()
-    assert "What the sensor is off by" in page
+    assert "Bias of the depth sensor" in page
     assert "Noise of the depth" in page
 
 
@@ -71,4 +71,4 @@ def test_a_doubtful_scale_of_depth_is_said_and_can_be_stated(folder, tmp_path, c
     main([*words, "--depth-scale", "5000"])
     told = capsys.readouterr().err
     assert "multiples of 5" not in told
-    assert "Depth is off by" in told
+    assert "RMS depth error on the board" in told

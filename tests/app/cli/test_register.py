@@ -147,9 +147,9 @@ def test_a_scale_is_found(capsys, tmp_path, files):
     assert np.cbrt(np.linalg.det(T[:3, :3])) == pytest.approx(1.05, abs=0.005)
 
 
-def test_repeated_points_and_points_that_are_nan_do_not_matter(capsys, tmp_path, files):
+def test_repeated_points_and_points_that_are_nan_or_astray_do_not_matter(capsys, tmp_path, files):
     points_m = read_cloud(files / "source.ply").points_m
-    messy = np.concatenate([points_m, points_m[:2000], np.full((7, 3), np.nan)])
+    messy = np.concatenate([points_m, points_m[:2000], np.full((7, 3), np.nan), [[1e38, 0.0, 0.0]]])
     np.savez(tmp_path / "messy.npz", points=messy)
     for source, name in ((files / "source.ply", "clean"), (tmp_path / "messy.npz", "messy")):
         assert run(capsys, source, files / "target.ply", "--out", tmp_path / name)[0] == 0

@@ -37,7 +37,9 @@ def test_a_rig_that_finds_its_places_says_how_well_it_agrees(capsys, tmp_path):
     share = metrics["measured"]["agreement_between_nodes"]
     assert code == 0
     assert share > 0.9
-    assert err.splitlines()[-1] == f"Of what two cameras both measured, {share:.1%} is within 2 %"
+    assert err.splitlines()[-1] == (
+        f"Where two cameras measured the same surface, {share:.1%} of the points agree within 2 %"
+    )
     poses = json.loads((tmp_path / "out" / "poses.json").read_text())
     assert poses == metrics["poses"]
     assert np.shape(poses["node_01"]) == (4, 4)

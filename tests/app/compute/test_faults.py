@@ -134,8 +134,8 @@ def test_a_disk_without_room_for_another_session_is_one_sentence_and_others_go_o
     with contextlib.closing(Connection(running.url)) as other:
         wait_for(lambda: bool(other.notices))
         assert other.notices == [
-            "You cannot come in: A file cannot be used (No space left on device); delete something there, as "
-            "the disk is full"
+            "The app cannot start for you: A file cannot be used (No space left on device); "
+            "delete something there, as the disk is full"
         ]
     other_step = "Fuse" if page.current != "Fuse" else "Depth"
     page.go(other_step)

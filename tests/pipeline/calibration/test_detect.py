@@ -1,5 +1,7 @@
 """Boards are found where they are, never mirrored, and where they are not it says why."""
 
+import re
+
 import cv2
 import numpy as np
 import pytest
@@ -13,8 +15,10 @@ BOARDS = {
     "thesis": Board(),
     "square": Board("circles", 6, 6, 0.03),
     "shifted": Board("circles-asymmetric", 4, 11, 0.02),
+    "even shifted": Board("circles-asymmetric", 4, 10, 0.018),
     "chessboard": Board("chessboard", 9, 6, 0.025),
     "charuco": Board("charuco", 8, 5, 0.03),
+    "tags": Board("aprilgrid", 5, 4, 0.05),
 }
 
 
@@ -71,10 +75,10 @@ def test_a_grid_of_another_size_is_not_found_in_a_part_of_the_board(size):
     for T in poses(BOARDS["thesis"], 4):
         found = detect(photograph(BOARDS["thesis"], T), Board("circles", *size, 0.035))
         assert not found.found
-        assert "count its columns" in found.reason or "circles are seen" in found.reason
+        assert "--columns and --rows" in found.reason
 
 
-@pytest.mark.parametrize("name", ["shifted", "chessboard", "charuco"])
+@pytest.mark.parametrize("name", ["shifted", "even shifted", "chessboard", "charuco", "tags"])
 def test_other_boards_of_another_size_are_not_found_either(name):
     board = BOARDS[name]
     other = Board(board.pattern, board.columns - 1, board.rows - 2, board.spacing_m)
@@ -116,3 +120,57 @@ def test_only_eight_bits_are_searched():
 def test_boards_that_cannot_be_are_refused(given, sentence):
     with pytest.raises(InputError, match=sentence):
         Board(*given)
+
+
+@pytest.mark.parametrize("size", [(8, 6), (9, 5), (7, 7), (10, 7), (6, 9)])
+def test_a_chessboard_of_another_size_is_named_and_that_size_finds_it(size):
+    picture = photograph(BOARDS["chessboard"], poses(BOARDS["chessboard"])[1])
+    refused = detect(picture, Board("chessboard", *size, 0.025))
+    if size == (6, 9):  # the same board, columns and rows exchanged
+        assert refused.found
+        return
+    columns, rows = map(int, re.search(r"--columns (\d+) --rows (\d+)", refused.reason).groups())
+    assert {columns, rows} == {9, 6}
+    assert detect(picture, Board("chessboard", columns, rows, 0.025)).found
+
+
+@pytest.mark.parametrize(("name", "pattern"), [("charuco", "charuco"), ("tags", "aprilgrid")])
+def test_markers_in_place_of_a_chessboard_are_named_and_their_pattern_finds_them(name, pattern):
+    board = BOARDS[name]
+    picture = photograph(board, poses(board)[1])
+    refused = detect(picture, Board("chessboard", 9, 6, 0.025))
+    assert f"--pattern {pattern}" in refused.reason
+    assert detect(picture, board).found
+
+
+@pytest.mark.parametrize(
+    ("name", "asked"),
+    [
+        ("shifted", Board("circles", 4, 11, 0.02)),
+        ("thesis", Board("circles-asymmetric", 11, 9, 0.02)),
+        ("even shifted", Board("circles-asymmetric", 4, 11, 0.018)),
+        ("even shifted", Board("circles-asymmetric", 5, 10, 0.018)),
+        ("even shifted", Board("circles-asymmetric", 4, 8, 0.018)),
+        ("even shifted", Board("circles-asymmetric", 3, 10, 0.018)),
+        ("shifted", Board("circles-asymmetric", 4, 10, 0.02)),
+        ("shifted", Board("circles-asymmetric", 4, 9, 0.02)),
+    ],
+)
+def test_circles_in_other_rows_are_not_found_and_the_options_to_check_are_named(name, asked):
+    for T in poses(BOARDS[name], 4):
+        refused = detect(photograph(BOARDS[name], T), asked)
+        assert not refused.found
+        assert "--columns and --rows" in refused.reason
+
+
+def test_an_even_number_of_shifted_rows_without_its_mark_may_be_upside_down_and_says_so():
+    board = BOARDS["even shifted"]
+    T = poses(board)[1]
+    picture = photograph(board, T)
+    x, y = seen(board, T)[0].round().astype(int).tolist()
+    cv2.circle(picture, (x, y), 8, int(picture[y, x]), -1)
+    found = detect(picture, board)
+    assert found.found
+    assert not found.oriented
+    truth = seen(board, T)
+    assert min(np.abs(found.points_px - one).max() for one in (truth, truth[::-1])) < 0.5

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.calibration.estimate import View, calibrate
+from packetmesh.errors import ReconstructionError
+from pipeline.calibration.estimate import View, best_fit, calibrate
 from pipeline.calibration.outliers import outlier_views
 from tests.pipeline.calibration.test_trust import BOARD, SIZE, views
 
@@ -27,7 +28,7 @@ def spoiled(kind, row, given):
 @pytest.mark.parametrize("row", [0, 6])
 def test_the_view_that_went_wrong_is_named_and_no_other(kind, row):
     given = spoiled(kind, row, views(0.2, 1))
-    told = outlier_views(calibrate(given, SIZE), given)
+    told = outlier_views(best_fit(given, SIZE), given)
     assert [one.name for one in told] == [str(row)]
     assert told[0].rms_px > 2.0 * told[0].others_px
     assert told[0].rms_without_px == pytest.approx(0.2 * 2**0.5, rel=0.1)
@@ -36,7 +37,15 @@ def test_the_view_that_went_wrong_is_named_and_no_other(kind, row):
 
 def test_two_bad_views_are_both_found_the_worst_first():
     given = spoiled("blurred", 2, spoiled("wrong order", 7, views(0.2, 2)))
-    assert [one.name for one in outlier_views(calibrate(given, SIZE), given)] == ["7", "2"]
+    assert [one.name for one in outlier_views(best_fit(given, SIZE), given)] == ["7", "2"]
+
+
+@pytest.mark.parametrize("row", [0, 6])
+def test_a_view_that_spoils_the_camera_is_named_and_leaving_it_out_gives_the_camera(row):
+    given = spoiled("wrong order", row, views(0.2, 1))
+    with pytest.raises(ReconstructionError, match=rf"more than 5 px.*--without {row}, "):
+        calibrate(given, SIZE)
+    assert calibrate([one for one in given if one.name != str(row)], SIZE).rms_px < 0.4
 
 
 def test_views_that_are_alike_give_no_outlier():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.screens.calibrate import scatter as thesis
-from app.screens.calibrate.labels import HELD_OUT, RMS, TWO_HALVES
+from app.screens.calibrate.labels import HELD_OUT, RMS
 from app.screens.calibrate.noise_view import NoiseRequest, NoiseView
 from app.screens.calibrate.numbers import correlation_html, signed, strongest_sentence
 from app.screens.calibrate.photographs import Bar, bars_html
@@ -44,12 +44,15 @@ def test_the_thesis_is_shown_at_the_nearest_noise_and_not_without_any():
 @pytest.mark.parametrize(
     ("pair", "words"),
     [
-        (Pair("fx", DISTANCE, 0.97), ("fx and the board's distance go together at .97", "more tilted views")),
-        (Pair("k1", "k2", -0.95), ("k1 and k2 go against each other at .95", "nearer to its corners")),
-        (Pair("cx", "p1", 0.9), ("a lens that leans",)),
+        (
+            Pair("fx", DISTANCE, 0.97),
+            ("fx and the board's distance are correlated positively (.97)", "more tilted views"),
+        ),
+        (Pair("k1", "k2", -0.95), ("k1 and k2 are correlated negatively (.95)", "nearer to its corners")),
+        (Pair("cx", "p1", 0.9), ("a tilted lens",)),
         (Pair("cy", "k1", 0.9), ("opposite sides",)),
-        (Pair("fx", "k1", 0.9), ("out to the corners",)),
-        (Pair("fx", "k1", -0.5), ("tell all numbers apart", "at .50")),
+        (Pair("fx", "k1", 0.9), ("to the corners of the image",)),
+        (Pair("fx", "k1", -0.5), ("separate all parameters", "is .50")),
     ],
 )
 def test_the_strongest_pair_is_a_sentence_with_advice(pair, words):
@@ -93,8 +96,13 @@ def test_the_row_of_bars_explains_its_words_and_shows_names_as_text():
         assert f'data-packetmesh-pick="{name}" title="View {name}:' in shown
 
 
-def test_the_verdict_explains_its_halves_and_shows_names_as_text():
-    lines = ("Not good enough", "Two halves differ", "Out of line: view <b>")
-    shown = verdict_html(SimpleNamespace(passed=False, lines=lines))
-    assert f"{term('Two halves', TWO_HALVES)} differ" in shown
+@pytest.mark.parametrize(
+    ("passed", "failed", "sign"),
+    [(True, False, "✓ PASS"), (False, True, "✗ FAIL"), (False, False, "? NOT DECIDED")],
+)
+def test_the_verdict_has_three_signs_and_shows_names_as_text(passed, failed, sign):
+    shown = verdict_html(
+        SimpleNamespace(passed=passed, failed=failed, lines=("Good enough", "Outlier: view <b>"))
+    )
+    assert sign in shown
     assert "view &lt;b&gt;" in shown

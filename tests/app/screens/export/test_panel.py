@@ -30,11 +30,11 @@ def test_rows_of_buttons_come_with_what_is_there(server, store):
     shown = {one.label for one in bench.gui.all("button_group")}
     assert shown == {"Surface", "Clouds", "Numbers", "Race", "Network"}
     assert bench.gui.find("Race").options == ("Page", "GIF")
-    assert "No command plays a race" in bench.gui.text()
+    assert "No command runs a race" in bench.gui.text()
     assert "simulate --preset street-grid --out runs/network-1" in bench.gui.text()
     bench.others = ()
     bench.panel.on_show()
-    assert "No command plays a race" not in bench.gui.text()
+    assert "No command runs a race" not in bench.gui.text()
 
 
 def test_a_file_goes_to_who_asked_for_it(server, store):

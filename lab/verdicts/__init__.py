@@ -1,0 +1,1 @@
+"""Simulated calibration sessions, and how often the verdict on them is right."""

@@ -1,0 +1,126 @@
+"""Images of several cameras in one folder are noticed, and those of one camera are not taken for several."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from packetmesh.errors import InputError
+from pipeline.calibration.from_images import image_files
+from pipeline.calibration.series import camera_series, check_one_camera, made_by
+from pipeline.calibration.shots import series_shots
+
+
+def named(*patterns, count=3):
+    return [Path(pattern.format(index)) for index in range(count) for pattern in patterns]
+
+
+@pytest.mark.parametrize(
+    ("patterns", "cameras"),
+    [
+        (("left-{:04d}.jpg", "right-{:04d}.jpg"), ["left", "right"]),
+        (("Left{:02d}.png", "Right{:02d}.png"), ["left", "right"]),
+        (("leftImage{}.png", "rightImage{}.png"), ["left", "right"]),
+        (("{:04d}_left.png", "{:04d}_right.png"), ["left", "right"]),
+        (("L_{}.png", "R_{}.png"), ["l", "r"]),
+        (("imgL{}.png", "imgR{}.png"), ["l", "r"]),
+        (("cam0_{:03d}.png", "cam1_{:03d}.png"), ["cam0", "cam1"]),
+        (("camera_1-{}.png", "camera_2-{}.png", "camera_3-{}.png"), ["camera_1", "camera_2", "camera_3"]),
+        (("{:03d}_camA.png", "{:03d}_camB.png"), ["cama", "camb"]),
+        (("rgb_{}.png", "ir_{}.png"), ["ir", "rgb"]),
+    ],
+)
+def test_names_tell_the_cameras_and_the_moments(patterns, cameras):
+    files = named(*patterns)
+    series = camera_series(files)
+    assert list(series) == cameras
+    assert sum(map(len, series.values())) == len(files)
+    nodes = series_shots(files)
+    assert [node.name for node in nodes] == [f"node_{index:02d}" for index in range(len(cameras))]
+    assert all([shot.moment for shot in node.shots] == ["0", "1", "2"] for node in nodes)
+
+
+@pytest.mark.parametrize(
+    "patterns",
+    [
+        ("view{}.png", "wall.png"),
+        ("IMG_{:04d}.jpg",),
+        ("left{:02d}.jpg",),
+        ("cam0_{}.png",),
+        ("camera{}.png",),
+        ("IMG_20240101_12000{}.jpg", "IMG_20240102_12000{}.jpg"),
+        ("tilted{}.png", "straight{}.png"),
+        ("rearranged_{}.png", "clear_{}.png"),
+        ("DSC_{:04d}.JPG", "DSC_1{:03d}.JPG"),
+    ],
+)
+def test_names_of_one_camera_are_left_alone(patterns):
+    files = named(*patterns)
+    assert camera_series(files) == {}
+    check_one_camera(files)
+
+
+def test_each_remedy_of_the_refusal_works(tmp_path):
+    for path in named("left-{:04d}.jpg", "right-{:04d}.jpg"):
+        Image.new("L", (8, 6)).save(tmp_path / path)
+    with pytest.raises(InputError, match="3 of 'left' and 3 of 'right'") as refused:
+        image_files([str(tmp_path)])
+    told = str(refused.value)
+    pattern = re.search(r'alone by "([^"]+)"', told)[1]
+    assert [path.name for path in image_files([str(tmp_path / pattern)])] == [
+        f"left-000{k}.jpg" for k in range(3)
+    ]
+    assert "--one-camera" in told
+    assert len(image_files([str(tmp_path)], one_camera=True)) == 6
+    assert "--rig" in told
+    assert len(series_shots(image_files([str(tmp_path)], one_camera=True))) == 2
+    assert "a folder of its own" in told
+    (tmp_path / "left").mkdir()
+    for path in tmp_path.glob("left-*"):
+        path.rename(tmp_path / "left" / path.name)
+    assert len(image_files([str(tmp_path / "left")])) == 3
+
+
+def test_names_that_tell_no_cameras_apart_make_no_rig():
+    with pytest.raises(InputError, match=r"do not tell cameras apart; name them as left-0000\.png"):
+        series_shots(named("view{}.png"))
+    with pytest.raises(InputError, match="7 cameras, and a rig has at most 6"):
+        series_shots(named(*(f"cam{k}_{{}}.png" for k in range(7))))
+
+
+def photograph(path, model="", focal_mm=None, serial=""):
+    exif = Image.Exif()
+    if model:
+        exif[0x0110] = model
+    detail = exif.get_ifd(0x8769)
+    if focal_mm is not None:
+        detail[0x920A] = focal_mm
+    if serial:
+        detail[0xA431] = serial
+    Image.fromarray(np.zeros((6, 8), np.uint8)).save(path, exif=exif)
+
+
+def test_exif_data_of_two_cameras_two_bodies_or_two_focal_lengths_are_noticed(tmp_path):
+    for kinds in (
+        ({"model": "X100"}, {"model": "EOS R"}),
+        ({"model": "X100", "serial": "1"}, {"model": "X100", "serial": "2"}),
+        ({"model": "Phone", "focal_mm": 4.2}, {"model": "Phone", "focal_mm": 1.8}),
+    ):
+        files = [tmp_path / f"{index}.jpg" for index in range(4)]
+        for index, path in enumerate(files):
+            photograph(path, **kinds[index % 2])
+        with pytest.raises(
+            InputError, match=r"2 cameras or focal lengths by their EXIF data: 0\.jpg of .*--one-camera"
+        ):
+            check_one_camera(files)
+        check_one_camera(files[::2])
+
+
+def test_images_without_exif_data_or_no_images_are_left_to_their_reader(tmp_path):
+    photograph(tmp_path / "a.jpg", "X100")
+    Image.new("L", (8, 6)).save(tmp_path / "b.png")
+    (tmp_path / "c.png").write_bytes(b"no image")
+    check_one_camera([tmp_path / name for name in ("a.jpg", "b.png", "c.png", "missing.png")])
+    assert made_by(tmp_path / "c.png") == ""
