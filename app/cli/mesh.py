@@ -34,7 +34,8 @@ def mesh(
         max_points: Thin the cloud to about this many points first; without it, all points are used.
         smoothing_passes: How often every point is moved onto the plane of its neighbours.
         metres_per_unit: Metres per unit of the coordinates in the file: 0.001 for millimetres. Without it,
-            the unit is the one in the column titles of a text file, or else the metre.
+            the unit is the one in the column titles of a text file or in the coordinate system of a LAS
+            file, or else the metre.
         estimate_normals: Ignore the normals in the file and estimate them from the points.
         columns: Columns of a text, .npy or .bin file, such as x,y,z,_,r,g,b with _ for a column that is not
             used; without it, they are found in the file.

@@ -48,8 +48,8 @@ def register(
         start: `global` finds the start pose by matching features; `given` takes --init.
         scale: Estimate a scale as well (our methods, point metric).
         metres_per_unit: Metres per unit of the source and of the target: `0.001 1` if the source is in
-            millimetres. Without it, the unit is the one in the column titles of a text file, or else the
-            metre.
+            millimetres. Without it, the unit is the one in the column titles of a text file or in the
+            coordinate system of a LAS file, or else the metre.
         columns: Columns of the text, .npy and .bin files, such as x,y,z,_,r,g,b with _ for a column that is
             not used: once for both clouds, or once for each, with `auto` for columns found in the file.
         json: Print the metrics as one JSON object.

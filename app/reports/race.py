@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from app.drawing.colors import DISTANCE_STOPS, NEUTRAL, css
 from app.reports.hand_out import Viewpoint
 from app.reports.offline_page import offline_page
 from app.web.markup import Markup
+from pipeline.io.cloud_precision import middle_m, too_coarse
+from pipeline.kernels.geometry import rigid
 from pipeline.types import ByteArray, FloatArray
 
 _PARTS = ("race_page.css", "offline_page.js", "hand_out_view.js", "race_page.js")
@@ -61,8 +63,28 @@ class RaceShow:
         return max(len(run.poses) for run in self.runs)
 
 
+def _near_origin(race: RaceShow) -> RaceShow:
+    """Move clouds to the origin of their frames if the page's 32-bit numbers are too coarse for them."""
+    source_at_m, target_at_m = (
+        middle_m(points_m) if too_coarse(points_m) else np.zeros(3)
+        for points_m in (race.source_m, race.target_m)
+    )
+    if not (source_at_m.any() or target_at_m.any()):
+        return race
+    T_far_near, T_near_far = rigid(np.eye(3), source_at_m), rigid(np.eye(3), -target_at_m)
+    view = race.view
+    return replace(
+        race,
+        source_m=race.source_m - source_at_m,
+        target_m=race.target_m - target_at_m,
+        view=replace(view, eye_m=view.eye_m - target_at_m, middle_m=view.middle_m - target_at_m),
+        runs=tuple(replace(run, poses=T_near_far @ run.poses @ T_far_near) for run in race.runs),
+    )
+
+
 def race_page(race: RaceShow) -> Markup:
     """Return a self-contained HTML document that plays the race."""
+    race = _near_origin(race)
     record = {
         "view": race.view.record(),
         "steps": race.steps,

@@ -89,7 +89,7 @@ def verdict(
         raise InputError(f"An accuracy of {1000.0 * accuracy_m:g} mm cannot be met; try 5")
     probability = likely.within(accuracy_m, LEAST_SHARE)
     of_most_m = likely.of_share_m(LEAST_SHARE, LEVEL)
-    told = (
+    sentence = (
         f"At {likely.range_m:g} m a point is placed within {_mm(accuracy_m)} over "
         f"{100.0 * LEAST_SHARE:.0f} % of "
         f"the image with a probability of {percent(probability)}, {_over_most(likely, of_most_m)}: "
@@ -99,7 +99,7 @@ def verdict(
     return Verdict(
         *(probability, likely.range_m, accuracy_m, likely.map_m(LEVEL)),
         *(likely.share_within(accuracy_m, LEVEL), of_most_m, likely.wrong_lens, likely.bent),
-        " ".join([told, *advice]),
+        " ".join([sentence, *advice]),
     )
 
 
@@ -116,11 +116,11 @@ def _word(probability: float) -> str:
 
 def _advice(calibration: Calibration, likely: LikelyError, following: NextView | None) -> list[str]:
     """Return sentences on what to change: the lens model, the board, or the views."""
-    said = []
+    advice = []
     if likely.wrong_lens >= CERTAIN:
         other = OTHER_LENS[calibration.lens]
-        said.append(
-            f"The residuals show a lens that the model '{calibration.lens}' cannot hold: try --lens {other}."
+        advice.append(
+            f"The residuals show a lens that the model '{calibration.lens}' cannot describe: try --lens {other}."
         )
     if likely.bent >= CERTAIN:
         remedy = (
@@ -128,9 +128,9 @@ def _advice(calibration: Calibration, likely: LikelyError, following: NextView |
             if calibration.lens == "fisheye"
             else ("glue it onto a flat plate, or try --board-warp (one camera at a time)")
         )
-        said.append(f"The residuals show a bent board: {remedy}.")
-    if said:
-        return said
+        advice.append(f"The residuals show a bent board: {remedy}.")
+    if advice:
+        return advice
     if following is None:
         return ["Take more views, near the edges of the image."]
     x, y = following.points_px.mean(axis=0) / calibration.size_px
@@ -144,7 +144,7 @@ def _advice(calibration: Calibration, likely: LikelyError, following: NextView |
 
 def _over_most(likely: LikelyError, of_most_m: float) -> str:
     if np.isfinite(of_most_m):
-        return f"and within {_mm(of_most_m)} with {100.0 * LEVEL:.0f} %"
+        return f"and within {_mm(of_most_m)} with a probability of {100.0 * LEVEL:.0f} %"
     missing = np.isnan(likely.map_m(LEVEL)).mean()
     return f"and not at all in {100.0 * missing:.0f} % of it, where this lens has no rays"
 

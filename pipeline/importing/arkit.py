@@ -16,7 +16,7 @@ from packetmesh.errors import InputError
 from packetmesh.files import MAX_TEXT_BYTES, json_object, read_json, read_text
 from pipeline.importing.cameras import camera_of
 from pipeline.importing.found_poses import found_poses
-from pipeline.importing.pairing import color_folder, paired, require, thinned
+from pipeline.importing.pairing import color_folder, paired, pose_indices, require, thinned
 from pipeline.importing.sequence import DEPTH_SUFFIXES, Candidate, Sequence, posed
 from pipeline.importing.stray import CONFIDENCE_NOTE
 from pipeline.io.intrinsics import check_camera
@@ -104,21 +104,23 @@ def read_record3d(folder: Path, intrinsics: Path | None) -> Sequence:
             f"{folder} holds Record3D's own compressed depth in rgbd/, which is not read; try Record3D's "
             "export as EXR and JPG images"
         )
-    pairs, rare = thinned(list(enumerate(paired(colors, folder / "depth"))))
+    every, unpaired = paired(colors, folder / "depth")
     camera, each, matrices = _record3d_metadata(file)
+    frames = pose_indices(every, max(len(each), max(matrices, default=-1) + 1))
+    pairs, rare = thinned(list(zip(frames, every, strict=True)))
     poses = found_poses(matrices)
     own = {} if intrinsics else dict(enumerate(each))
     candidates, notes = posed(
         [
-            Candidate(color, depth, poses.T_world_camera.get(k), camera=own.get(k))
-            for k, (color, depth) in pairs
+            Candidate(pair.color, pair.depth, poses.T_world_camera.get(k), camera=own.get(k))
+            for k, pair in pairs
         ],
         f"poses in {file.name}",
         poses,
     )
     if intrinsics:
         camera, _ = camera_of(folder, candidates[0].color, intrinsics, None, "")
-    return Sequence(candidates, camera, notes=(*rare, *notes))
+    return Sequence(candidates, camera, notes=(*unpaired, *rare, *notes))
 
 
 def _record3d_metadata(file: Path) -> tuple[CameraIntrinsics, list[CameraIntrinsics], dict[int, FloatArray]]:

@@ -13,7 +13,7 @@ from packetmesh.errors import InputError
 from pipeline.importing.cameras import camera_of
 from pipeline.importing.handedness import mirrored_poses, y_points_up
 from pipeline.importing.sequence import Candidate, Sequence, named_inside, posed
-from pipeline.importing.tum import UNITS_PER_METRE, known_camera, poses_at, rows_in
+from pipeline.importing.tum import UNITS_PER_METRE, known_camera, poses_at, rows_in, seconds
 from pipeline.io.images import read_depth_values
 from pipeline.types import CameraIntrinsics
 
@@ -90,7 +90,7 @@ def _time_of_color(row: tuple[float, list[str]], depth: int) -> float:
     if depth == 1:
         return first_s
     try:
-        return float(words[1])
+        return seconds(float(words[1]))
     except ValueError:
         return first_s
 

@@ -12,18 +12,18 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
-from pipeline.importing.bag_cameras import alike, sdk_stream
+from pipeline.importing.bag_cameras import sdk_stream
 from pipeline.importing.bag_messages import color_of, depth_values_of
 from pipeline.importing.bag_times import moments_of, times_of
-from pipeline.importing.bag_topics import Topic, image_topics, message_of, pairs_of
+from pipeline.importing.bag_topics import Topic, image_topics, message_of, of_separate_cameras, pairs_of
 from pipeline.importing.bag_transforms import Transforms, sdk_units_per_metre, static_transforms
 from pipeline.importing.depth_units import depth_of
 from pipeline.importing.rig_folder import NodeImages
 from pipeline.io.depth_scale import known_in, usual_scale
-from pipeline.io.same_view import depth_camera_of
+from pipeline.io.same_view import alike, depth_camera_of, same_view_note
 from pipeline.types import CameraIntrinsics, FloatArray
 
-_SUFFIXES = (".bag", ".db3", ".mcap")
+SUFFIXES = (".bag", ".db3", ".mcap")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class _Place:
 
 def is_bag(path: Path) -> bool:
     """Return whether a path is a bag's file or the folder of a ROS 2 bag."""
-    return (path.is_file() and path.suffix in _SUFFIXES) or (path / "metadata.yaml").is_file()
+    return (path.is_file() and path.suffix in SUFFIXES) or (path / "metadata.yaml").is_file()
 
 
 def iterate_bag(path: Path, frames: int, depth_scale: float | None) -> Generator[Progress, None, BagNodes]:
@@ -59,18 +59,17 @@ def iterate_bag(path: Path, frames: int, depth_scale: float | None) -> Generator
         InputError: the bag is unreadable, lacks colour, depth or camera_info, or has no images of one time.
     """
     with _opened(path) as reader:
-        colors, depths = yield from image_topics(reader)
-        pairs, notes = pairs_of(path, reader, colors, depths)
+        colors, depths, notes = yield from image_topics(reader)
+        pairs, left_out = pairs_of(path, reader, colors, depths)
+        pairs, smaller = of_separate_cameras(pairs)
+        notes += [*left_out, *smaller]
         transforms = static_transforms(reader)
         topics = [topic for pair in pairs for topic in pair]
         times_s, time_notes = times_of(topics)
         moments = moments_of(path, times_s, frames, len(pairs) == 1)
         notes += [*time_notes, *(note for color, _ in pairs for note in color.found.notes)]
-        poses = transforms.poses([color.frame for color, _ in pairs])
-        if len(pairs) == 1 or any(pose is None for pose in poses):
-            poses = [None] * len(pairs)
-            why = "Moving" if len(pairs) == 1 else "No static transforms link the cameras, and moving"
-            notes.append(f"{why} transforms are not read; reconstruct looks for their poses")
+        poses, why = _poses(transforms, [color.frame for color, _ in pairs])
+        notes += why
         nodes = []
         for chosen in moments:
             for index, (pair, T_world_color) in enumerate(zip(pairs, poses, strict=True)):
@@ -80,6 +79,26 @@ def iterate_bag(path: Path, frames: int, depth_scale: float | None) -> Generator
         notes += [f"{node.depth_name}: {note}" for _, node in nodes for note in node.notes]
         notes += _repeated([node for _, node in nodes])
         return BagNodes(tuple(nodes), len(times_s[0]), units, tuple(dict.fromkeys(notes)))
+
+
+def _poses(transforms: Transforms, frames: list[str]) -> tuple[list[FloatArray | None], tuple[str, ...]]:
+    """Return the (4, 4) T_world_camera of the cameras by their frames, or None for all and the reason."""
+    unknown: list[FloatArray | None] = [None] * len(frames)
+    if len(frames) == 1:
+        return unknown, ("Moving transforms are not read; reconstruct looks for their poses",)
+    poses = transforms.poses(frames)
+    if any(pose is None for pose in poses):
+        return unknown, (
+            "No static transforms link the cameras, and moving transforms are not read; reconstruct looks "
+            "for their poses",
+        )
+    if len(set(frames)) < len(frames):
+        twice = next(frame for frame in frames if frames.count(frame) > 1)
+        return unknown, (
+            f"Several cameras have the frame {twice}, so that transforms do not tell their places; "
+            "reconstruct looks for their poses",
+        )
+    return poses, ()
 
 
 @contextmanager
@@ -94,7 +113,10 @@ def _opened(path: Path) -> Iterator[Any]:
         raise
     except Exception as error:  # a parser fails on damaged data in more ways than can be listed
         why = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(f"The bag {path} cannot be read ({why}); try to record or copy it again") from None
+        raise InputError(
+            f"The bag {path} cannot be read ({why}); "
+            "try to copy it again, or rosbag reindex or ros2 bag reindex"
+        ) from None
 
 
 def _repeated(nodes: list[NodeImages]) -> list[str]:
@@ -170,5 +192,7 @@ def _in_one_frame(
         )
         return _Place(own, np.eye(4)), (*depth.found.notes, note)
     remedy = f"try to record the camera_info of {depth.name}, too"
-    smaller = depth_camera_of(color.camera, shape, f"of {depth.name}", f"of {color.name}", remedy)
-    return None if smaller is None else _Place(smaller, np.eye(4)), ()
+    resized = depth_camera_of(color.camera, shape, f"of {depth.name}", f"of {color.name}", remedy)
+    if resized is None:
+        return None, ()
+    return _Place(resized, np.eye(4)), (same_view_note(color.camera, resized),)

@@ -20,8 +20,6 @@ _RECTIFIED = re.compile(r"(?:^|[_/])rect(?:ified)?(?:[_/]|$)")
 """Part of the names of topics with rectified images, as of ``image_rect_color``."""
 _SDK = re.compile(r"^(/device_\d+/sensor_\d+/[^/]+)/image/data$")
 """Image topics as the RealSense SDK names them."""
-_SDK_LENS = "brown conrady"
-"""The RealSense SDK's name of ROS's model plumb_bob."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,17 +80,6 @@ def common_parts(first: str, second: str) -> int:
     return same.index(False) if False in same else len(same)
 
 
-def alike(one: CameraIntrinsics, other: CameraIntrinsics) -> bool:
-    """Return whether two cameras have the same pixels: within 0.01 px, and the same distortion."""
-    sizes = (one.width_px, one.height_px) == (other.width_px, other.height_px)
-    same_lens = (
-        one.fisheye == other.fisheye
-        and one.distortion.shape == other.distortion.shape
-        and np.allclose(one.distortion, other.distortion, atol=1e-4)
-    )
-    return sizes and same_lens and np.allclose(one.matrix, other.matrix, rtol=0.0, atol=0.01)
-
-
 def camera_in(
     message: Any, topic: str, size_px: tuple[int, int], rectified: bool
 ) -> tuple[CameraIntrinsics, tuple[str, ...]]:
@@ -121,7 +108,7 @@ def camera_in(
             f"The camera of {topic} has no projection matrix P, which the rectified images need; try to "
             "record the images before rectification"
         )
-    if model.lower() == _SDK_LENS or not (np.any(d) or is_fisheye_name(model)):
+    if not (np.any(d) or is_fisheye_name(model)):
         model = ""
     lens = lens_of(model, d)
     if lens is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from typing import Any
 
@@ -21,17 +22,42 @@ _DEPTHS: dict[str, np.dtype[Any]] = {
     "16UC1": np.dtype(np.uint16),
     "mono16": np.dtype(np.uint16),
     "32FC1": np.dtype(np.float32),
+    "64FC1": np.dtype(np.float64),
 }
 _COMPRESSED_DEPTH = "compressedDepth"
+_BRIGHTNESS = re.compile(
+    r"(?:^|[_/])(?:ir|infra\d?|infrared|confidence|amplitude|intensity|gr[ae]y|mono)(?:[_/]|$)"
+)
+"""Part of the names of topics such as /ir/image_raw, /kinect2/sd/image_ir and /tof/confidence_image."""
+_PNG = b"\x89PNG\r\n\x1a\n"
+_PNG_HEADER_BYTES, _GREY_16 = 26, b"\x10\x00"
+"""Size of a PNG up to its bit depth and colour type, and these two for one channel of 16 bits."""
 _CONFIG_BYTES = 12
 """Size of the header of compressed depth: format and two parameters that quantise 32FC1, then PNG or RVL."""
 
 
-def is_depth(message: Any) -> bool:
-    """Return whether an Image or CompressedImage contains depth."""
+def is_depth(message: Any, topic: str) -> bool:
+    """Return whether an Image or CompressedImage contains depth, by its encoding and topic."""
+    return _may_be_depth(message) and not is_brightness(message, topic)
+
+
+def is_brightness(message: Any, topic: str) -> bool:
+    """Return whether an Image has 16 bits of brightness, by its encoding and topic."""
+    if not _may_be_depth(message) or "depth" in topic.lower():
+        return False
+    return getattr(message, "encoding", "") == "mono16" or _BRIGHTNESS.search(topic) is not None
+
+
+def _may_be_depth(message: Any) -> bool:
     if hasattr(message, "format"):
-        return _COMPRESSED_DEPTH in message.format
+        return _COMPRESSED_DEPTH in message.format or _is_png_of_16_bits(message)
     return message.encoding in _DEPTHS
+
+
+def _is_png_of_16_bits(message: Any) -> bool:
+    """Return whether the data are a PNG of one 16-bit channel, as which image_transport compresses depth."""
+    data = np.asarray(message.data)[:_PNG_HEADER_BYTES].tobytes()
+    return data.startswith(_PNG) and data[_PNG_HEADER_BYTES - 2 :] == _GREY_16
 
 
 def stamp_s(raw: bytes, is_ros2: bool) -> float:
@@ -49,7 +75,7 @@ def size_of(message: Any, topic: str) -> tuple[int, int]:
     if not hasattr(message, "format"):
         return message.width, message.height
     try:
-        image = depth_values_of(message, topic) if is_depth(message) else color_of(message, topic)
+        image = depth_values_of(message, topic) if is_depth(message, topic) else color_of(message, topic)
     except InputError:
         return 0, 0
     return image.shape[1], image.shape[0]
@@ -97,6 +123,8 @@ def transform_in(message: Any) -> FloatArray:
 
 def _compressed_depth(message: Any, topic: str) -> NDArray[Any]:
     data = np.asarray(message.data)
+    if _COMPRESSED_DEPTH not in message.format:
+        data = np.concatenate([np.zeros(_CONFIG_BYTES, np.uint8), data])
     rvl = "rvl" in message.format.lower()
     values = _rvl(data.tobytes()) if rvl else cv2.imdecode(data[_CONFIG_BYTES:], cv2.IMREAD_UNCHANGED)
     if values is None or values.ndim != 2:

@@ -12,11 +12,15 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.importing.bag_cameras import FoundCamera, camera_of_topic, common_parts, sdk_stream
-from pipeline.importing.bag_messages import is_depth, size_of, stamp_s
+from pipeline.importing.bag_messages import is_brightness, is_depth, size_of, stamp_s
+from pipeline.io.same_view import alike
+from pipeline.kernels.geometry import scaled_to
 from pipeline.types import MAX_NODES, CameraIntrinsics, FloatArray
 
 PROGRESS_EVERY = 20
 """Number of images between progress reports."""
+_RESIZED_WITHIN_PX = 1.0
+"""Drivers do not agree on where the first pixel's centre goes."""
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 
 
@@ -43,9 +47,10 @@ class Topic:
         return self.found.camera
 
 
-def image_topics(reader: Any) -> Generator[Progress, None, tuple[list[Topic], list[Topic]]]:
-    """Return the colour topics and the depth topics, sorted by name."""
+def image_topics(reader: Any) -> Generator[Progress, None, tuple[list[Topic], list[Topic], list[str]]]:
+    """Return the colour topics and the depth topics, sorted by name, and a note for each other one."""
     found: tuple[list[Topic], list[Topic]] = ([], [])
+    notes = []
     connections = [own for own in reader.connections if own.msgtype in _IMAGES]
     images, seen = max(1, sum(connection.msgcount for connection in connections)), 0
     for connection in sorted(connections, key=lambda connection: connection.topic):
@@ -57,12 +62,16 @@ def image_topics(reader: Any) -> Generator[Progress, None, tuple[list[Topic], li
             first = reader.deserialize(raw, connection.msgtype) if first is None else first
             stamps_s.append(stamp_s(raw, reader.is2))
             recorded_ns.append(at_ns)
-        if first is not None:
+        if first is not None and is_brightness(first, connection.topic):
+            notes.append(
+                f"{connection.topic} is left out: by its name, its 16 bits are brightness and not depth"
+            )
+        elif first is not None:
             frame = first.header.frame_id.lstrip("/")
             camera = camera_of_topic(reader, connection.topic, frame, size_of(first, connection.topic))
             topic = Topic(connection, frame, camera, np.array(stamps_s), recorded_ns)
-            found[is_depth(first)].append(topic)
-    return found
+            found[is_depth(first, connection.topic)].append(topic)
+    return *found, notes
 
 
 def pairs_of(
@@ -107,6 +116,30 @@ def pairs_of(
         f"{color.name} is left out: a rig has at most {MAX_NODES} nodes" for color, _ in pairs[MAX_NODES:]
     ]
     return pairs[:MAX_NODES], notes
+
+
+def of_separate_cameras(
+    pairs: list[tuple[Topic, Topic]],
+) -> tuple[list[tuple[Topic, Topic]], list[str]]:
+    """Return the pairs without those of a camera that another pair has in more pixels, and notes on them."""
+    largest = sorted(pairs, key=lambda pair: -pair[0].camera.width_px)
+    kept: list[tuple[Topic, Topic]] = []
+    notes = []
+    for pair in largest:
+        own = next((one for one, _ in kept if _is_resized(pair[0], one)), None)
+        if own is None:
+            kept.append(pair)
+        else:
+            notes.append(f"{pair[0].name} is left out: it shows the same as {own.name} in fewer pixels")
+    return [pair for pair in pairs if pair in kept], notes
+
+
+def _is_resized(small: Topic, large: Topic) -> bool:
+    """Return whether two topics of one frame have the same camera in different sizes."""
+    if small.frame != large.frame or small.camera.width_px == large.camera.width_px:
+        return False
+    resized = scaled_to(large.camera, small.camera.width_px, small.camera.height_px)
+    return resized is not None and alike(resized, small.camera, within_px=_RESIZED_WITHIN_PX)
 
 
 def message_of(reader: Any, topic: Topic, index: int) -> Any:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from pathlib import Path
 
 from packetmesh.errors import InputError
 from pipeline.io.images import read_color
 from pipeline.io.intrinsics import read_intrinsics
+from pipeline.io.same_view import alike
 from pipeline.types import CameraIntrinsics
 
 PRIMESENSE = CameraIntrinsics.pinhole(525.0, 525.0, 319.5, 239.5, 640, 480)
@@ -16,6 +19,10 @@ PRIMESENSE = CameraIntrinsics.pinhole(525.0, 525.0, 319.5, 239.5, 640, 480)
 _SUFFIXES = ("json", "yaml", "yml")
 _NAMED = ("*intrinsic*.txt", "camera_matrix.csv")
 """Files that contain a camera by their names; those of ``_SUFFIXES`` may contain other things."""
+_FOLDERS = ("calib", "calibration", "intrinsics")
+"""Subfolders of camera files, as RTAB-Map exports them."""
+_OTHER_CAMERA = re.compile(r"(?<![a-z])(depth|ir|infra\d?|infrared)(?![a-z])", re.IGNORECASE)
+"""Part of the name of a depth camera's file, such as depth_intrinsics.json."""
 
 
 def camera_of(
@@ -58,17 +65,53 @@ def camera_of(
 
 
 def _file_in(folder: Path, size_px: tuple[int, int]) -> tuple[Path | None, list[str]]:
-    """Return the intrinsics file of a recording, and the names of files that may have been meant as such."""
+    """Return the intrinsics file of a recording, and the names of files that may have been meant as such.
+
+    Raises:
+        InputError: several files hold different cameras for images of this size.
+    """
     others, of_other_sizes = list[str](), list[Path]()
-    for path in [path for suffix in _SUFFIXES for path in sorted(folder.glob(f"*.{suffix}"))]:
+    fitting: dict[Path, CameraIntrinsics] = {}
+    for path in [path for suffix in _SUFFIXES for path in _files(folder, f"*.{suffix}")]:
         try:
             camera = read_intrinsics(path, size_px)
         except InputError:  # JSON or YAML of another kind
             others.append(path.name)
             continue
         if (camera.width_px, camera.height_px) == size_px:
-            return path, []
-        of_other_sizes.append(path)
-    named = [path for pattern in _NAMED for path in sorted(folder.glob(pattern))]
-    found = [*of_other_sizes, *named, *sorted(folder.parent.glob(_NAMED[0]))]
+            fitting[path] = camera
+        else:
+            of_other_sizes.append(path)
+    if fitting:
+        return _only(folder, fitting), []
+    named = [path for pattern in _NAMED for path in _files(folder, pattern)]
+    above = _of_color(sorted(folder.parent.glob(_NAMED[0])))
+    found = [*of_other_sizes, *_of_color(named), *above]
     return next(iter(found), None), others
+
+
+def _files(folder: Path, pattern: str) -> list[Path]:
+    return [
+        path
+        for place in (folder, *(folder / name for name in _FOLDERS))
+        for path in sorted(place.glob(pattern))
+    ]
+
+
+def _of_color(paths: Iterable[Path]) -> list[Path]:
+    """Return the paths whose names are not of a depth or infrared camera, or all if there are no others."""
+    paths = list(paths)
+    return [path for path in paths if not _OTHER_CAMERA.search(path.stem)] or paths
+
+
+def _only(folder: Path, fitting: dict[Path, CameraIntrinsics]) -> Path:
+    """Return the file of the colour camera, if it is clear which one that is."""
+    paths = _of_color(fitting)
+    first = fitting[paths[0]]
+    if any(not alike(fitting[path], first) for path in paths[1:]):
+        names = ", ".join(path.relative_to(folder).as_posix() for path in paths[:4])
+        raise InputError(
+            f"{folder} has different cameras for images of this size in {names}; try --intrinsics FILE with "
+            "that of the colour images"
+        )
+    return paths[0]

@@ -11,7 +11,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.files import read_text
-from pipeline.io.poses import departure, nearest_rigid, why_not_rigid
+from pipeline.io.poses import departure, matrix_in, nearest_rigid, why_not_rigid
 from pipeline.types import FloatArray
 
 
@@ -28,6 +28,11 @@ class FoundPoses:
     departure: float
     """Largest departure from orthonormal of a rotation in use."""
 
+    @property
+    def count(self) -> int:
+        """Number of poses, usable or not."""
+        return len(self.T_world_camera) + len(self.refused) + self.lost
+
 
 def poses_in_files(paths: Iterable[Path]) -> FoundPoses:
     """Read pose files of 4 x 4 numbers; a file that is missing has no pose."""
@@ -37,13 +42,14 @@ def poses_in_files(paths: Iterable[Path]) -> FoundPoses:
         if not path.is_file():
             continue
         try:
-            lines = (line.split("#")[0] for line in read_text(path, "pose file").splitlines())
-            words = " ".join(lines).replace(",", " ").split()
-            matrices[path] = np.array(words, dtype=np.float64).reshape(4, 4)
-        except ValueError:
-            unreadable.append(f"{path.name} does not hold 4 x 4 numbers")
+            T = matrix_in(read_text(path, "pose file"))
         except InputError as error:
             unreadable.append(str(error).split(";")[0])
+            continue
+        if T is None:
+            unreadable.append(f"{path.name} does not hold 4 x 4 numbers")
+        else:
+            matrices[path] = T
     return found_poses(matrices, unreadable)
 
 

@@ -100,7 +100,8 @@ def iterate_import(
     sequence = kind.read(folder, None if intrinsics is None else Path(intrinsics))
     if depth_scale is not None:
         sequence = sequence.with_scale(depth_scale)
-    sequence = replace(sequence, candidates=distinct(sequence.candidates))
+    candidates, repeated = distinct(sequence.candidates)
+    sequence = replace(sequence, candidates=candidates, notes=(*sequence.notes, *repeated))
     yield Progress("choice of frames", 0.2)
     middle = depth_in(sequence.candidates[len(sequence.candidates) // 2], sequence)
     chosen = choose(sequence, frames, float(np.nanmedian(middle.depth.z_m)))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from packetmesh.errors import InputError
 from pipeline.importing import arkit, associated, colmap, numbered, stray, tum
+from pipeline.importing.bag import SUFFIXES
 from pipeline.importing.sequence import Sequence
 
 
@@ -84,6 +85,9 @@ def recognise(path: Path) -> tuple[Kind, Path]:
     if found:
         names = ", ".join(folder.name for _, folder in found[:6])
         raise InputError(f"{path} holds {len(found)} recordings; try one of them: {names}")
+    bags = [file for suffix in SUFFIXES for file in sorted(path.glob(f"*{suffix}"))]
+    if bags:
+        raise InputError(f"{path} holds the bag {bags[0].name}; try {bags[0]}")
     raise InputError(f"{path} is of no known kind; the kinds are {_known()}")
 
 

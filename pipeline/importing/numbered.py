@@ -15,6 +15,7 @@ from pipeline.importing.pairing import (
     color_folder,
     depth_images,
     paired,
+    pose_indices,
     require,
     thinned,
 )
@@ -57,10 +58,11 @@ def is_scannet(folder: Path) -> bool:
 
 def read_scannet(folder: Path, intrinsics: Path | None) -> Sequence:
     """Read a ScanNet scene as exported by its SensReader (Dai et al., CVPR 2017); depth in millimetres."""
-    pairs, rare = thinned(paired(folder / "color", folder / "depth"))
-    found = [(color, depth, folder / "pose" / f"{color.stem}.txt") for color, depth in pairs]
+    every, unpaired = paired(folder / "color", folder / "depth")
+    pairs, rare = thinned(every)
+    found = [(pair.color, pair.depth, folder / "pose" / f"{pair.color.stem}.txt") for pair in pairs]
     candidates, lost = _with_poses(found, f"pose/{found[0][2].name}")
-    notes = (*rare, *lost)
+    notes = (*unpaired, *rare, *lost)
     first, beside = candidates[0], folder / "intrinsic"
     height_px, width_px = read_color(first.color).shape[:2]
     if intrinsics is None:
@@ -93,13 +95,14 @@ def read_open3d(folder: Path, intrinsics: Path | None) -> Sequence:
     """Read Redwood (Choi et al., CVPR 2015) or Open3D recordings; depth in mm, poses in a .log file."""
     colors = color_folder(folder)
     assert colors is not None
-    pairs, rare = thinned(list(enumerate(paired(colors, folder / "depth"))))
+    every, unpaired = paired(colors, folder / "depth")
     poses, missing, trajectory = _trajectory(folder)
-    found = [Candidate(color, depth, poses.T_world_camera.get(index)) for index, (color, depth) in pairs]
+    pairs, rare = thinned(list(zip(pose_indices(every, poses.count), every, strict=True)))
+    found = [Candidate(pair.color, pair.depth, poses.T_world_camera.get(index)) for index, pair in pairs]
     candidates, notes = posed(found, missing, poses)
     default = PRIMESENSE, "a PrimeSense camera's from the factory"
     camera, assumed = camera_of(folder, candidates[0].color, intrinsics, *default)
-    return Sequence(candidates, camera, notes=(*rare, *assumed, *trajectory, *notes))
+    return Sequence(candidates, camera, notes=(*unpaired, *rare, *assumed, *trajectory, *notes))
 
 
 def _trajectory(folder: Path) -> tuple[FoundPoses, str, tuple[str, ...]]:
@@ -133,9 +136,10 @@ def read_trajectory_log(file: Path) -> dict[int, FloatArray]:
 
 
 def is_sunrgbd(folder: Path) -> bool:
-    """Return whether a folder contains image/ and depth_bfx/, or image/ and depth/ with intrinsics.txt."""
+    """Return whether a folder contains one image in image/, depth_bfx/ or depth/, and intrinsics.txt."""
     depth = (folder / "depth_bfx").is_dir() or (folder / "depth").is_dir()
-    return (folder / "image").is_dir() and depth and (folder / "intrinsics.txt").is_file()
+    image = (folder / "image").is_dir() and len(list((folder / "image").iterdir())) == 1
+    return image and depth and (folder / "intrinsics.txt").is_file()
 
 
 def read_sunrgbd(folder: Path, intrinsics: Path | None) -> Sequence:

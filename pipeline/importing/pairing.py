@@ -3,29 +3,80 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
 
 from packetmesh.errors import InputError
 from pipeline.importing.sequence import DEPTH_SUFFIXES
+from pipeline.importing.tum import associate
 
 MOST_CANDIDATES = 600
 """Largest number of frames that are considered; longer recordings are subsampled."""
 COLOR_FOLDERS = ("color", "rgb", "image", "images")
 COLOR_SUFFIXES = (".jpg", ".jpeg", ".png", ".ppm")
+_Numbered: TypeAlias = dict[tuple[Fraction, ...], Path]
+"""Images by the numbers in their names."""
+_TIME = re.compile(r"\d+\.\d+")
+_NUMBER = re.compile(r"\d+(?:\.\d+)?")
+"""Frame numbers and times, such as TUM's 1305031102.175304."""
 
 
-def paired(colors: Path, depths: Path) -> list[tuple[Path, Path]]:
-    """Pair the images whose names have the same number, in order of the number."""
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """A colour and a depth image of one number."""
+
+    position: int
+    """Position of its number among all numbers in both folders, from 0."""
+    number: int
+    """First number in the names; -1 without one."""
+    color: Path
+    depth: Path
+
+
+def paired(colors: Path, depths: Path) -> tuple[list[Pair], tuple[str, ...]]:
+    """Pair the images whose names have the same number, in order of the number; also notes on the others.
+
+    Raises:
+        InputError: no two images have the same number, or two images of a folder have.
+    """
     by_number = [
-        _by_number(path for path in folder.iterdir() if path.suffix.lower() in suffixes)
+        _by_number(folder, [path for path in folder.iterdir() if path.suffix.lower() in suffixes])
         for folder, suffixes in ((colors, COLOR_SUFFIXES), (depths, DEPTH_SUFFIXES))
     ]
-    both = sorted(by_number[0].keys() & by_number[1].keys())
+    if all(_is_time(path) for own in by_number for path in own.values()):
+        by_number[1] = _at_nearest_time(*by_number)
+    every = sorted(by_number[0].keys() | by_number[1].keys())
+    both = by_number[0].keys() & by_number[1].keys()
     counts = f"{len(by_number[0])} and {len(by_number[1])} images"
     missing = f"an image in {depths.name}/ with the number of an image in {colors.name}/"
-    require(both, colors.parent, f"{missing} ({colors.name}/ and {depths.name}/ have {counts})")
-    return [(by_number[0][number], by_number[1][number]) for number in both]
+    require(list(both), colors.parent, f"{missing} ({colors.name}/ and {depths.name}/ have {counts})")
+    pairs = [
+        Pair(position, int(number[0]) if number else -1, by_number[0][number], by_number[1][number])
+        for position, number in enumerate(every)
+        if number in both
+    ]
+    note = f"{colors.name}/ and {depths.name}/ have {counts}, of which {len(both)} pairs have the same number"
+    return pairs, () if len(both) == len(every) else (note,)
+
+
+def pose_indices(pairs: list[Pair], count: int) -> list[int]:
+    """Return the index of each pair's pose in a list of poses that has one for each frame of a recording.
+
+    If images were deleted, there are more poses than pairs; then the numbers in the folders tell the frame.
+
+    Args:
+        pairs: all pairs of the recording.
+        count: number of poses.
+    """
+    if count == len(pairs):
+        return list(range(count))
+    if count > pairs[-1].position + 1 and pairs[0].number in (0, 1):
+        return [pair.number - pairs[0].number for pair in pairs]
+    return [pair.position for pair in pairs]
 
 
 def depth_images(folder: Path, pattern: str) -> list[Path]:
@@ -33,11 +84,33 @@ def depth_images(folder: Path, pattern: str) -> list[Path]:
     return [path for path in sorted(folder.glob(pattern)) if path.suffix.lower() in DEPTH_SUFFIXES]
 
 
-def _by_number(paths: Iterable[Path]) -> dict[tuple[int, ...], Path]:
+def _by_number(folder: Path, paths: list[Path]) -> _Numbered:
     """Index paths by the first number in the name (Redwood's frame number), or by all if it is not unique."""
-    numbered = [(tuple(map(int, re.findall(r"\d+", path.stem))), path) for path in paths]
-    by_first = {numbers[:1]: path for numbers, path in numbered if numbers}
-    return by_first if len(by_first) == len(numbered) else dict(numbered)
+    paths = [path for path in paths if _NUMBER.search(path.stem)] or paths
+    numbers = [tuple(map(Fraction, _NUMBER.findall(path.stem))) for path in paths]
+    first = [own[:1] for own in numbers]
+    keys = first if len(set(first)) == len(paths) else numbers
+    found: _Numbered = {}
+    for key, path in sorted(zip(keys, paths, strict=True), key=lambda pair: pair[1]):
+        if key in found:
+            raise InputError(
+                f"{folder} has several images of the same number, {found[key].name} and {path.name}; try to "
+                "move one of each away"
+            )
+        found[key] = path
+    return found
+
+
+def _is_time(path: Path) -> bool:
+    return _TIME.fullmatch(path.stem) is not None
+
+
+def _at_nearest_time(colors: _Numbered, depths: _Numbered) -> _Numbered:
+    """Return the depth images by the time of the colour image that is less than 20 ms apart, if there is."""
+    keys = sorted(colors), sorted(depths)
+    near = associate(*(np.array([float(key[0]) for key in own]) for own in keys))
+    renamed = {keys[1][j]: keys[0][i] for i, j in near}
+    return {renamed.get(key, key): path for key, path in depths.items()}
 
 
 def thinned(items: list) -> tuple[list, tuple[str, ...]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -74,26 +75,68 @@ class Sequence:
 
 
 def named_inside(folder: Path, name: str, file: str) -> Path:
-    """Return the path of ``name``, which a file of a recording contains.
+    """Return the path of ``name``, which a file of a recording contains, with any system's separators.
 
     Raises:
         InputError: it is outside the recording's folder.
     """
+    with suppress(ValueError):  # absolute, but inside
+        name = Path(name).relative_to(folder.resolve()).as_posix()
+    if "\\" in name and not (folder / name).is_file():
+        name = name.replace("\\", "/")
     try:
         return path_below(folder, name)
     except InputError:
-        raise InputError(f"{file} in {folder} names {name}, which is outside; check the file") from None
+        raise InputError(
+            f"{file} in {folder} names {name}, which is outside this folder; try names such as rgb/0.png, "
+            "from this folder on"
+        ) from None
 
 
-def distinct(candidates: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
-    """Return the candidates without those whose colour or depth image an earlier one already has."""
+def existing(candidates: list[Candidate], lists: str, remedy: str) -> tuple[list[Candidate], tuple[str, ...]]:
+    """Return the candidates whose two images exist, and a note if some do not.
+
+    Args:
+        candidates: the frames that the files of a recording name.
+        lists: names of these files.
+        remedy: what to try if none exists.
+
+    Raises:
+        InputError: none exists.
+    """
+    missing = [path for own in candidates for path in (own.color, own.depth) if not path.is_file()]
+    if not missing:
+        return candidates, ()
+    kept = [own for own in candidates if own.color.is_file() and own.depth.is_file()]
+    if not kept:
+        raise InputError(f"No two images that {lists} names together exist, such as {missing[0]}; {remedy}")
+    return kept, (
+        f"{len(candidates) - len(kept)} of {len(candidates)} frames of {lists} lack an image, such as "
+        f"{missing[0]}, and were left out",
+    )
+
+
+def distinct(candidates: tuple[Candidate, ...]) -> tuple[tuple[Candidate, ...], tuple[str, ...]]:
+    """Return the candidates without those of a moment that an earlier one already has, and a note.
+
+    It is the same moment if the colour or the depth image is the same, or the time.
+    """
     seen: set[Path] = set()
+    times_s: set[float] = set()
     found = []
+    repeated = 0
     for candidate in candidates:
-        if not seen & {candidate.color, candidate.depth}:
-            found.append(candidate)
-            seen |= {candidate.color, candidate.depth}
-    return tuple(found)
+        if seen & {candidate.color, candidate.depth}:
+            continue
+        if candidate.time_s in times_s:
+            repeated += 1
+            continue
+        found.append(candidate)
+        seen |= {candidate.color, candidate.depth}
+        if candidate.time_s is not None:
+            times_s.add(candidate.time_s)
+    note = f"{repeated} frames have the time of another frame and were left out; each needs its own time"
+    return tuple(found), (note,) if repeated else ()
 
 
 def posed(

@@ -44,10 +44,12 @@ def read_stray(folder: Path, intrinsics: Path | None) -> Sequence:
             f"{folder} has no photographs in rgb/, and its video {_VIDEO} is not read; try in that folder: "
             f"mkdir rgb && ffmpeg -i {_VIDEO} -start_number 0 rgb/%06d.png"
         )
-    pairs, rare = thinned(paired(colors, folder / "depth"))
+    every, unpaired = paired(colors, folder / "depth")
+    pairs, rare = thinned(every)
     rows = _odometry(folder / _ODOMETRY)
     found = []
-    for color, depth in pairs:
+    for pair in pairs:
+        color, depth = pair.color, pair.depth
         row = rows.get(_number(depth), {})
         confidence = folder / "confidence" / depth.with_suffix(".png").name
         found.append(
@@ -60,7 +62,7 @@ def read_stray(folder: Path, intrinsics: Path | None) -> Sequence:
             )
         )
     candidates, pose_notes = posed(found, f"pose in {_ODOMETRY} with the number of a frame")
-    notes = (*rare, *pose_notes)
+    notes = (*unpaired, *rare, *pose_notes)
     if any(candidate.confidence for candidate in candidates):
         notes += (CONFIDENCE_NOTE,)
     if intrinsics is None and not (folder / _MATRIX).is_file():

@@ -14,12 +14,19 @@ from scipy.spatial.transform import Rotation
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_TEXT_BYTES, read_bytes, text_in
 from pipeline.importing.cameras import PRIMESENSE, camera_of
-from pipeline.importing.sequence import Candidate, Sequence, named_inside, posed
+from pipeline.importing.sequence import Candidate, Sequence, existing, named_inside, posed
 from pipeline.kernels.geometry import rigid
 from pipeline.types import CameraIntrinsics, FloatArray
 
 UNITS_PER_METRE = 5000.0
 LARGEST_GAP_S = 0.02
+LARGEST_TIME_S = 1e11
+_LENGTH_WITHIN = 0.05
+"""Largest departure of a quaternion's length from 1."""
+_MATRICES = (12, 16)
+"""Numbers of a 3 x 4 and a 4 x 4 matrix."""
+_W_FIRST = re.compile(r"^.*\bq\w*w\b.*\bq\w*x\b", re.MULTILINE)
+"""A heading of EuRoC's order, in which the quaternion's scalar comes first."""
 _CAMERAS = {
     "1": ((517.3, 516.5, 318.6, 255.3), (0.2624, -0.9531, -0.0054, 0.0026, 1.1633)),
     "2": ((520.9, 521.0, 325.1, 249.7), (0.2312, -0.7849, -0.0033, -0.0001, 0.9172)),
@@ -44,11 +51,12 @@ def read_tum(folder: Path, intrinsics: Path | None) -> Sequence:
     if not pairs:
         raise InputError(
             f"Of the {len(pictures)} images in {folder / 'rgb.txt'} and the {len(depths)} in depth.txt "
-            f"no two are less than {1000 * LARGEST_GAP_S:g} ms apart; check that their clocks agree"
+            f"no two are less than {1000 * LARGEST_GAP_S:g} ms apart; check that their clocks agree and "
+            "that the times are in seconds"
         )
     truth = folder / "groundtruth.txt"
     poses = poses_at(truth, rgb_s)
-    candidates, notes = posed(
+    there, missing = existing(
         [
             Candidate(
                 named_inside(folder, pictures[i], "rgb.txt"),
@@ -58,10 +66,15 @@ def read_tum(folder: Path, intrinsics: Path | None) -> Sequence:
             )
             for i, j in pairs
         ],
+        f"{folder / 'rgb.txt'} or depth.txt",
+        "try to unpack the images beside it",
+    )
+    candidates, notes = posed(
+        there,
         f"pose in {truth.name} at the time of an image" if truth.is_file() else truth.name,
     )
     camera, assumed = camera_of(folder, candidates[0].color, intrinsics, *known_camera(folder))
-    return Sequence(candidates, camera, UNITS_PER_METRE, notes=(*assumed, *notes))
+    return Sequence(candidates, camera, UNITS_PER_METRE, notes=(*missing, *assumed, *notes))
 
 
 def associate(first_s: FloatArray, second_s: FloatArray) -> list[tuple[int, int]]:
@@ -96,34 +109,59 @@ def listed(file: Path) -> tuple[FloatArray, list[str]]:
 
 
 def rows_in(file: Path, what: str, least: int, form: str) -> list[tuple[float, list[str]]]:
-    """Return time and words of each line, sorted by time."""
+    """Return time in seconds and words of each line, sorted by time.
+
+    Clocks that count milliseconds, microseconds or nanoseconds since 1970 are told by their size.
+    """
     rows = []
-    text = text_in(read_bytes(file, 100 * MAX_TEXT_BYTES, what), "replace")
-    for line in text.splitlines():
+    for line in _text(file, what).splitlines():
         if not line.strip() or line.startswith("#"):
             continue
         words = line.replace(",", " ").split()
         try:
-            time_s = float(words[0])
+            time = float(words[0])
         except ValueError:
-            time_s = np.nan
-        if not np.isfinite(time_s) or len(words) <= least:
+            time = np.nan
+        if not np.isfinite(time) or len(words) <= least:
             raise InputError(f"The {what} {file} has the line '{line[:80]}'; try lines with {form}")
-        rows.append((time_s, words[1:]))
+        rows.append((seconds(time), words[1:]))
     rows.sort(key=lambda row: row[0])
     return rows
 
 
+def seconds(time: float) -> float:
+    """Return a time in seconds; a larger one than the year 5138 counts thousandths, millionths and so on."""
+    while abs(time) > LARGEST_TIME_S:
+        time /= 1000.0
+    return time
+
+
+def _text(file: Path, what: str) -> str:
+    return text_in(read_bytes(file, 100 * MAX_TEXT_BYTES, what), "replace")
+
+
 def poses_at(file: Path, wanted_s: FloatArray) -> dict[int, FloatArray]:
-    """Return T_world_camera by the index of each of (N,) times that has a pose at most 20 ms away."""
+    """Return T_world_camera by the index of each of (N,) times that has a pose at most 20 ms away.
+
+    Raises:
+        InputError: the lines are not a time, a position and a quaternion.
+    """
     if not file.is_file():
         return {}
-    rows = rows_in(file, "trajectory", 7, "a time, tx ty tz in metres and a quaternion qx qy qz qw")
+    form = "a time, tx ty tz in metres and a quaternion qx qy qz qw"
+    rows = rows_in(file, "trajectory", 7, form)
     times_s = np.array([time_s for time_s, _ in rows])
     try:
         values = np.array([words[:7] for _, words in rows], dtype=np.float64).reshape(-1, 7)
     except ValueError:
         raise InputError(f"The trajectory {file} holds words where numbers belong; check the file") from None
+    lengths = np.linalg.norm(values[:, 3:], axis=1)
+    wrong = (lengths > 0.5) & (np.abs(lengths - 1.0) > _LENGTH_WITHIN)
+    if wrong.any() or any(len(words) in _MATRICES for _, words in rows):
+        row = " ".join(rows[int(wrong.argmax())][1])
+        raise InputError(f"The trajectory {file} has the pose '{row[:80]}', no quaternion; try {form}")
+    if _W_FIRST.search(_text(file, "trajectory")):
+        values[:, 3:] = np.roll(values[:, 3:], -1, axis=1)
     found = {}
     for index, time_s in enumerate(wanted_s):
         nearest = int(np.abs(times_s - time_s).argmin()) if len(times_s) else 0

@@ -25,6 +25,7 @@ _COLMAP_NUMBERS = {"PINHOLE": 4, "OPENCV": 8, "FULL_OPENCV": 12, "OPENCV_FISHEYE
 """Number of parameters after the image size."""
 _FISHEYE = re.compile(r"\bequidistant\b|\bOPENCV_FISHEYE\b|^fisheye_model:\s*1", re.MULTILINE)
 _KALIBR = re.compile(r"^\s+(intrinsics|distortion_coeffs|resolution):\s*\[([^\]]*)\]", re.MULTILINE)
+_KALIBR_CAMERA = re.compile(r"^cam\d+:", re.MULTILINE)
 _MATLAB = re.compile(
     r"^\s*(FocalLength|PrincipalPoint|ImageSize|RadialDistortion|TangentialDistortion)\s*[:=]\s*\[([^\]]*)\]",
     re.MULTILINE,
@@ -182,45 +183,63 @@ def is_fisheye(text: str, model: str) -> bool:
     return is_fisheye_name(model) or _FISHEYE.search(text) is not None
 
 
-def camera_in(text: str) -> CameraIntrinsics | None:
-    """Read a COLMAP, Kalibr or MATLAB camera; returns None if the text is none of these."""
+def camera_in(path: AnyPath, text: str, size_px: tuple[int, int] | None) -> CameraIntrinsics | None:
+    """Read a COLMAP, Kalibr or MATLAB camera; returns None if the text is none of these.
+
+    Raises:
+        InputError: several different cameras in the file have images of the size ``size_px``.
+        ValueError: numbers are missing.
+    """
     for read in (_from_colmap, _from_kalibr, _from_matlab):
-        camera = read(text)
-        if camera is not None:
-            return camera
+        cameras = read(text)
+        fitting = [camera for camera in cameras if (camera.width_px, camera.height_px) == size_px]
+        if any(not _same(camera, fitting[0]) for camera in fitting):
+            raise InputError(
+                f"The intrinsics file {path} has {len(fitting)} cameras for images of "
+                f"{fitting[0].width_px} x {fitting[0].height_px} pixels; try a file with only the camera of "
+                "these images"
+            )
+        if cameras:
+            return (fitting or cameras)[0]
     return None
 
 
-def _from_colmap(text: str) -> CameraIntrinsics | None:
-    found = _COLMAP.search(text)
-    if found is None:
-        return None
-    width, height, *numbers = (float(word) for word in found[2].split())
-    if len(numbers) != _COLMAP_NUMBERS[found[1]]:
-        raise ValueError
-    fx, fy, cx, cy, *lens = numbers
-    return _camera((fx, fy, cx - COLMAP_MIDDLE, cy - COLMAP_MIDDLE), lens, width, height)
+def _same(one: CameraIntrinsics, other: CameraIntrinsics) -> bool:
+    return np.array_equal(one.matrix, other.matrix) and np.array_equal(one.distortion, other.distortion)
 
 
-def _from_kalibr(text: str) -> CameraIntrinsics | None:
-    found = {name: _numbers(words) for name, words in reversed(_KALIBR.findall(text))}
-    if not {"intrinsics", "resolution"} <= found.keys():
-        return None
-    width, height = found["resolution"]
-    return _camera(found["intrinsics"], found.get("distortion_coeffs", []), width, height)
+def _from_colmap(text: str) -> list[CameraIntrinsics]:
+    cameras = []
+    for model, words in _COLMAP.findall(text):
+        width, height, *numbers = (float(word) for word in words.split())
+        if len(numbers) != _COLMAP_NUMBERS[model]:
+            raise ValueError
+        fx, fy, cx, cy, *lens = numbers
+        cameras.append(_camera((fx, fy, cx - COLMAP_MIDDLE, cy - COLMAP_MIDDLE), lens, width, height))
+    return cameras
 
 
-def _from_matlab(text: str) -> CameraIntrinsics | None:
+def _from_kalibr(text: str) -> list[CameraIntrinsics]:
+    cameras = []
+    for part in _KALIBR_CAMERA.split(text):
+        found = {name: _numbers(words) for name, words in _KALIBR.findall(part)}
+        if {"intrinsics", "resolution"} <= found.keys():
+            width, height = found["resolution"]
+            cameras.append(_camera(found["intrinsics"], found.get("distortion_coeffs", []), width, height))
+    return cameras
+
+
+def _from_matlab(text: str) -> list[CameraIntrinsics]:
     found = {name: _numbers(words) for name, words in _MATLAB.findall(text)}
     if not {"FocalLength", "PrincipalPoint", "ImageSize"} <= found.keys():
-        return None
+        return []
     if "Distortion" in text and not {"RadialDistortion", "TangentialDistortion"} <= found.keys():
-        return None  # the file is truncated
+        return []  # the file is truncated
     k1, k2, k3 = (*found.get("RadialDistortion", []), 0.0, 0.0, 0.0)[:3]
     p1, p2 = (*found.get("TangentialDistortion", []), 0.0, 0.0)[:2]
     cx, cy = (value - MATLAB_MIDDLE for value in found["PrincipalPoint"])
     height, width = found["ImageSize"]
-    return _camera((*found["FocalLength"], cx, cy), [k1, k2, p1, p2, k3], width, height)
+    return [_camera((*found["FocalLength"], cx, cy), [k1, k2, p1, p2, k3], width, height)]
 
 
 def _camera(

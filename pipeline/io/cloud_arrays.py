@@ -6,6 +6,7 @@ import logging
 from pathlib import PurePath
 
 import numpy as np
+from scipy.stats import ks_2samp
 
 from packetmesh.errors import InputError
 from pipeline.io.cloud_columns import say_columns, table_named, table_of_columns
@@ -20,12 +21,18 @@ _KITTI, _NUSCENES = 4, 5
 """Numbers of a point: x, y, z, reflectance; or x, y, z, intensity, index of the laser's ring."""
 _MOST_RINGS = 128
 _LARGEST_INTENSITY = 255.0
-FARTHEST_M = 1e5
-"""Largest plausible coordinate of a sweep; larger numbers mean that the file is something else."""
+FARTHEST_M, NEAREST_M = 1e5, 1e-30
+"""Largest plausible coordinate of a sweep, and the least: labels read as floats are smaller."""
+_WIDEST = 50
+"""An array of few rows that are longer than this has a point in each column."""
+_MIXED = 0.1
+"""Two columns are alike if their distribution functions differ by less."""
+_LEAST_ROWS = 200
+"""Fewer rows do not show whether columns are alike."""
 
 
 def parse_npy(path: AnyPath, data: bytes, layout: Layout) -> np.ndarray:
-    """Read an array (N, 3 or more); columns after the third are interpreted as in text files.
+    """Read an array (N, 3 or more), or one with named fields; columns are interpreted as in text files.
 
     Raises:
         InputError: the file is damaged, not such an array of numbers, or its columns are in doubt.
@@ -37,6 +44,14 @@ def parse_npy(path: AnyPath, data: bytes, layout: Layout) -> np.ndarray:
             f"The point cloud {path} is a truncated or damaged array, or holds more than numbers; "
             "try numpy.save(file, points)"
         ) from None
+    if array.dtype.names and array.ndim == 1 and layout.columns is None:
+        check_count(path, len(array))
+        return array
+    if array.ndim == 2 and array.shape[0] in (3, 4, 6) and array.shape[1] > _WIDEST:
+        raise InputError(
+            f"The array in {path} has {array.shape[0]} rows of {array.shape[1]} numbers, and each row should "
+            "be a point; try numpy.save(file, points.T)"
+        )
     if array.ndim != 2 or array.shape[1] < 3 or array.dtype.kind not in "fiu":
         raise InputError(
             f"The array in {path} is {array.dtype} of shape {array.shape}; try N x 3 numbers, or N x 6 with "
@@ -84,12 +99,18 @@ def _width(path: AnyPath, data: bytes) -> int:
     named_nuscenes = str(path).lower().endswith(".pcd.bin") or PurePath(path).name.startswith("LIDAR_TOP")
     if named_nuscenes and _NUSCENES in fits:
         return _NUSCENES
+    _check_positions(path, _rows(path, data, fits[0])[:, :3])
+    fits = [width for width in fits if not _mixed(_rows(path, data, width))]
+    if not fits:
+        raise InputError(
+            f"The numbers in {path} are no rows of x, y, z, reflectance (KITTI), and no rows of five numbers "
+            "(nuScenes); try --columns with a name for each number of a point, such as x,y,z or x,y,z,i,_,_"
+        )
     plausible = [width for width in fits if _plausible(_rows(path, data, width))]
     if fits == [_KITTI] and not named_nuscenes:
         return _KITTI
     if len(plausible) == 1:
         return plausible[0]
-    _check_positions(path, _rows(path, data, fits[0])[:, :3])
     raise InputError(
         f"The sweep {path} may have four numbers a point, as in KITTI, or five, as in nuScenes; try "
         "--columns x,y,z,i or --columns x,y,z,i,_, whichever is right"
@@ -105,6 +126,13 @@ def _plausible(rows: FloatArray) -> bool:
             ring = rows[:, 4]
             fine = bool(np.all((ring >= 0.0) & (ring < _MOST_RINGS) & (ring == np.rint(ring))))
     return fine
+
+
+def _mixed(rows: FloatArray) -> bool:
+    """Return whether columns two apart are alike, as if rows of another width were read."""
+    if len(rows) < _LEAST_ROWS:
+        return False
+    return all(ks_2samp(rows[:, k], rows[:, k + 2], method="asymp").statistic < _MIXED for k in (0, 1))
 
 
 def _rows(path: AnyPath, data: bytes, width: int) -> FloatArray:
@@ -124,8 +152,11 @@ def _rows(path: AnyPath, data: bytes, width: int) -> FloatArray:
 
 
 def _check_positions(path: AnyPath, points: FloatArray) -> None:
-    """Raise an InputError if a coordinate is beyond ``FARTHEST_M`` everywhere, or all numbers are zero."""
-    if not points.any() or not (np.abs(np.nan_to_num(points, nan=np.inf)) < FARTHEST_M).any(axis=0).all():
+    """Raise an InputError if a coordinate is beyond ``FARTHEST_M`` everywhere, or all are about zero."""
+    if (
+        not (np.abs(points) > NEAREST_M).any()
+        or not (np.abs(np.nan_to_num(points, nan=np.inf)) < FARTHEST_M).any(axis=0).all()
+    ):
         raise InputError(
             f"The numbers in {path} are no positions; a .bin file is read as a sweep of KITTI or nuScenes"
         )

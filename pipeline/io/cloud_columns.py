@@ -70,23 +70,29 @@ def checked_width(path: AnyPath, names: Sequence[str], width: int) -> tuple[str,
     return (*names, *([UNUSED] * (width - len(names))))
 
 
-def guessed_columns(path: AnyPath, rows: FloatArray) -> tuple[str, ...]:
+def guessed_columns(path: AnyPath, rows: FloatArray, places: Sequence[int] | None = None) -> tuple[str, ...]:
     """Return the fields of (N, W) numbers without names, guessed from their values.
 
     The first three columns are the position. Three columns of vectors of length one are normals, three
     columns of whole numbers up to 255 colours.
 
+    Args:
+        path: the file.
+        rows: (N, W) numbers.
+        places: (W,) positions of these columns in the file, if it has other columns too.
+
     Raises:
         InputError: the numbers may mean different things.
     """
     width = rows.shape[1]
+    places = range(width) if places is None else places
     normal = next((k for k in range(3, width - 2) if _unit_vectors(rows[:, k : k + 3])), None)
     others = [k for k in range(3, width) if normal is None or not normal <= k < normal + 3]
-    _check_position(path, rows, others)
+    _check_position(path, rows, others, places)
     names = [*POSITION, *([UNUSED] * (width - 3))]
     if normal is not None:
         names[normal : normal + 3] = NORMAL
-    color = _colors_at(path, rows, others)
+    color = _colors_at(path, rows, others, places)
     if color is not None:
         names[color : color + 3] = COLOR
     return tuple(names)
@@ -141,7 +147,9 @@ def table_named(rows: FloatArray, names: Sequence[str]) -> np.ndarray:
     return table
 
 
-def check_degrees(path: AnyPath, points: FloatArray) -> None:
+def check_degrees(
+    path: AnyPath, points: FloatArray, option: str = "--columns x,y,z if they are metres"
+) -> None:
     """Raise an InputError if x and y of (N, 3) points look like latitude and longitude."""
     finite = points[np.isfinite(points).all(axis=1)]
     if len(finite) < _TIME_ROWS:
@@ -151,8 +159,8 @@ def check_degrees(path: AnyPath, points: FloatArray) -> None:
     on_earth = bool((np.abs(finite[:, :2]) <= 180.0).all()) and float(np.abs(finite[:, :2]).max()) > 1.0
     if on_earth and 0.0 < across < _LARGEST_DEGREES and up > _UPRIGHT * across:
         raise InputError(
-            f"The first two columns of {path} look like latitude and longitude in degrees, which are no "
-            "lengths; try to export it in metres (UTM), or --columns x,y,z if they are metres"
+            f"The first two coordinates in {path} look like latitude and longitude in degrees, which are no "
+            f"lengths; try to export it in metres (UTM), or {option}"
         )
 
 
@@ -164,7 +172,7 @@ def _whole(column: FloatArray) -> bool:
     return bool(np.all(column == np.rint(column)))
 
 
-def _check_position(path: AnyPath, rows: FloatArray, others: list[int]) -> None:
+def _check_position(path: AnyPath, rows: FloatArray, others: list[int], places: Sequence[int]) -> None:
     """Raise an InputError if the first three of more columns may not be the position."""
     if not others:
         check_degrees(path, rows[:, :3])
@@ -172,31 +180,37 @@ def _check_position(path: AnyPath, rows: FloatArray, others: list[int]) -> None:
     first = rows[:, 0]
     rises = len(first) >= _TIME_ROWS and bool(np.all(np.diff(first) >= 0.0))
     if rises and len(np.unique(first)) > _TIME_SHARE * len(first):
-        raise _doubt(path, rows.shape[1], "the first rises from line to line like a time", 1)
+        raise _doubt(path, places, f"column {places[0] + 1} rises from line to line like a time", 1)
     if np.median(np.abs(first)) > _FARTHEST_ON_EARTH:
-        raise _doubt(path, rows.shape[1], "the first is too large for a position", 1)
+        raise _doubt(path, places, f"column {places[0] + 1} is too large for a position", 1)
     fractional = [k for k in range(3 + len(others)) if k < rows.shape[1] and not _whole(rows[:, k])]
     for count in (1, 2):
         leading = all(_whole(rows[:, k]) for k in range(count))
         following = [k for k in range(count, count + 3) if k in fractional and (k < 3 or k in others)]
         if leading and len(following) == 3:
-            what = "first is" if count == 1 else "first two are"
-            raise _doubt(
-                path, rows.shape[1], f"the {what} whole numbers like a row or ring, others not", count
-            )
+            what = f"{_places(places[:count], None)} {'has' if count == 1 else 'have'}"
+            raise _doubt(path, places, f"{what} whole numbers like a row or ring, others not", count)
     check_degrees(path, rows[:, :3])
 
 
-def _doubt(path: AnyPath, width: int, why: str, before: int) -> InputError:
-    names = checked_width(path, [*([UNUSED] * before), *POSITION], max(width, before + 3))
-    plain = checked_width(path, POSITION, width)
+def _doubt(path: AnyPath, places: Sequence[int], why: str, before: int) -> InputError:
+    """Return the error for a position that may begin ``before`` columns later."""
+    later = _option([*([UNUSED] * before), *POSITION], places)
     return InputError(
-        f"The point cloud {path} does not say what its {width} columns are, and {why}; try --columns "
-        f"{','.join(names)} or --columns {','.join(plain)}, whichever is right"
+        f"The point cloud {path} does not say what its columns are, and {why}; try --columns {later} or "
+        f"--columns {_option(POSITION, places)}, whichever is right"
     )
 
 
-def _colors_at(path: AnyPath, rows: FloatArray, others: list[int]) -> int | None:
+def _option(names: Sequence[str], places: Sequence[int]) -> str:
+    """Return the value of --columns for names of the columns at some places of the file."""
+    columns = [UNUSED] * (places[-1] + 1)
+    for name, place in zip(names, places, strict=False):
+        columns[place] = name
+    return ",".join(columns)
+
+
+def _colors_at(path: AnyPath, rows: FloatArray, others: list[int], places: Sequence[int]) -> int | None:
     """Return the first of the three columns that are colours.
 
     Raises:
@@ -219,7 +233,7 @@ def _colors_at(path: AnyPath, rows: FloatArray, others: list[int]) -> int | None
             order[:3], order[start : start + 3] = POSITION, "rgb"
         raise InputError(
             f"The point cloud {path} has more than three adjacent columns that may be colours; try --columns "
-            f"{','.join(orders[0])} or --columns {','.join(orders[1])}, whichever is right"
+            f"{_option(orders[0], places)} or --columns {_option(orders[1], places)}, whichever is right"
         )
     return best
 

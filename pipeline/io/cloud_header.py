@@ -6,6 +6,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.lib.recfunctions import rename_fields
+
 from packetmesh.errors import InputError
 from pipeline.io.cloud_columns import UNUSED
 from pipeline.io.cloud_table import COLOR, NORMAL, POSITION
@@ -44,12 +47,14 @@ def _aliases() -> dict[str, str]:
             letter,
             name,
             f"{letter}f",
+            f"diffuse{name}",
             *(f"{c}{n}" for c in ("color", "colour") for n in (letter, name)),
         ):
             found[word] = COLOR[channel]
-    found |= dict.fromkeys(("east", "easting", "eastings"), "x")
-    found |= dict.fromkeys(("north", "northing", "northings"), "y")
-    return found | dict.fromkeys(("elevation", "elev", "height", "altitude"), "z")
+    found |= dict.fromkeys(("east", "easting", "eastings", "rechtswert"), "x")
+    found |= dict.fromkeys(("north", "northing", "northings", "hochwert"), "y")
+    found |= dict.fromkeys(("elevation", "elev", "height", "altitude", "höhe", "hoehe"), "z")
+    return found | {"rot": "red", "grün": "green", "gruen": "green", "blau": "blue"}
 
 
 _ALIASES = _aliases()
@@ -99,6 +104,17 @@ def header_of(path: AnyPath, titles: Sequence[str]) -> Header | None:
     whole = {name for group in (POSITION, NORMAL, COLOR) if set(group) <= set(names) for name in group}
     metres = _unit(path, [(titles[k], units[k][1]) for k in map(names.index, POSITION)])
     return Header(tuple(titles), tuple(name if name in whole else UNUSED for name in names), metres)
+
+
+def with_plain_names(table: np.ndarray) -> np.ndarray:
+    """Return a structured array with PLY's names for fields of other names: X, n_x, diffuse_red."""
+    names = table.dtype.names or ()
+    plain = {name: name for name in names}
+    for group in (POSITION, NORMAL, COLOR):
+        others = [[name for name in names if _field(name) == field] for field in group]
+        if not set(group) & set(names) and all(len(same) == 1 for same in others):
+            plain |= {same[0]: field for same, field in zip(others, group, strict=True)}
+    return rename_fields(table, plain)
 
 
 def no_position(path: AnyPath, titles: Sequence[str]) -> InputError:

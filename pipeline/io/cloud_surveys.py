@@ -10,7 +10,8 @@ from types import ModuleType
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.io.cloud_table import COLOR, POSITION, check_count, truncated
+from pipeline.io.cloud_las_units import metres_per_axis
+from pipeline.io.cloud_table import COLOR, POSITION, Layout, check_count, truncated
 from pipeline.types import AnyPath
 
 _E57_POSITION = ("cartesianX", "cartesianY", "cartesianZ")
@@ -18,11 +19,14 @@ _E57_COLORS = ("colorRed", "colorGreen", "colorBlue")
 _DAMAGED = "The point cloud {} is truncated or damaged; try to copy or export it again"
 
 
-def parse_las(path: AnyPath, data: bytes) -> np.ndarray:
-    """Read the points of a LAS or LAZ file; 16-bit colours are reduced to 8 bits.
+def parse_las(path: AnyPath, data: bytes, layout: Layout) -> np.ndarray:
+    """Read the points of a LAS or LAZ file; 16-bit colours are reduced to 8 bits, all-black ones left out.
+
+    Positions are converted to metres if the file's coordinate system has another unit, unless
+    ``layout.header_unit`` is False.
 
     Raises:
-        InputError: the extra is not installed, or the file is damaged.
+        InputError: the extra is not installed, the file is damaged, or its coordinates are degrees.
     """
     laspy = _library("laspy", path)
     if not _las_records_fit(data):
@@ -31,6 +35,7 @@ def parse_las(path: AnyPath, data: bytes) -> np.ndarray:
         with laspy.open(io.BytesIO(data)) as reader:
             check_count(path, reader.header.point_count)
             points, count = reader.read(), reader.header.point_count
+            records = [*reader.header.vlrs, *(reader.evlrs or ())]
         if len(points) < count:  # laspy returns the points of a truncated file without an error
             raise truncated(path, len(points), count)
         xyz = np.stack([np.asarray(points[name], np.float64) for name in ("x", "y", "z")], axis=1)
@@ -42,6 +47,10 @@ def parse_las(path: AnyPath, data: bytes) -> np.ndarray:
         raise
     except Exception:  # a parser fails on damaged data in more ways than can be listed
         raise InputError(_DAMAGED.format(path)) from None
+    if layout.header_unit:
+        xyz *= metres_per_axis(path, records)
+    if rgb is not None and not rgb.any():
+        rgb = None
     if rgb is not None and rgb.max(initial=0) > 255:
         rgb = rgb >> 8
     return _table(xyz, rgb)

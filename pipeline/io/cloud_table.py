@@ -27,7 +27,7 @@ class Layout:
     columns: tuple[str, ...] | None = None
     """Field of each column (``parse_columns``); None finds them in the file."""
     header_unit: bool = True
-    """Whether positions are converted to metres if the titles of the columns name another unit."""
+    """Whether positions are converted to metres if the file names another unit."""
 
 
 def cloud_of(path: AnyPath, table: np.ndarray) -> PointCloud:

@@ -32,6 +32,11 @@ _COMMENTS = ("#", "//", "%")
 _HEADER_LINES = 50
 """Lines without numbers that may be above the table."""
 _SEPARATORS = re.compile(r"[\s,;|\"]+")
+_FORTRAN = re.compile(r"(?<=\d)[dD](?=[-+]\d\d)")
+_BRACKETS = "[](){}"
+"""Marks around the numbers of a point, as Python and NumPy print them."""
+_COLMAP = "POINT3D_ID, X, Y, Z, R, G, B"
+"""Comment above points3D.txt of COLMAP, whose lines end with a list of any length."""
 _NOT_A_NUMBER = (
     "",
     "nan",
@@ -78,7 +83,7 @@ def parse_text(path: AnyPath, data: bytes, layout: Layout) -> np.ndarray:
         InputError: the file is not such text, its lines differ in length, its columns or decimal marks are
             in doubt, or there are too many points.
     """
-    lines = _lines_of(path, _without_groups(_decoded(path, data)))
+    lines = _lines_of(path, _plain_numbers(_decoded(path, data)))
     if not lines.numbers:
         raise InputError(f"The point cloud {path} has no lines of three numbers or more; try another file")
     check_count(path, len(lines.numbers))
@@ -86,6 +91,10 @@ def parse_text(path: AnyPath, data: bytes, layout: Layout) -> np.ndarray:
     width = len(dialect.cells(lines.numbers[:1])[0])
     if width > MOST_COLUMNS:
         raise InputError(f"The point cloud {path} has {width} columns; try one with a point on each line")
+    if layout.columns is None and any(line.startswith(_COLMAP) for line in lines.comments):
+        names = (UNUSED, *POSITION, *COLOR)
+        say_columns(path, (*names, UNUSED), [*_COLMAP.split(", "), "the list of observations"])
+        return _table(path, lines.numbers, dialect, names, more=True)
     if layout.columns is not None:
         checked_width(path, layout.columns, width)
         return _table(path, lines.numbers, dialect, layout.columns, more=True)
@@ -120,8 +129,12 @@ def _decoded(path: AnyPath, data: bytes) -> str:
     raise InputError(f"The point cloud {path} is not a text file; try to export it as PLY")
 
 
-def _without_groups(text: str) -> str:
-    """Remove apostrophes and, where blanks do not separate, no-break spaces that mark thousands."""
+def _plain_numbers(text: str) -> str:
+    """Write Fortran's exponents (1.0D+02) with e; remove apostrophes and no-break spaces that mark thousands.
+
+    No-break spaces count as such marks only where blanks do not separate the numbers.
+    """
+    text = _FORTRAN.sub("e", text)
     marks = "'\u2019" + ("\u00a0\u202f" if ";" in text or "\t" in text else "")
     if not any(mark in text for mark in marks):
         return text
@@ -136,6 +149,8 @@ def _lines_of(path: AnyPath, text: str) -> _Lines:
     left: int | None = None  # lines of numbers that the last count still promises
     for line in text.splitlines():
         plain = line.strip()
+        if plain.startswith(tuple(_BRACKETS)) and _has_numbers(inside := plain.strip(_BRACKETS + ", ")):
+            plain = line = inside
         if not plain:
             continue
         if plain.startswith(_COMMENTS):
@@ -229,7 +244,7 @@ def _guessed(path: AnyPath, lines: _Lines, dialect: Dialect, width: int) -> np.n
             f"The point cloud {path} has {width} columns, and a PTS file has 3, 4, 6 or 7; try --columns "
             "x,y,z,_ with a name for each column"
         )
-    found = _PTS[width] if pts and width in _PTS else guessed_columns(path, rows)
+    found = _PTS[width] if pts and width in _PTS else guessed_columns(path, rows, places)
     names = [UNUSED] * width
     for place, name in zip(places, found, strict=True):
         names[place] = name

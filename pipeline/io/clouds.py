@@ -10,7 +10,8 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_GEOMETRY_BYTES, atomic_path, read_bytes
 from pipeline.io.cloud_arrays import parse_npy, parse_sweep
-from pipeline.io.cloud_columns import parse_columns
+from pipeline.io.cloud_columns import check_degrees, parse_columns
+from pipeline.io.cloud_header import with_plain_names
 from pipeline.io.cloud_models import parse_model
 from pipeline.io.cloud_npz import parse_npz
 from pipeline.io.cloud_pcd import parse_pcd
@@ -22,27 +23,34 @@ from pipeline.io.cloud_text import parse_text
 from pipeline.io.cloud_vtk import parse_vtk
 from pipeline.types import AnyPath, PointCloud
 
-_PARSERS: dict[str, Callable[[AnyPath, bytes], np.ndarray]] = {
-    ".ply": parse_ply,
-    ".pcd": parse_pcd,
-    ".npz": parse_npz,
-    ".vtk": parse_vtk,
-    **dict.fromkeys((".obj", ".stl", ".glb"), parse_model),
+_Parser = Callable[[AnyPath, bytes, Layout], np.ndarray]
+
+
+def _self_named(parse: Callable[[AnyPath, bytes], np.ndarray]) -> _Parser:
+    """Return a parser of a format that names its columns and has no unit."""
+    return lambda path, data, layout: parse(path, data)
+
+
+_PARSERS: dict[str, _Parser] = {
+    ".ply": _self_named(parse_ply),
+    ".pcd": _self_named(parse_pcd),
+    ".npz": _self_named(parse_npz),
+    ".vtk": _self_named(parse_vtk),
+    **dict.fromkeys((".obj", ".stl", ".glb"), _self_named(parse_model)),
     **dict.fromkeys((".las", ".laz"), parse_las),
-    ".e57": parse_e57,
-}
-"""Parsers by suffix. A new format is a file with a parser that returns a table, and a line here."""
-_TABLE_PARSERS: dict[str, Callable[[AnyPath, bytes, Layout], np.ndarray]] = {
+    ".e57": _self_named(parse_e57),
     ".npy": parse_npy,
     **dict.fromkeys((".xyz", ".txt", ".asc", ".csv", ".pts"), parse_text),
     ".bin": parse_sweep,
 }
-"""Parsers of tables whose columns a user can name."""
+"""Parsers by suffix. A new format is a file with a parser that returns a table, and a line here."""
+_COLUMNED = (".npy", ".xyz", ".txt", ".asc", ".csv", ".pts", ".bin")
+"""Formats whose columns a user can name."""
 
 
 def takes_columns(path: AnyPath) -> bool:
     """Return whether the columns of such a file can be named by a user."""
-    return PurePath(path).suffix.lower() in _TABLE_PARSERS
+    return PurePath(path).suffix.lower() in _COLUMNED
 
 
 def read_cloud(path: AnyPath, columns: str | None = None, header_unit: bool = True) -> PointCloud:
@@ -56,7 +64,8 @@ def read_cloud(path: AnyPath, columns: str | None = None, header_unit: bool = Tr
         path: the file.
         columns: columns of text, .npy and .bin files, such as ``x,y,z,_,r,g,b`` (``parse_columns``); without
             it they are found in the file, and what is not plain is logged.
-        header_unit: whether positions are converted to metres if the titles of the columns name another unit.
+        header_unit: whether positions are converted to metres if the titles of the columns, or the coordinate
+            system of a LAS file, have another unit.
 
     Returns:
         (N, 3) points in the file's unit, which should be metres.
@@ -70,16 +79,17 @@ def read_cloud(path: AnyPath, columns: str | None = None, header_unit: bool = Tr
     [0.5, 0.0, 1.0]
     """
     suffix = PurePath(path).suffix.lower() or ".ply"
-    if suffix not in _PARSERS and suffix not in _TABLE_PARSERS:
-        known = ", ".join((*_PARSERS, *_TABLE_PARSERS))
+    if suffix not in _PARSERS:
+        known = ", ".join(_PARSERS)
         raise InputError(f"The point cloud {path} is of a kind that is not read; try one of {known}")
     layout = Layout(None if columns is None else parse_columns(columns), header_unit)
     if columns is not None and not takes_columns(path):
         raise InputError(f"The point cloud {path} names its columns itself; try it without --columns")
     data = read_bytes(path, MAX_GEOMETRY_BYTES, "point cloud")
-    if takes_columns(path):
-        return cloud_of(path, _TABLE_PARSERS[suffix](path, data, layout))
-    return cloud_of(path, _PARSERS[suffix](path, data))
+    cloud = cloud_of(path, with_plain_names(_PARSERS[suffix](path, data, layout)))
+    if header_unit and not takes_columns(path):
+        check_degrees(path, cloud.points_m, "--metres-per-unit if they are lengths")
+    return cloud
 
 
 def write_cloud(path: AnyPath, cloud: PointCloud) -> None:

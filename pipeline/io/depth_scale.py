@@ -67,6 +67,12 @@ def doubts(values: NDArray[Any], depth_scale: float, stated: bool) -> tuple[str,
             f"The median depth is {median_m:.3g} m at {depth_scale:g} units in a metre; no room is like "
             f"that: {_try(median_m * depth_scale)}"
         )
+    far = float(np.mean(known / depth_scale > FARTHEST_M))
+    if far > MOST_FAR_SHARE and median_m <= ROOM_M[1]:
+        found.append(
+            f"{far:.1%} of the depth values are farther than {FARTHEST_M:.0f} m, up to "
+            f"{float(known.max()) / depth_scale:.3g} m; if nothing was seen there, try 0 in their place"
+        )
     empty = float(np.mean(values == NO_VALUE)) if values.dtype.kind in "iu" else 0.0
     if empty:
         found.append(f"{empty:.1%} of the depth values are {NO_VALUE}, which is read as unknown")
@@ -99,9 +105,11 @@ def check_median(path: AnyPath, values: NDArray[Any], depth_scale: float) -> Non
             f"{depth_scale:g} units in a metre; {_try(median_units)}"
         )
     if np.mean(known / depth_scale > FARTHEST_FLOAT_M) > MOST_FAR_SHARE:
+        share = np.mean(known / depth_scale > FARTHEST_FLOAT_M)
         raise InputError(
-            f"The numbers in the depth image {path} are no depths, as if their bytes were in another order; "
-            "try to export it again"
+            f"Of the numbers in the depth image {path}, {share:.0%} are beyond {FARTHEST_FLOAT_M / 1000:g} "
+            "km, as where nothing was seen, or where bytes are in another order; try 0 where there is no "
+            "depth, or to export it again"
         )
 
 

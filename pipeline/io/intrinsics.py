@@ -12,6 +12,7 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, json_object, read_text
 from pipeline.io.camera_files import camera_in, is_fisheye
+from pipeline.io.camera_keys import camera_of_keys
 from pipeline.io.lenses import FISHEYE, KNOWN, is_known, lens_of
 from pipeline.types import AnyPath, CameraIntrinsics, FloatArray
 
@@ -21,8 +22,9 @@ MOST_DISTORTION = 1e4
 _YAML_ENTRY = re.compile(r"^([ \t]*)(\w+):(.*(?:\n(?![ \t]*\w+:).*)*)", re.MULTILINE)
 _MODEL = re.compile(r"^[ \t]+distortion_model:\s*[\"']?(\w+)", re.MULTILINE)
 """Kalibr's distortion model, which is that of one of several cameras."""
-_SIZES = {"width", "height", "image_width", "image_height"}
 _LIST = re.compile(r"\[[^\]]*\]")
+_LIST_ITEM = re.compile(r"\s*-(\s|$)")
+"""The first item of a block list, in contrast to a negative number."""
 _WORDS = re.compile(r"\s*[^\s#%.-]")
 """A line that is neither empty nor a comment, a list item or the end of a document."""
 _BETWEEN = re.compile(r"[,;\[\]()]")
@@ -33,9 +35,8 @@ _NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?(?
 def read_intrinsics(path: AnyPath, size_px: tuple[int, int] | None = None) -> CameraIntrinsics:
     """Read intrinsics from JSON, YAML or text.
 
-    Formats: ``width height fx fy cx cy [distortion]``; Open3D's column-major ``intrinsic_matrix``;
-    ROS's camera_info (``K``, ``D``) or the calibration file of OpenCV and ROS (``camera_matrix``,
-    ``distortion_coefficients``); files of COLMAP, Kalibr and MATLAB (``pipeline.io.camera_files``); or a
+    Formats: JSON and YAML with the keys of ``pipeline.io.camera_keys``: those of Open3D, ROS's camera_info,
+    OpenCV, the RealSense SDK and nerfstudio; files of COLMAP, Kalibr and MATLAB (``camera_files``); or a
     bare matrix, 3 x 3 or 4 x 4 numbers, if the image size is known. Lenses: all of ``CameraIntrinsics``.
 
     Args:
@@ -52,26 +53,35 @@ def read_intrinsics(path: AnyPath, size_px: tuple[int, int] | None = None) -> Ca
     is_json = text.lstrip().startswith("{")
     try:
         values = json_object(text, path, "intrinsics file") if is_json else _parse_yaml(text)
-        camera = _from_keys(values, size_px) or camera_in(text)
+        model = _model_in(values, text)
+        camera = camera_of_keys(path, values, size_px, model == FISHEYE) or camera_in(path, text, size_px)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError):
         camera = None
     if camera is None:
         raise InputError(
             f"The intrinsics file {path} is of no known style; try JSON with width, height, fx, fy, cx and cy"
         )
-    camera = _with_lens(path, camera, text, str(values.get("distortion_model", "")))
+    camera = _with_lens(path, camera, model)
     check_camera(f"The intrinsics file {path}", camera)
     return camera
 
 
-def _with_lens(path: AnyPath, camera: CameraIntrinsics, text: str, model: str) -> CameraIntrinsics:
+def _model_in(values: dict[str, Any], text: str) -> str:
+    """Return the file's name of the distortion model, FISHEYE for all names of a fisheye; empty without one.
+
+    ``model`` is its key in files of the RealSense SDK, next to ``coeffs``.
+    """
+    named = _MODEL.search(text)
+    model = str(values.get("distortion_model") or (values.get("model", "") if "coeffs" in values else ""))
+    return FISHEYE if is_fisheye(text, model) else model or (named[1] if named else "")
+
+
+def _with_lens(path: AnyPath, camera: CameraIntrinsics, model: str) -> CameraIntrinsics:
     """Return the camera with the lens that its file names, or that its number of coefficients tells.
 
     Raises:
         InputError: the lens is not supported.
     """
-    named = _MODEL.search(text)
-    model = FISHEYE if is_fisheye(text, model) else model or (named[1] if named else "")
     lens = lens_of(model, camera.distortion)
     if lens is None:
         count = f"of {len(camera.distortion)} coefficients" if is_known(model) else ""
@@ -107,8 +117,7 @@ def _in_matrix(path: AnyPath, numbers: FloatArray, size_px: tuple[int, int] | No
             f"The intrinsics file {path} is a bare matrix and does not say for which size; try JSON with "
             "width, height, fx, fy, cx and cy"
         )
-    fx, fy, cx, cy = matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
-    camera = CameraIntrinsics.pinhole(fx, fy, cx, cy, *size_px)
+    camera = CameraIntrinsics(matrix.copy(), np.zeros(5), *size_px)
     check_camera(f"The intrinsics file {path}", camera)
     return camera
 
@@ -146,7 +155,7 @@ def _parse_yaml(text: str) -> dict[str, Any]:
     parent = ""
     for indent, key, body in _YAML_ENTRY.findall(text):
         numbers = [float(number) for number in _NUMBER.findall(body)]
-        is_list = "[" in body or body.lstrip().startswith("-")
+        is_list = "[" in body or _LIST_ITEM.match(body) is not None
         if any(_WORDS.match(line) for line in _LIST.sub("", body).splitlines()[1:]):
             raise ValueError
         value = numbers if is_list else numbers[0] if numbers else body.strip().strip("\"'")
@@ -156,50 +165,6 @@ def _parse_yaml(text: str) -> dict[str, Any]:
             parent = key
             values[key] = value if body.strip() and "!!" not in body else {}
     return values
-
-
-def _from_keys(values: dict[str, Any], size_px: tuple[int, int] | None) -> CameraIntrinsics | None:
-    """Return the camera with all its distortion coefficients, at least five; None for an unknown format.
-
-    Its images have the size ``size_px`` if the file does not give one.
-
-    Raises:
-        KeyError, TypeError, ValueError, OverflowError: a value is missing or invalid.
-    """
-    if "intrinsic_matrix" in values:
-        matrix = np.array(values["intrinsic_matrix"], dtype=np.float64).reshape(3, 3).T
-        distortion: Any = []
-    elif "camera_matrix" in values or "K" in values or "k" in values:
-        rows = _first(values, "camera_matrix", "K", "k")
-        matrix = np.array(_data(rows), dtype=np.float64).reshape(3, 3)
-        distortion = _first(values, "distortion_coefficients", "D", "d")
-    elif "fx" in values:
-        fx, fy, cx, cy = (float(values[key]) for key in ("fx", "fy", "cx", "cy"))
-        matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
-        distortion = _first(values, "distortion")
-    else:
-        return None
-    coefficients = np.array([] if distortion is None else _data(distortion), dtype=np.float64).reshape(-1)
-    coefficients = np.pad(coefficients, (0, max(0, 5 - len(coefficients))))
-    if size_px is not None and not _SIZES & values.keys():
-        width, height = size_px
-    else:
-        width, height = (values.get(f"image_{key}") or values[key] for key in ("width", "height"))
-    return CameraIntrinsics(matrix, coefficients, int(width), int(height))
-
-
-def _first(values: dict[str, Any], *keys: str) -> Any:
-    return next((values[key] for key in keys if values.get(key) is not None), None)
-
-
-def _data(value: Any) -> Any:
-    """Return a list, or the data of a matrix after checking that they match its size."""
-    if not isinstance(value, dict):
-        return value
-    numbers = value["data"]
-    if "rows" in value and "cols" in value and len(numbers) != value["rows"] * value["cols"]:
-        raise ValueError
-    return numbers
 
 
 def check_camera(name: str, camera: CameraIntrinsics) -> None:

@@ -9,20 +9,27 @@ from pipeline.types import CameraIntrinsics, FloatArray
 
 FISHEYE = "equidistant"
 """ROS's and Kalibr's name of the fisheye model, which is also written."""
+_BROWN = "brown_conrady"
+"""The RealSense SDK's name of the model plumb_bob; its variants differ from it if a coefficient is not 0."""
 _FISHEYES = {FISHEYE, "fisheye", "kannala_brandt", "kannala_brandt4"}
-_OPENCV = {"", "none", "plumb_bob", "radtan", "rational_polynomial"}
+_OPENCV = {"", "none", "plumb_bob", "radtan", _BROWN, "rational_polynomial"}
 """Names of OpenCV's model, which the number of coefficients extends."""
 KNOWN = "plumb_bob with 5 coefficients, rational_polynomial with 8, 12 or 14, or equidistant with 4"
 
 
 def is_fisheye_name(model: str) -> bool:
     """Return whether a file's name of a distortion model is that of a fisheye."""
-    return model.lower() in _FISHEYES
+    return _plain(model) in _FISHEYES
 
 
 def is_known(model: str) -> bool:
     """Return whether a file's name of a distortion model is that of a supported lens; empty is OpenCV's."""
-    return is_fisheye_name(model) or model.lower() in _OPENCV
+    return _plain(model) in _FISHEYES | _OPENCV
+
+
+def _plain(model: str) -> str:
+    """Return a name in ROS's form: brown_conrady for "Brown Conrady" and "distortion.brown_conrady"."""
+    return model.lower().rpartition(".")[2].replace(" ", "_").replace("-", "_")
 
 
 def ros_name(camera: CameraIntrinsics) -> str:
@@ -41,6 +48,8 @@ def lens_of(model: str, given: FloatArray) -> FloatArray | None:
     """
     given = np.asarray(given, np.float64).ravel()
     used = len(np.trim_zeros(given, "b"))
+    if not used and _plain(model).endswith(_BROWN):
+        return np.zeros(COEFFICIENTS[0])
     counts = (FISHEYE_COEFFICIENTS,) if is_fisheye_name(model) else COEFFICIENTS
     count = next((count for count in counts if count >= used), None)
     if not is_known(model) or count is None or (used > counts[0] and len(given) not in counts):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 
 import numpy as np
 
@@ -16,6 +17,9 @@ EXACT, NOTED, LARGEST = 1e-4, 1e-3, 1e-2
 """Departure from a rotation (``departure``) up to which a matrix is kept as it is, is replaced by the nearest
 rotation without a note, and is replaced with a note. Recordings are orthonormal to about 5e-4."""
 
+_BETWEEN = re.compile(r"[,;()\[\]]|\barray\b")
+"""Marks between the numbers of a matrix."""
+
 
 def read_pose(path: AnyPath) -> FloatArray:
     """Read a (4, 4) rigid transform as ``read_pose_noted`` does, and log the note."""
@@ -26,7 +30,7 @@ def read_pose(path: AnyPath) -> FloatArray:
 
 
 def read_pose_noted(path: AnyPath) -> tuple[FloatArray, tuple[str, ...]]:
-    """Read a (4, 4) rigid transform from a text file of 16 numbers, row by row, and a note on its rotation.
+    """Read a (4, 4) rigid transform from a text file (``matrix_in``), and a note on its rotation.
 
     A matrix that is not quite a rotation is replaced by the nearest rotation (``nearest_rigid``).
 
@@ -49,23 +53,39 @@ def read_pose_noted(path: AnyPath) -> tuple[FloatArray, tuple[str, ...]]:
 
 
 def _matrix_in(path: AnyPath) -> FloatArray:
-    rows = [
-        line.split("#")[0].replace(",", " ").split() for line in read_text(path, "pose file").splitlines()
-    ]
-    filled = [row for row in rows if row]
-    try:
-        if len(filled) == 1:
-            return np.array(filled[0], dtype=np.float64).reshape(4, 4)
-        T = np.array(filled, dtype=np.float64)
-    except ValueError:
-        T = np.empty(0)
-    if T.shape != (4, 4):
-        counts = ", ".join(str(len(row)) for row in filled[:6]) or "0"
+    text = read_text(path, "pose file")
+    T = matrix_in(text)
+    if T is None:
+        counts = ", ".join(str(len(row)) for row in _rows(text)[:6]) or "0"
         raise InputError(
             f"The pose file {path} does not hold 4 x 4 numbers but lines of {counts} words; try four lines "
             "of four numbers"
         )
     return T
+
+
+def matrix_in(text: str) -> FloatArray | None:
+    """Return the (4, 4) matrix in a text, None if it holds none.
+
+    It has 4 x 4 numbers, or the first 3 x 4 of them, row by row: four in a line, or all in one line, or each
+    in its own; between them may be commas, semicolons and brackets, as Python prints them.
+    """
+    rows = _rows(text)
+    if len(rows) > 1 and {len(row) for row in rows} not in ({1}, {4}):
+        return None
+    try:
+        numbers = np.array([word for row in rows for word in row], dtype=np.float64)
+    except ValueError:
+        return None
+    if numbers.size == 12:
+        numbers = np.append(numbers, (0.0, 0.0, 0.0, 1.0))
+    return numbers.reshape(4, 4) if numbers.size == 16 else None
+
+
+def _rows(text: str) -> list[list[str]]:
+    """Return the words of the lines that have any, without comments."""
+    rows = (_BETWEEN.sub(" ", line.split("#")[0]).split() for line in text.splitlines())
+    return [row for row in rows if row]
 
 
 def departure(T: FloatArray) -> float:

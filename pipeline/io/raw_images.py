@@ -16,6 +16,8 @@ from pipeline.types import AnyPath
 
 _NPY = b"\x93NUMPY"
 _TIFF = (b"II*\x00", b"MM\x00*")
+_OTHER_MODES = ("P", "PA", "LA", "CMYK", "YCbCr", "LAB")
+"""Pillow's modes of TIFF images whose numbers are not grey, or red, green and blue."""
 _EXR = b"\x76\x2f\x31\x01"
 _EXR_DEPTH = ("Z", "Y", "V")
 """Names of single channels in OpenEXR files, in order of preference."""
@@ -46,6 +48,8 @@ def raw_values(path: AnyPath, data: bytes, what: str) -> np.ndarray:
         raise InputError(
             f"The {what} {path} has the channels {error}; try one channel, one named Z, Y or V, or R, G, B"
         ) from None
+    except _SeveralImages as error:
+        raise InputError(f"The {what} {path} holds {error} images; try a file with one of them") from None
     except _TooLarge as error:
         raise InputError(
             f"The {what} {path} has {error} pixels, more than the {MAX_IMAGE_PIXELS / 1e6:g} million that "
@@ -68,6 +72,10 @@ class _TooLarge(Exception):
     """The image exceeds the largest number of pixels; the error's text is the image size."""
 
 
+class _SeveralImages(Exception):
+    """A TIFF file has several images; the error's text is their number."""
+
+
 class _OtherChannels(Exception):
     """An OpenEXR file has no channel that is read; the error's text is the names of its channels."""
 
@@ -79,15 +87,22 @@ def _check(height_px: int, width_px: int) -> None:
 
 def _numpy(data: bytes) -> np.ndarray:
     values = array_in(data)
+    if values.ndim == 3 and values.shape[2] == 1:
+        values = values[..., 0]
+    elif values.ndim == 3 and values.shape[0] == 1 and values.shape[2] > 4:  # channel first, as networks do
+        values = values[0]
     if values.ndim > 1:
         _check(*values.shape[:2])
-    return values
+    return values.astype(np.float32) if values.dtype == np.float16 else values
 
 
 def _tiff(data: bytes) -> np.ndarray:
     with Image.open(io.BytesIO(data), formats=["TIFF"]) as image:
         _check(image.height, image.width)
-        return np.asarray(image)
+        pages = getattr(image, "n_frames", 1)
+        if pages > 1:
+            raise _SeveralImages(pages)
+        return np.asarray(image.convert("RGB") if image.mode in _OTHER_MODES else image)
 
 
 def _exr(data: bytes) -> np.ndarray:

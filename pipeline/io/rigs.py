@@ -7,6 +7,7 @@ A node's depth is corrected by ``depth_correction.json`` if it has one. If a sep
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -91,10 +92,7 @@ def _same_view(
     sensed: DepthMap, depth: AnyPath, camera: CameraIntrinsics, color: AnyPath
 ) -> tuple[DepthMap, tuple[str, ...]]:
     """Return depth of the colour camera's view on its pixel grid, and a note if it was resized."""
-    remedy = (
-        "try files of one size, depth of the same view in fewer pixels, or the depth camera's own intrinsics "
-        "and extrinsics"
-    )
+    remedy = "try files of the same proportions, or the depth camera's own intrinsics and extrinsics"
     depth_camera = depth_camera_of(camera, sensed.z_m.shape, depth, color, remedy)
     if depth_camera is None:
         return sensed, ()
@@ -134,9 +132,11 @@ def _check_size(
 ) -> None:
     """Raise an InputError if a camera is for images of another size."""
     if (camera.height_px, camera.width_px) != shape[:2]:
+        upright = (camera.width_px, camera.height_px) == shape[:2]
+        remedy = "to turn the image by 90 degrees, or " if upright else ""
         raise InputError(
             f"The intrinsics file {intrinsics} is for {camera.width_px} x {camera.height_px} pixels but the "
-            f"{what} {image} has {shape[1]} x {shape[0]}; try the intrinsics of images of that size"
+            f"{what} {image} has {shape[1]} x {shape[0]}; try {remedy}the intrinsics of images of that size"
         )
 
 
@@ -231,7 +231,14 @@ def _write_noise(folder: Path, frame: RgbdFrame) -> None:
 
 
 def _node_folders(directory: Path) -> list[Path]:
-    return sorted(folder for folder in directory.glob("node_*") if folder.is_dir())
+    """Return the nodes' folders, node_2 before node_10."""
+    folders = (folder for folder in directory.glob("node_*") if folder.is_dir())
+    return sorted(folders, key=lambda folder: _natural(folder.name))
+
+
+def _natural(name: str) -> list[tuple[str, int]]:
+    """Return a key that sorts names by the values of the numbers in them, and the other letters as usual."""
+    return [(letters, int(number or -1)) for letters, number in re.findall(r"(\D*)(\d*)", name)]
 
 
 def _load_node(folder: Path, over: NodeFiles, depth_scale: float | None) -> RgbdFrame:

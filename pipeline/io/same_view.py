@@ -1,6 +1,8 @@
-"""Camera of a depth image that shows the same view as its colour image in another number of pixels."""
+"""Cameras of images that show the same view: of depth in another number of pixels, and with equal pixels."""
 
 from __future__ import annotations
+
+import numpy as np
 
 from packetmesh.errors import InputError
 from pipeline.kernels.geometry import scaled_to
@@ -43,3 +45,14 @@ def same_view_note(camera: CameraIntrinsics, depth_camera: CameraIntrinsics) -> 
         f"{camera.width_px} x {camera.height_px}: taken as the same view, so that depth has the colour "
         "camera, resized"
     )
+
+
+def alike(one: CameraIntrinsics, other: CameraIntrinsics, within_px: float = 0.01) -> bool:
+    """Return whether two cameras have the same pixels, within so many, and the same distortion."""
+    sizes = (one.width_px, one.height_px) == (other.width_px, other.height_px)
+    same_lens = (
+        one.fisheye == other.fisheye
+        and one.distortion.shape == other.distortion.shape
+        and np.allclose(one.distortion, other.distortion, atol=1e-4)
+    )
+    return sizes and same_lens and np.allclose(one.matrix, other.matrix, rtol=0.0, atol=within_px)

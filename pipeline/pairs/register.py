@@ -33,6 +33,8 @@ ALIASES = {"ceicp": DEFAULT_METHOD}
 LEAST_POINTS = 6
 LARGEST_M, SMALLEST_M = 1000.0, 0.001
 """Plausible extents of a cloud in metres."""
+_MOST_EXTENTS = 1e4
+"""Points farther from the middle than so many extents of a cloud are errors of measurement."""
 EVALUATED_POINTS = 20_000
 """Both clouds are thinned to about this many points before their distance is measured."""
 SHAPE_POINTS = 3000
@@ -147,13 +149,29 @@ def prepared_cloud(cloud: PointCloud, name: str, voxel_m: float | None) -> Point
         cloud = cloud.select(first)
     extent_m = middle_extent_m(cloud.points_m)
     if not SMALLEST_M <= extent_m <= LARGEST_M:
-        unit = "millimetres" if extent_m > LARGEST_M else "kilometres"
+        unit, metres = ("millimetres", "0.001") if extent_m > LARGEST_M else ("kilometres", "1000")
         raise InputError(
-            f"The {name} cloud is {extent_m:.3g} m across, as if its numbers were {unit}; "
-            "try --metres-per-unit with those of source and target"
+            f"The {name} cloud is {extent_m:.3g} m across, as if its numbers were {unit}, and clouds from "
+            f"{SMALLEST_M:g} to {LARGEST_M:g} m can be registered; try --metres-per-unit with the units of "
+            f"source and target, {metres} {metres} if both are in {unit}"
         )
+    cloud = _without_strays(cloud, name, _MOST_EXTENTS * extent_m)
     cloud = without_bad_normals(cloud, name)
     return cloud if voxel_m is None else voxel_average(cloud, voxel_m)
+
+
+def _without_strays(cloud: PointCloud, name: str, farthest_m: float) -> PointCloud:
+    """Return the points that are at most so far from the median of all."""
+    near = np.abs(cloud.points_m - np.median(cloud.points_m, axis=0)).max(axis=1) <= farthest_m
+    if near.all():
+        return cloud
+    _log.warning(
+        "%d points of the %s cloud are left out: they are more than %.3g m from the others",
+        (~near).sum(),
+        name,
+        farthest_m,
+    )
+    return cloud.select(near)
 
 
 def prepared_pair(

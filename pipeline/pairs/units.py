@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
 
 from packetmesh.errors import InputError
 from pipeline.types import FloatArray, PointCloud
+
+_log = logging.getLogger(__name__)
 
 _QUANTILES = (0.1, 0.25, 0.5, 0.75, 0.9)
 """Quantiles of the distances from the middle, which describe a cloud's shape whatever its pose."""
@@ -21,6 +24,8 @@ _KILO = 300.0, 3000.0
 _SIMILAR, _SAME = 0.35, 0.02
 """Largest relative deviation of the quantiles' ratios for similar and for the same shapes."""
 _LEAST_FACTOR = 1.05
+_NOTED_FACTOR = 1.01
+"""From this factor on clouds of the same shape get a note about their sizes."""
 _OF_DEVIATION = 3.0
 """A factor must differ from one by this many times the deviation."""
 _USUAL_M = 0.05, 50.0
@@ -66,6 +71,13 @@ def check_units(source: PointCloud, target: PointCloud, known: bool, with_scale:
     if _KILO[0] < factor < _KILO[1]:
         raise _thousand(larger, factor, target if larger == "source" else source)
     if known or not _differs(found.deviation, factor, with_scale):
+        if _NOTED_FACTOR < factor <= _LEAST_FACTOR and found.deviation <= _SAME and not with_scale:
+            _log.warning(
+                "The %s cloud is %.3f times as large as the other and of about the same shape; if both "
+                "show the same place, try --scale, which estimates the factor",
+                larger,
+                factor,
+            )
         return
     tolerance = _SIMILAR if factor >= _LARGE else _SAME
     name = min(_UNITS, key=lambda unit: abs(np.log(factor * _UNITS[unit])))

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from pipeline.kernels.kdtree import KdTree
+from pipeline.kernels.local_planes import patch_normals
 from pipeline.types import BoolArray, FloatArray, PointCloud
 
 _log = logging.getLogger(__name__)
@@ -25,6 +27,12 @@ DOUBTFUL_SHARE = 0.05
 """Share of opposite neighbours from which a surface may be torn."""
 LEAST_ALONG_SHARE = 0.7
 """Share of neighbours with normals along one axis below which they are no normals; chance makes a half."""
+LEAST_PLANE_COSINE = 0.6
+"""Mean cosine between normals and planes below which they are no normals of these points; chance: a half."""
+MOST_UNKNOWN_SHARE = 0.05
+"""If a larger share of the normals is unknown, all are estimated."""
+_PLANE_POINTS, _PLANE_NEIGHBOURS = 5000, 20
+"""Planes are fitted to so many of about so many points: few, so that they are wider than noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +43,13 @@ class Agreement:
     """Share of neighbouring pairs whose normals are along about one axis, of either sign."""
     opposite_share: float
     """Share of those pairs whose normals point against each other."""
+    plane_cosine: float
+    """Mean cosine between a normal and that of the plane through the points around, of either sign."""
 
     @property
     def axes_fit(self) -> bool:
-        """Whether the normals' axes are those of a surface."""
-        return self.along_share >= LEAST_ALONG_SHARE
+        """Whether the normals' axes are those of the surface through the points."""
+        return self.along_share >= LEAST_ALONG_SHARE and self.plane_cosine >= LEAST_PLANE_COSINE
 
     @property
     def signs_fit(self) -> bool:
@@ -54,7 +64,7 @@ def known_normals(normals: FloatArray) -> BoolArray:
 
 
 def agreement(points_m: FloatArray, normals: FloatArray) -> Agreement:
-    """Measure how well (N, 3) unit normals agree among neighbouring points, on every k-th point."""
+    """Measure how well (N, 3) unit normals agree with neighbours and with the points, on every k-th point."""
     count = min(_NEIGHBOURS + 1, len(points_m))
     rows = np.arange(0, len(points_m), max(1, len(points_m) // _SAMPLED))
     distances_m, near = cKDTree(points_m).query(points_m[rows], k=count, workers=-1)
@@ -63,9 +73,20 @@ def agreement(points_m: FloatArray, normals: FloatArray) -> Agreement:
     beside_m = np.abs(np.einsum("nki,ni->nk", arms_m, normals[rows]))
     cosines = np.einsum("nki,ni->nk", normals[near], normals[rows])[beside_m <= _TANGENT * distances_m]
     along = np.abs(cosines) > _ALONG
+    plane_cosine = _plane_cosine(points_m, normals)
     if not along.any():
-        return Agreement(1.0 if not len(cosines) else 0.0, 0.0)
-    return Agreement(float(along.mean()), float((cosines[along] < 0.0).mean()))
+        return Agreement(1.0 if not len(cosines) else 0.0, 0.0, plane_cosine)
+    return Agreement(float(along.mean()), float((cosines[along] < 0.0).mean()), plane_cosine)
+
+
+def _plane_cosine(points_m: FloatArray, normals: FloatArray) -> float:
+    """Return the mean cosine between normals and planes through the points around; 1 for few points."""
+    rows = np.arange(0, len(points_m), max(1, len(points_m) // _PLANE_POINTS))
+    if len(rows) < _PLANE_NEIGHBOURS:
+        return 1.0
+    some_m = points_m[rows] - np.median(points_m, axis=0)
+    axes = patch_normals(KdTree(some_m), _PLANE_NEIGHBOURS)
+    return float(np.abs(np.einsum("ni,ni->n", axes, normals[rows])).mean())
 
 
 def without_bad_normals(cloud: PointCloud, name: str) -> PointCloud:
@@ -92,10 +113,9 @@ def without_bad_normals(cloud: PointCloud, name: str) -> PointCloud:
     found = agreement(cloud.points_m, normals)
     if not (found.axes_fit and found.signs_fit):
         _log.warning(
-            "The normals of the %s cloud disagree with their neighbours (%s); they are estimated from the "
-            "points",
+            "The normals of the %s cloud cannot be used (%s); they are estimated from the points",
             name,
-            opposite_text(found) if found.axes_fit else "their axes differ",
+            opposite_text(found) if found.axes_fit else "they are not perpendicular to the surface",
         )
         return replace(cloud, normals=None)
     return replace(cloud, normals=normals)

@@ -15,13 +15,19 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.config import SurfaceConfig
-from pipeline.io.cloud_precision import middle_m, too_coarse
+from pipeline.io.cloud_precision import too_coarse
 from pipeline.io.clouds import read_cloud
 from pipeline.io.meshes import check_place, mesh_suffix, write_mesh
 from pipeline.kernels.point_sets import distinct_rows
 from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.surface.boundary import edges_and_faces
-from pipeline.surface.given_normals import DOUBTFUL_SHARE, agreement, known_normals, opposite_text
+from pipeline.surface.given_normals import (
+    DOUBTFUL_SHARE,
+    MOST_UNKNOWN_SHARE,
+    agreement,
+    known_normals,
+    opposite_text,
+)
 from pipeline.surface.normals import oriented_normals, turned_outwards, turned_to_viewpoint
 from pipeline.surface.radii import radii, spacing
 from pipeline.surface.smooth import smooth
@@ -38,8 +44,10 @@ OUTER_PERCENT = 1.0
 """Per cent of the points on either side that do not count for a cloud's width, because of outliers."""
 LARGEST_M, SMALLEST_M = 1e9, 1e-12
 """Largest allowed coordinate, and the extent below which a cloud counts as one point."""
+_FAR_M = 1e5
+"""Clouds whose middle is farther from the origin are moved to it for the computation."""
 _COARSE = 0.1
-"""Coordinates in a mesh file must be resolved to this share of the smallest ball."""
+"""Coordinates in steps above this share of the smallest ball make a rough surface."""
 _LINE = 1e-6
 """A cloud is a line if it is thinner than this share of its length."""
 
@@ -66,8 +74,8 @@ class MeshOptions:
     """Thin the cloud to about this many points first."""
     smoothing_passes: int = 0
     metres_per_unit: float | None = None
-    """Unit of the cloud's coordinates in metres, 0.001 for millimetres; None is the unit that the titles of a
-    text file's columns name, or else metres."""
+    """Unit of the cloud's coordinates in metres, 0.001 for millimetres; None is the unit that the
+    file names (``read_cloud``), or else metres."""
     estimate_normals: bool = False
     """Whether given normals are ignored and estimated from the points."""
     columns: str | None = None
@@ -146,8 +154,10 @@ def iterate_mesh_cloud(cloud: PointCloud, options: MeshOptions) -> Generator[Pro
     if options.estimate_normals:
         cloud = replace(cloud, normals=None)
     cloud = in_metres(usable_points(cloud), metres_per_unit)
-    far = too_coarse(cloud.points_m)
-    offset_m = middle_m(cloud.points_m) if far else np.zeros(3)  # sums of squares lose digits far away
+    far = too_coarse(cloud.points_m) or _reach_m(cloud.points_m) > _FAR_M
+    offset_m = (
+        np.rint(np.median(cloud.points_m, axis=0)) if far else np.zeros(3)
+    )  # sums of squares lose digits far away
     viewpoint_m = None if options.viewpoint_m is None else np.array(options.viewpoint_m) - offset_m
     if far:
         cloud = replace(cloud, points_m=cloud.points_m - offset_m)
@@ -169,6 +179,8 @@ def iterate_mesh_cloud(cloud: PointCloud, options: MeshOptions) -> Generator[Pro
     radii_m = chosen_radii(cloud, options.radii_m)
     if not far:
         _check_resolution(cloud.points_m, radii_m[0])
+    else:
+        _warn_of_rounding(cloud.points_m + offset_m, radii_m[0])
     sizes = ", ".join(f"{1000.0 * radius_m:.4g}" for radius_m in radii_m)
     yield Progress(f"rolling balls of {sizes} mm over {len(cloud)} points", 0.55)
     surface = reconstruct_surface(cloud, radii_m)
@@ -201,7 +213,7 @@ def mesh_report(meshed: MeshedCloud) -> dict[str, Any]:
 
 
 def usable_points(cloud: PointCloud) -> PointCloud:
-    """Return the distinct points in their order, without those whose normal is unknown (unless all are).
+    """Return the distinct points in their order, without those whose normal is unknown (unless many are).
 
     Raises:
         InputError: fewer than three points, or all of them coincident or collinear.
@@ -261,7 +273,7 @@ def with_normals(cloud: PointCloud, viewpoint_m: FloatArray | None) -> tuple[Poi
     their signs say nothing: then they are turned to agree, or estimated if even their axes disagree.
     """
     if cloud.normals is not None and not (found := agreement(cloud.points_m, cloud.normals)).axes_fit:
-        _log.warning("The normals of the file disagree with their neighbours; they are estimated")
+        _log.warning("The normals of the file are not perpendicular to the surface; they are estimated")
         cloud = replace(cloud, normals=None)
     if cloud.normals is None:
         cloud = oriented_normals(cloud, viewpoint_m)
@@ -310,17 +322,25 @@ def chosen_radii(cloud: PointCloud, radii_m: tuple[float, ...] | None) -> tuple[
 
 
 def _known_normals(cloud: PointCloud) -> PointCloud:
-    """Normalise the normals; leave out points without one, or all normals if no point has one."""
+    """Normalise the normals; leave out points without one, or all normals if many points have none."""
     if cloud.normals is None:
         return cloud
     known = known_normals(cloud.normals)
     if not known.any():
         _log.warning("All normals of the file are zero or not finite; they are estimated from the points")
         return replace(cloud, normals=None)
-    if not known.all():
+    unknown = int((~known).sum())
+    if unknown > MOST_UNKNOWN_SHARE * len(cloud):
+        _log.warning(
+            "%d of %d normals of the file are zero or not finite; all are estimated from the points",
+            unknown,
+            len(cloud),
+        )
+        return replace(cloud, normals=None)
+    if unknown:
         _log.warning(
             "%d points are left out: their normals are zero or not finite; --estimate-normals keeps them",
-            (~known).sum(),
+            unknown,
         )
         cloud = cloud.select(known)
     assert cloud.normals is not None
@@ -348,12 +368,33 @@ def _check_shape(points_m: FloatArray) -> None:
         )
 
 
+def _reach_m(points_m: FloatArray) -> float:
+    """Return the largest coordinate, by magnitude, of the middle of the points."""
+    return float(np.abs(np.median(points_m, axis=0)).max())
+
+
 def _check_resolution(points_m: FloatArray, radius_m: float) -> None:
     """Refuse points so far from the origin that the 32-bit floats of a mesh file are too coarse."""
-    reach_m = float(np.abs(points_m).max())
-    step_m = float(np.spacing(np.float32(reach_m)))
+    step_m = float(np.spacing(np.float32(_reach_m(points_m))))
     if step_m > _COARSE * radius_m:
         raise InputError(
-            f"The cloud reaches {reach_m:.4g} m from the origin, where the numbers of a mesh file are "
-            f"{step_m:.2g} m apart; try to move it nearer to the origin"
+            f"The cloud reaches {_reach_m(points_m):.4g} m from the origin, where the numbers of a mesh file "
+            f"are {step_m:.2g} m apart; try to move it nearer to the origin"
+        )
+
+
+def _warn_of_rounding(points_m: FloatArray, radius_m: float) -> None:
+    """Log that the positions of a far cloud were rounded to 32-bit numbers, if balls see their steps."""
+    reach_m = _reach_m(points_m)
+    step_m = float(np.spacing(np.float32(reach_m)))
+    if step_m <= _COARSE * radius_m or too_coarse(points_m):
+        return
+    axis = int(np.abs(np.median(points_m, axis=0)).argmax())
+    steps_m = np.diff(np.unique(points_m[:, axis]))
+    if len(steps_m) and steps_m.min() < 1.5 * step_m:  # a grid of heights has larger steps
+        _log.warning(
+            "The cloud is %.4g m from the origin, where 32-bit numbers are %.2g m apart, and its positions "
+            "are rounded to them; try to export it with 64-bit numbers, or nearer to the origin",
+            reach_m,
+            step_m,
         )

@@ -87,7 +87,7 @@ def _lines(trust: Trust, lens: Calibration, may_bend: bool) -> Iterator[str]:
     target = f"{1000.0 * judged.accuracy_m:g} mm at {judged.range_m:g} m"
     most = 1000.0 * judged.error_of_most_m
     reached = (
-        f"and within {most:.2g} mm with 95 %"
+        f"and within {most:.2g} mm with a probability of 95 %"
         if np.isfinite(most)
         else "but more than 5 % of it has no rays, where the lens model folds back"
     )

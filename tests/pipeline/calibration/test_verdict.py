@@ -50,7 +50,7 @@ def test_it_passes_where_the_error_is_small_enough_and_not_where_it_is_not(found
     assert good.sentence.endswith("pass.")
     assert not bad.passed
     assert bad.share < 0.95
-    assert f"and within {1000.0 * of_most_m:.2g} mm with 95 %" in bad.sentence
+    assert f"and within {1000.0 * of_most_m:.2g} mm with a probability of 95 %" in bad.sentence
 
 
 def test_a_lens_that_the_model_cannot_hold_leads_to_another_model_which_passes():

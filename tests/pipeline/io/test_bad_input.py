@@ -131,7 +131,7 @@ BAD_FILES = {
         json.dumps({"width": 16, "height": 12, "K": K9, "D": [0.1] * 7}).encode(),
         "distortion model of 7 coefficients",
     ),
-    "pose: three lines": (read_pose, pose(EYE[:3]), "4 x 4 numbers"),
+    "pose: three columns": (read_pose, pose(EYE[:, :3]), "4 x 4 numbers"),
     "pose: words": (read_pose, b"a b c d\n" * 4, "4 x 4 numbers"),
     "pose: ragged": (read_pose, pose(EYE) + b" 7", "4 x 4 numbers"),
     "pose: NaN": (read_pose, pose(EYE * np.nan), "4 x 4 numbers"),

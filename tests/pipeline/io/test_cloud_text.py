@@ -157,7 +157,7 @@ def test_an_intensity_is_told_from_colours_that_are_alike(tmp_path, said):
 @pytest.mark.parametrize(
     ("columns", "says"),
     [
-        ((TIME, POINTS), "the first rises.*--columns _,x,y,z or --columns x,y,z,_"),
+        ((TIME, POINTS), "column 1 rises.*--columns _,x,y,z or --columns x,y,z,_"),
         ((RNG.permutation(1.7e9 + TIME), POINTS), "too large for a position"),
         ((RNG.integers(0, 32, (COUNT, 1)), POINTS), "whole numbers like a row or ring"),
         ((RNG.integers(0, 32, (COUNT, 2)), POINTS, COLORS), "--columns _,_,x,y,z,_,_,_"),

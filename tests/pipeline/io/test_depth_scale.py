@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from packetmesh.errors import InputError
 from pipeline.importing.depth_units import unrotated
 from pipeline.io.demos import load_demo
 from pipeline.io.depth_scale import NO_VALUE, doubts
+from pipeline.io.images import read_depth
 
 RNG = np.random.default_rng(3)
 MM = RNG.integers(600, 4000, (30, 40)).astype(np.uint16)
@@ -68,3 +70,23 @@ def test_values_that_stand_for_nothing_are_said_with_their_share():
 @pytest.mark.parametrize("scene", ["living-room", "office"])
 def test_the_demo_scenes_raise_no_doubt(scene):
     assert load_demo(scene).notes == ()
+
+
+def test_a_background_at_a_large_distance_is_a_doubt():
+    """65504 is the largest number of half precision, which renderers store where nothing is."""
+    values = np.full((10, 10), 2.0, np.float32)
+    values[:2] = 65504.0
+    (note,) = doubts(values, 1.0, stated=False)
+    assert note.startswith("20.0% of the depth values are farther than 66 m, up to 6.55e+04 m;")
+    assert not doubts(np.where(values > 66.0, np.float32(0.0), values), 1.0, stated=False)
+
+
+def test_a_background_beyond_all_distances_opens_with_0_in_its_place(tmp_path):
+    """Blender stores 1e10 there."""
+    values = np.full((10, 10), 2.0, np.float32)
+    values[:2] = 1e10
+    np.save(tmp_path / "depth.npy", values)
+    with pytest.raises(InputError, match=r"20% are beyond 1000 km, as where nothing was seen.*try 0 where"):
+        read_depth(tmp_path / "depth.npy")
+    np.save(tmp_path / "depth.npy", np.where(values > 1e6, 0.0, values))
+    assert read_depth(tmp_path / "depth.npy").valid.mean() == 0.8

@@ -1,5 +1,6 @@
 """Poses of real recordings are rotations only to some digits; what is none is refused with the reason."""
 
+import json
 import logging
 
 import numpy as np
@@ -124,3 +125,30 @@ def test_exact_poses_stay_as_they_are(tmp_path):
     exact = look_at((1.0, 2.0, 1.5), (0.0, 0.0, 1.0))
     write_pose(tmp_path / "pose.txt", exact)
     np.testing.assert_array_equal(read_pose(tmp_path / "pose.txt"), exact)
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        lambda T: str(T.tolist()),
+        repr,
+        str,
+        lambda T: "\n".join(" ".join(map(repr, row)) for row in T[:3].tolist()),
+        lambda T: " ".join(map(repr, T[:3].ravel().tolist())),
+        lambda T: ";\n".join(" ".join(map(repr, row)) for row in T.tolist()),
+        lambda T: json.dumps(T.tolist(), indent=1),
+    ],
+    ids=["list", "repr", "str", "3 x 4", "KITTI", "MATLAB", "JSON"],
+)
+def test_a_pose_may_be_as_other_programs_print_it(tmp_path, form):
+    (tmp_path / "pose.txt").write_text(form(T))
+    np.testing.assert_allclose(read_pose(tmp_path / "pose.txt"), T, atol=1e-7)
+
+
+@pytest.mark.parametrize("text", ["1 2 3 0 0 0 1", "1 0 0\n0 1 0\n0 0 1\n0 0 0", "1,5 0,0 0,0 2,5\n" * 4])
+def test_other_counts_of_numbers_are_no_pose(tmp_path, text):
+    (tmp_path / "pose.txt").write_text(text)
+    with pytest.raises(
+        InputError, match=r"does not hold 4 x 4 numbers but lines of .* try four lines of four"
+    ):
+        read_pose(tmp_path / "pose.txt")

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import OpenEXR
 import pytest
-from PIL import Image
+from PIL import Image, ImageCms
 
 from packetmesh.errors import InputError
 from pipeline.io.images import read_color, read_depth
@@ -149,3 +149,37 @@ def test_colours_of_sixteen_bits_are_refused(tmp_path):
     (tmp_path / "deep.npy").write_bytes(npy(RGB.astype(np.uint16)))
     with pytest.raises(InputError, match="try 8 bits"):
         read_color(tmp_path / "deep.npy")
+
+
+@pytest.mark.parametrize(("mode", "within"), [("CMYK", 0), ("P", 0), ("YCbCr", 2), ("LAB", 3), ("LA", 0)])
+def test_colours_of_a_tiff_in_another_mode_are_those_that_pillow_shows(tmp_path, mode, within):
+    smooth = np.add.outer(8 * np.arange(12), 4 * np.arange(17))[..., None] + np.arange(3) * 20
+    picture = Image.fromarray(smooth.astype(np.uint8))
+    if mode == "LAB":  # Pillow converts to it by colour profiles only
+        profiles = [ImageCms.createProfile(name) for name in ("sRGB", "LAB")]
+        other = ImageCms.profileToProfile(picture, *profiles, outputMode="LAB")
+    else:
+        other = picture.convert(mode)
+    other.save(tmp_path / "color.tif")
+    expected = picture if mode == "LAB" else other.convert("RGB")
+    difference = read_color(tmp_path / "color.tif").astype(int) - np.asarray(expected)
+    assert np.abs(difference).max() <= within
+
+
+def test_of_two_images_in_a_tiff_none_is_chosen(tmp_path):
+    pages = [Image.fromarray(MM), Image.fromarray(MM + 1)]
+    pages[0].save(tmp_path / "depth.tif", save_all=True, append_images=pages[1:])
+    with pytest.raises(InputError, match=r"depth.tif holds 2 images; try a file with one of them"):
+        read_depth(tmp_path / "depth.tif")
+
+
+@pytest.mark.parametrize("values", [METRES[..., None], METRES[None]])
+def test_an_axis_of_one_channel_is_dropped(tmp_path, values):
+    np.save(tmp_path / "depth.npy", values)
+    np.testing.assert_array_equal(read_depth(tmp_path / "depth.npy").z_m, METRES)
+
+
+def test_half_precision_is_converted_before_any_arithmetic(tmp_path):
+    millimetres = np.full((4, 4), 2050.0, np.float16)
+    np.save(tmp_path / "depth.npy", millimetres)
+    np.testing.assert_array_equal(read_depth(tmp_path / "depth.npy", 1000.0).z_m, np.float32(2.05))

@@ -1,8 +1,12 @@
 """Rig folders: what is saved is loaded, and the nodes' order and poses hold."""
 
+import json
+
+import cv2
 import numpy as np
 import pytest
 
+from packetmesh.errors import InputError
 from pipeline.io.depth_correction import DepthCorrection, write_depth_correction
 from pipeline.io.rigs import load_frame, load_rig, save_rig
 from pipeline.kernels.geometry import LEVEL_POSE, look_at
@@ -113,3 +117,25 @@ def test_a_corrected_rig_is_written_corrected_and_never_corrected_twice(tmp_path
     assert again.noise == noise
     save_rig(tmp_path / "rig", raw)
     assert load_rig(tmp_path / "rig").frames[0].noise is None
+
+
+def test_nodes_are_ordered_by_the_numbers_in_their_names(tmp_path):
+    save_rig(tmp_path / "rig", rig_of(2))
+    for old, new in (("node_00", "node_2"), ("node_01", "node_10")):
+        (tmp_path / "rig" / old).rename(tmp_path / "rig" / new)
+    assert [frame.name for frame in load_rig(tmp_path / "rig").frames] == ["node_2", "node_10"]
+
+
+def test_intrinsics_on_their_side_say_so(tmp_path):
+    save_rig(tmp_path / "rig", rig_of(1))
+    node = tmp_path / "rig" / "node_00"
+    K = {"fx": 14, "fy": 14, "cx": 5.5, "cy": 7.5, "width": 12, "height": 16}
+    (node / "intrinsics.json").write_text(json.dumps(K))
+    with pytest.raises(
+        InputError, match="try to turn the image by 90 degrees, or the intrinsics of images of"
+    ):
+        load_rig(tmp_path / "rig")
+    for name in ("color", "depth"):
+        image = cv2.imread(str(node / f"{name}.png"), cv2.IMREAD_UNCHANGED)
+        cv2.imwrite(str(node / f"{name}.png"), cv2.rotate(image, cv2.ROTATE_90_CLOCKWISE))
+    assert load_rig(tmp_path / "rig").frames[0].depth.z_m.shape == (16, 12)

@@ -86,3 +86,14 @@ def test_given_units_settle_it_except_for_a_thousand():
         checked(1000.0 * room(3000), room(3000), known=True)
     with pytest.raises(InputError, match="in centimetres"):
         checked(100.0 * room(3000), room(3000), with_scale=True)
+
+
+def test_a_scale_of_two_per_cent_is_noted_and_scale_silences_the_note(caplog):
+    points_m = room(5000)
+    checked(1.02 * apply(AWAY, points_m), points_m)
+    assert "source cloud is 1.020 times as large" in caplog.text
+    assert "try --scale" in caplog.text
+    caplog.clear()
+    checked(1.02 * points_m, points_m, with_scale=True)
+    checked(points_m, points_m)
+    assert not caplog.records

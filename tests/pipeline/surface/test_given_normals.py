@@ -105,7 +105,42 @@ def test_random_normals_are_estimated_with_a_sentence(caplog):
     answer = meshed(random_normals())
     assert answer.normals == ESTIMATED_OUTWARDS
     assert mesh_report(answer)["genus"] == 0
-    assert "The normals of the file disagree with their neighbours; they are estimated" in caplog.text
+    assert "The normals of the file are not perpendicular to the surface; they are estimated" in caplog.text
+
+
+@pytest.mark.parametrize("of_frame", ["constant", "axes swapped", "tangent"])
+def test_normals_of_another_frame_are_estimated(caplog, of_frame):
+    """Neighbours agree, so only the planes through the points show it."""
+    caplog.set_level(logging.WARNING)
+    up = np.array([0.0, 0.0, 1.0])
+    normals = {
+        "constant": np.tile(up, (len(BALL), 1)),
+        "axes swapped": BALL.normals[:, [0, 2, 1]] * (1.0, -1.0, 1.0),
+        "tangent": np.cross(BALL.normals, up) + 1e-9,
+    }[of_frame]
+    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    assert agreement(BALL.points_m, normals).along_share > 0.9
+    cloud = replace(BALL, normals=normals)
+    answer = meshed(cloud)
+    assert answer.normals == ESTIMATED_OUTWARDS
+    assert mesh_report(answer)["genus"] == 0
+    assert without_bad_normals(cloud, "target").normals is None
+    assert "target cloud cannot be used (they are not perpendicular to the surface)" in caplog.text
+
+
+def test_noise_as_large_as_the_spacing_does_not_cost_a_cloud_its_normals():
+    x, y = np.meshgrid(np.arange(150.0), np.arange(150.0))
+    points = np.stack([x.ravel(), y.ravel(), RNG.normal(size=x.size)], axis=1)
+    assert agreement(points, np.tile([0.0, 0.0, 1.0], (len(points), 1))).axes_fit
+
+
+def test_many_unknown_normals_cost_no_points(caplog):
+    caplog.set_level(logging.WARNING)
+    normals = BALL.normals.copy()
+    normals[::3] = np.nan
+    answer = meshed(replace(BALL, normals=normals))
+    assert (answer.points, answer.normals) == (2000, ESTIMATED_OUTWARDS)
+    assert "667 of 2000 normals of the file are zero or not finite; all are estimated" in caplog.text
 
 
 @pytest.mark.parametrize("value", [0.0, np.nan, np.inf])
@@ -125,4 +160,4 @@ def test_normals_of_a_registration_have_unit_length_or_are_left_out(caplog):
     assert without_bad_normals(BALL, "source").normals is not None
     assert not caplog.records
     assert without_bad_normals(with_signs(0.5), "source").normals is None
-    assert "source cloud disagree with their neighbours" in caplog.text
+    assert "normals of the source cloud cannot be used (" in caplog.text

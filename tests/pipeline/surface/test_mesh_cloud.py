@@ -240,3 +240,26 @@ def test_points_of_a_line_and_one_beside_it_are_a_surface():
 def test_options_that_cannot_be_are_refused(options, says):
     with pytest.raises(InputError, match=says):
         MeshOptions(**options)
+
+
+def test_a_grid_of_heights_with_whole_coordinates_is_meshed_in_its_place(caplog):
+    """Its coordinates are exact 32-bit numbers, 0.5 m apart so far from the origin."""
+    caplog.set_level(logging.WARNING)
+    x, y = np.meshgrid(np.arange(30.0), np.arange(40.0))
+    points_m = np.stack([5e5 + x.ravel(), 5.4e6 + y.ravel(), 200.0 + 0.1 * x.ravel()], axis=1)
+    surface = meshed(PointCloud(points_m)).surface
+    assert len(surface.triangles) == 2 * 29 * 39
+    np.testing.assert_allclose(surface.vertices_m[:, 1].min(), 5.4e6)
+    assert "rounded to them" not in caplog.text
+
+
+def test_a_cloud_that_was_rounded_to_floats_far_away_is_named(caplog):
+    points_m = sphere(3000).points_m + np.array([5e5, 5.4e6, 0.0])
+    meshed(PointCloud(points_m.astype(np.float32).astype(np.float64)))
+    assert "32-bit numbers are 0.5 m apart, and its positions are rounded to them" in caplog.text
+
+
+def test_a_stray_point_moves_nothing():
+    cloud = sphere(1500)
+    stray = PointCloud(np.vstack([cloud.points_m, [1e7, 0.0, 0.0]]))
+    assert len(meshed(stray).surface.triangles) == 2 * 1500 - 4
