@@ -19,7 +19,7 @@ def import_rig(
     intrinsics: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Convert a recording to a rig: of a data set, COLMAP, ROS or a telephone.
+    """Convert a recording to a rig: of a data set, COLMAP, nerfstudio, ROS or a telephone.
 
     Data sets: TUM, ICL-NUIM, 7-Scenes, ScanNet, SUN RGB-D, Redwood and Open3D. Telephones: Stray Scanner,
     Polycam and Record3D.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -120,8 +121,8 @@ def say_places(placement: Placement) -> None:
 
     if len(placement.verdicts) < 2:
         return
-    if placement.agreements:
-        share = placement.agreement.within_2pct_share
+    share = placement.agreement.within_2pct_share
+    if isfinite(share):  # some two cameras measured the same surface
         say(f"Where two cameras measured the same surface, {share:.1%} of the points agree within 2 %")
     for sentence in placement.sentences:
         say(sentence)

@@ -39,6 +39,10 @@ def read_color(path: AnyPath) -> ByteArray:
     return np.ascontiguousarray(bgr[..., ::-1])
 
 
+class NoDepthError(InputError):
+    """A depth image in which all depth is unknown."""
+
+
 @dataclass(frozen=True, slots=True)
 class ReadDepth:
     """A depth image with the scale at which it was read."""
@@ -91,7 +95,7 @@ def read_depth_values(path: AnyPath) -> NDArray[Any]:
             "or more is needed; try the file with the raw depth, not a preview of it"
         )
     if not known_in(values).any():
-        raise InputError(f"The depth image {path} has no depth anywhere; try another exposure of the scene")
+        raise NoDepthError(f"The depth image {path} has no depth anywhere; try another exposure of the scene")
     return values
 
 

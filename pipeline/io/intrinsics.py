@@ -53,17 +53,31 @@ def read_intrinsics(path: AnyPath, size_px: tuple[int, int] | None = None) -> Ca
     is_json = text.lstrip().startswith("{")
     try:
         values = json_object(text, path, "intrinsics file") if is_json else _parse_yaml(text)
-        model = _model_in(values, text)
+    except ValueError:
+        raise _unknown(path) from None
+    return camera_of_values(path, values, text, size_px)
+
+
+def camera_of_values(
+    path: AnyPath, values: dict[str, Any], text: str, size_px: tuple[int, int] | None
+) -> CameraIntrinsics:
+    """Return the camera of a file's keys and values, or else of its text, as ``read_intrinsics`` does."""
+    model = _model_in(values, text)
+    try:
         camera = camera_of_keys(path, values, size_px, model == FISHEYE) or camera_in(path, text, size_px)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError):
         camera = None
     if camera is None:
-        raise InputError(
-            f"The intrinsics file {path} is of no known style; try JSON with width, height, fx, fy, cx and cy"
-        )
+        raise _unknown(path)
     camera = _with_lens(path, camera, model)
     check_camera(f"The intrinsics file {path}", camera)
     return camera
+
+
+def _unknown(path: AnyPath) -> InputError:
+    return InputError(
+        f"The intrinsics file {path} is of no known style; try JSON with width, height, fx, fy, cx and cy"
+    )
 
 
 def _model_in(values: dict[str, Any], text: str) -> str:

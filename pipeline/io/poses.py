@@ -19,6 +19,8 @@ rotation without a note, and is replaced with a note. Recordings are orthonormal
 
 _BETWEEN = re.compile(r"[,;()\[\]]|\barray\b")
 """Marks between the numbers of a matrix."""
+_ENDS = re.compile(r"[\n)\]]\s*\Z")
+"""The end of a line or of a bracket: 12 numbers without it may be a truncated file of 16."""
 
 
 def read_pose(path: AnyPath) -> FloatArray:
@@ -67,8 +69,8 @@ def _matrix_in(path: AnyPath) -> FloatArray:
 def matrix_in(text: str) -> FloatArray | None:
     """Return the (4, 4) matrix in a text, None if it holds none.
 
-    It has 4 x 4 numbers, or the first 3 x 4 of them, row by row: four in a line, or all in one line, or each
-    in its own; between them may be commas, semicolons and brackets, as Python prints them.
+    It has 4 x 4 numbers, or the first 3 x 4 of them and a line end, row by row: four in a line, or all in
+    one line, or each in its own; between them may be commas, semicolons and brackets, as Python prints them.
     """
     rows = _rows(text)
     if len(rows) > 1 and {len(row) for row in rows} not in ({1}, {4}):
@@ -77,7 +79,7 @@ def matrix_in(text: str) -> FloatArray | None:
         numbers = np.array([word for row in rows for word in row], dtype=np.float64)
     except ValueError:
         return None
-    if numbers.size == 12:
+    if numbers.size == 12 and _ENDS.search(text):
         numbers = np.append(numbers, (0.0, 0.0, 0.0, 1.0))
     return numbers.reshape(4, 4) if numbers.size == 16 else None
 

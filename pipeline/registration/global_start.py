@@ -76,10 +76,13 @@ def global_start(source: PointCloud, target: PointCloud, voxel_m: float, seed: i
 def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[Any, Any]:
     """Return the thinned cloud with normals, and its features."""
     points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points_m))
-    if cloud.normals is not None:
-        points.normals = o3d.utility.Vector3dVector(cloud.normals)
+    given = cloud.normals
+    if given is not None and not (np.isfinite(given).all() and given.any(axis=1).all()):
+        given = None
+    if given is not None:
+        points.normals = o3d.utility.Vector3dVector(given)
     points = points.voxel_down_sample(voxel_m)
-    if cloud.normals is None:
+    if given is None:
         points.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(NORMAL_REACH * voxel_m, 30))
         points.orient_normals_towards_camera_location(np.zeros(3))
     o3d_registration: Any = o3d.pipelines.registration  # its stubs require an optional argument

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from functools import cached_property, partial
 
@@ -12,7 +13,11 @@ from pipeline.kernels.local_planes import patch_normals
 from pipeline.kernels.point_sets import neighbour_distances_m
 from pipeline.types import BoolArray, FloatArray, IntArray
 
+_log = logging.getLogger(__name__)
+
 NORMAL_NEIGHBOURS, SPACING_NEIGHBOURS = 20, 4
+_UNIT_TOLERANCE = 1e-3
+"""Given normals whose length differs more from 1 are scaled."""
 FEW_POINTS = 20_000
 """Clouds up to this size get all their normals at once, on all cores, instead of some at each iteration."""
 
@@ -26,11 +31,16 @@ class Normals:
     def __init__(
         self, points_m: FloatArray, known: FloatArray | None = None, tree: Callable[[], KdTree] | None = None
     ) -> None:
-        """Prepare for (N, 3) points; ``known`` are given normals, ``tree`` returns the points' tree."""
+        """Prepare for (N, 3) points; ``tree`` returns their tree.
+
+        ``known`` are given normals, of any length; those that are zero or not finite are computed.
+        """
         self._points_m, self._tree_of = points_m, tree or partial(tree_of, points_m)
-        self._found, self._all = np.full(len(points_m), known is not None), known is not None
-        given = np.empty((len(points_m), 3)) if known is None else known
-        self._normals = np.ascontiguousarray(given, dtype=np.float64)
+        unknown = np.zeros(len(points_m), bool), np.empty((len(points_m), 3))
+        found, normals = unknown if known is None else _usable(known)
+        self._found: BoolArray = found
+        self._normals: FloatArray = normals
+        self._all = bool(self._found.all())
 
     def at(self, rows: IntArray) -> FloatArray:
         """Return (N, 3) normals, of which at least those at ``rows`` are valid."""
@@ -55,6 +65,22 @@ class Normals:
     @cached_property
     def _tree(self) -> KdTree:
         return self._tree_of()
+
+
+def _usable(normals: FloatArray) -> tuple[BoolArray, FloatArray]:
+    """Return (N,) which of (N, 3) normals are finite and not zero, and the normals with unit length."""
+    normals = np.array(normals, dtype=np.float64, order="C")
+    lengths = np.linalg.norm(normals, axis=1)
+    usable = np.isfinite(lengths) & (lengths > 0.0)
+    if not usable.all():
+        _log.warning(
+            "%d of %d normals are zero or not finite; they are estimated from the points",
+            (~usable).sum(),
+            len(usable),
+        )
+    scaled = usable & (np.abs(lengths - 1.0) > _UNIT_TOLERANCE)
+    normals[scaled] /= lengths[scaled, None]
+    return usable, normals
 
 
 @compiled

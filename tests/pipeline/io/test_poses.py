@@ -133,8 +133,8 @@ def test_exact_poses_stay_as_they_are(tmp_path):
         lambda T: str(T.tolist()),
         repr,
         str,
-        lambda T: "\n".join(" ".join(map(repr, row)) for row in T[:3].tolist()),
-        lambda T: " ".join(map(repr, T[:3].ravel().tolist())),
+        lambda T: "".join(" ".join(map(repr, row)) + "\n" for row in T[:3].tolist()),
+        lambda T: " ".join(map(repr, T[:3].ravel().tolist())) + "\n",
         lambda T: ";\n".join(" ".join(map(repr, row)) for row in T.tolist()),
         lambda T: json.dumps(T.tolist(), indent=1),
     ],
@@ -145,7 +145,10 @@ def test_a_pose_may_be_as_other_programs_print_it(tmp_path, form):
     np.testing.assert_allclose(read_pose(tmp_path / "pose.txt"), T, atol=1e-7)
 
 
-@pytest.mark.parametrize("text", ["1 2 3 0 0 0 1", "1 0 0\n0 1 0\n0 0 1\n0 0 0", "1,5 0,0 0,0 2,5\n" * 4])
+@pytest.mark.parametrize(
+    "text",
+    ["1 2 3 0 0 0 1", "1 0 0 1\n0 1 0 2\n0 0 1 0.4", "1 0 0\n0 1 0\n0 0 1\n0 0 0", "1,5 0,0 0,0 2,5\n" * 4],
+)
 def test_other_counts_of_numbers_are_no_pose(tmp_path, text):
     (tmp_path / "pose.txt").write_text(text)
     with pytest.raises(

@@ -54,3 +54,15 @@ def test_points_on_a_line_or_in_one_place_have_some_unit_normal():
     line[:, 0] = np.arange(30.0)
     for points in (line, np.ones((30, 3))):
         np.testing.assert_allclose(np.linalg.norm(pca_normals(points), axis=1), 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("value", [0.0, np.nan, np.inf])
+@pytest.mark.parametrize("bad", [slice(0, None), slice(0, None, 3)])
+def test_given_normals_that_are_unknown_are_computed_and_others_kept(value, bad):
+    rng = np.random.default_rng(4)
+    points = np.column_stack([rng.uniform(-1, 1, (300, 2)), np.full(300, 2.0)])
+    known = np.tile([0.0, 0.0, 3.0], (300, 1))  # away from the camera, and of length 3
+    known[bad] = value
+    expected = np.tile([0.0, 0.0, 1.0], (300, 1))
+    expected[bad] = [0.0, 0.0, -1.0]
+    np.testing.assert_allclose(Normals(points, known).at(np.arange(300)), expected, atol=1e-9)
