@@ -7,7 +7,7 @@ from pathlib import Path
 
 from packetmesh.errors import InputError
 from pipeline.io.clouds import read_cloud, takes_columns
-from pipeline.surface.mesh_cloud import in_metres
+from pipeline.surface.cloud_checks import in_metres
 from pipeline.types import PointCloud
 
 AUTO = "auto"

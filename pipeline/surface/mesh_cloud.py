@@ -18,16 +18,21 @@ from pipeline.config import SurfaceConfig
 from pipeline.io.cloud_precision import too_coarse
 from pipeline.io.clouds import read_cloud
 from pipeline.io.meshes import check_place, mesh_suffix, write_mesh
-from pipeline.kernels.point_sets import distinct_rows
 from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.surface.boundary import edges_and_faces
-from pipeline.surface.given_normals import (
-    DOUBTFUL_SHARE,
-    MOST_UNKNOWN_SHARE,
-    agreement,
-    known_normals,
-    opposite_text,
+from pipeline.surface.cloud_checks import (
+    LEAST_POINTS,
+    check_resolution,
+    check_shape,
+    check_unit,
+    doubtful_unit,
+    in_metres,
+    middle_reach_m,
+    usable_points,
+    warn_of_rounding,
+    width_of,
 )
+from pipeline.surface.given_normals import DOUBTFUL_SHARE, agreement, opposite_text
 from pipeline.surface.normals import oriented_normals, turned_outwards, turned_to_viewpoint
 from pipeline.surface.radii import radii, spacing
 from pipeline.surface.smooth import smooth
@@ -37,19 +42,8 @@ from pipeline.types import FloatArray, PointCloud, SurfaceResult
 
 _log = logging.getLogger(__name__)
 
-LEAST_POINTS = 3
-USUAL_M = 0.05, 50.0
-"""Usual range of widths: from objects to houses."""
-OUTER_PERCENT = 1.0
-"""Per cent of the points on either side that do not count for a cloud's width, because of outliers."""
-LARGEST_M, SMALLEST_M = 1e9, 1e-12
-"""Largest allowed coordinate, and the extent below which a cloud counts as one point."""
 _FAR_M = 1e5
 """Clouds whose middle is farther from the origin are moved to it for the computation."""
-_COARSE = 0.1
-"""Coordinates in steps above this share of the smallest ball make a rough surface."""
-_LINE = 1e-6
-"""A cloud is a line if it is thinner than this share of its length."""
 
 GIVEN = "given"
 GIVEN_TURNED = "given, turned to the viewpoint"
@@ -154,7 +148,7 @@ def iterate_mesh_cloud(cloud: PointCloud, options: MeshOptions) -> Generator[Pro
     if options.estimate_normals:
         cloud = replace(cloud, normals=None)
     cloud = in_metres(usable_points(cloud), metres_per_unit)
-    far = too_coarse(cloud.points_m) or _reach_m(cloud.points_m) > _FAR_M
+    far = too_coarse(cloud.points_m) or middle_reach_m(cloud.points_m) > _FAR_M
     offset_m = (
         np.rint(np.median(cloud.points_m, axis=0)) if far else np.zeros(3)
     )  # sums of squares lose digits far away
@@ -168,7 +162,7 @@ def iterate_mesh_cloud(cloud: PointCloud, options: MeshOptions) -> Generator[Pro
     if options.max_points is not None and len(cloud) > options.max_points:
         yield Progress(f"thinning {len(cloud)} points", 0.1)
         cloud = voxel_average(cloud, voxel_for_count(cloud.points_m, options.max_points))
-        _check_shape(cloud.points_m)
+        check_shape(cloud.points_m)
     yield Progress(f"normals of {len(cloud)} points", 0.15)
     cloud, normals = with_normals(cloud, viewpoint_m)
     yield Progress(f"the normals are {normals}", 0.35)
@@ -178,12 +172,18 @@ def iterate_mesh_cloud(cloud: PointCloud, options: MeshOptions) -> Generator[Pro
     yield Progress("spacing of the points", 0.5)
     radii_m = chosen_radii(cloud, options.radii_m)
     if not far:
-        _check_resolution(cloud.points_m, radii_m[0])
+        check_resolution(cloud.points_m, radii_m[0])
     else:
-        _warn_of_rounding(cloud.points_m + offset_m, radii_m[0])
+        warn_of_rounding(cloud.points_m + offset_m, radii_m[0])
     sizes = ", ".join(f"{1000.0 * radius_m:.4g}" for radius_m in radii_m)
     yield Progress(f"rolling balls of {sizes} mm over {len(cloud)} points", 0.55)
     surface = reconstruct_surface(cloud, radii_m)
+    if normals == GIVEN and surface.quality.components > 1:
+        _log.warning(
+            "The surface has %d pieces; if they belong together, the given normals may point to different "
+            "sides: try --estimate-normals",
+            surface.quality.components,
+        )
     if far:
         surface = replace(surface, vertices_m=surface.vertices_m + offset_m)
     return MeshedCloud(surface, len(cloud), normals, width_m, doubt)
@@ -210,60 +210,6 @@ def mesh_report(meshed: MeshedCloud) -> dict[str, Any]:
         "euler": euler,
         "genus": (2 - euler) // 2 if closed else None,
     }
-
-
-def usable_points(cloud: PointCloud) -> PointCloud:
-    """Return the distinct points in their order, without those whose normal is unknown (unless many are).
-
-    Raises:
-        InputError: fewer than three points, or all of them coincident or collinear.
-    """
-    first = distinct_rows(cloud.points_m)
-    if len(first) < len(cloud):
-        _log.warning("%d repeated points are left out", len(cloud) - len(first))
-        cloud = cloud.select(first)
-    cloud = _known_normals(cloud)
-    _check_shape(cloud.points_m)
-    return cloud
-
-
-def check_unit(metres_per_unit: float) -> None:
-    """Check the length of a unit.
-
-    Raises:
-        InputError: the length is not finite or not positive.
-    """
-    if not (math.isfinite(metres_per_unit) and metres_per_unit > 0.0):
-        raise InputError(f"There cannot be {metres_per_unit:g} metres in a unit; try 0.001 for millimetres")
-
-
-def in_metres(cloud: PointCloud, metres_per_unit: float) -> PointCloud:
-    """Convert a cloud to metres.
-
-    Raises:
-        InputError: the unit's length is not finite or not positive.
-    """
-    check_unit(metres_per_unit)
-    if metres_per_unit == 1.0:
-        return cloud
-    return replace(cloud, points_m=metres_per_unit * cloud.points_m)
-
-
-def width_of(cloud: PointCloud) -> float:
-    """Return the longest side of the box around the points, without ``OUTER_PERCENT`` at each end."""
-    low_m, high_m = np.percentile(cloud.points_m, [OUTER_PERCENT, 100.0 - OUTER_PERCENT], axis=0)
-    return float((high_m - low_m).max())
-
-
-def doubtful_unit(width_m: float, metres_per_unit: float) -> str | None:
-    """Return a warning for a cloud that is larger than a house or too small for a depth camera, or None."""
-    if USUAL_M[0] <= width_m <= USUAL_M[1]:
-        return None
-    if width_m > USUAL_M[1]:
-        advice = f"if its numbers are millimetres, try --metres-per-unit {0.001 * metres_per_unit:.3g}"
-    else:
-        advice = "if it is wider in truth, say so with --metres-per-unit"
-    return f"The cloud is {width_m:.3g} m wide; {advice}"
 
 
 def with_normals(cloud: PointCloud, viewpoint_m: FloatArray | None) -> tuple[PointCloud, str]:
@@ -319,82 +265,3 @@ def chosen_radii(cloud: PointCloud, radii_m: tuple[float, ...] | None) -> tuple[
             f"across; try about {min(fits_m, extent_m):.3g} m"
         )
     return tuple(sorted(radii_m))
-
-
-def _known_normals(cloud: PointCloud) -> PointCloud:
-    """Normalise the normals; leave out points without one, or all normals if many points have none."""
-    if cloud.normals is None:
-        return cloud
-    known = known_normals(cloud.normals)
-    if not known.any():
-        _log.warning("All normals of the file are zero or not finite; they are estimated from the points")
-        return replace(cloud, normals=None)
-    unknown = int((~known).sum())
-    if unknown > MOST_UNKNOWN_SHARE * len(cloud):
-        _log.warning(
-            "%d of %d normals of the file are zero or not finite; all are estimated from the points",
-            unknown,
-            len(cloud),
-        )
-        return replace(cloud, normals=None)
-    if unknown:
-        _log.warning(
-            "%d points are left out: their normals are zero or not finite; --estimate-normals keeps them",
-            unknown,
-        )
-        cloud = cloud.select(known)
-    assert cloud.normals is not None
-    return replace(cloud, normals=cloud.normals / np.linalg.norm(cloud.normals, axis=1, keepdims=True))
-
-
-def _check_shape(points_m: FloatArray) -> None:
-    reach_m, extent_m = float(np.abs(points_m).max()), float(np.ptp(points_m, axis=0).max())
-    if reach_m > LARGEST_M:
-        raise InputError(
-            f"A point of the cloud has a coordinate of {reach_m:.3g} m; check its file and its units"
-        )
-    if extent_m < SMALLEST_M:
-        raise InputError("All points of the cloud are in one place; check its file")
-    if len(points_m) < LEAST_POINTS:
-        raise InputError(
-            f"The cloud has {len(points_m)} distinct points; a surface needs at least {LEAST_POINTS}, "
-            "so check its file"
-        )
-    centered = (points_m - points_m.mean(axis=0)) / extent_m
-    widths = np.sqrt(np.maximum(np.linalg.eigvalsh(centered.T @ centered), 0.0))
-    if widths[1] <= _LINE * widths[2]:
-        raise InputError(
-            f"The {len(points_m)} points of the cloud lie on one line; a surface needs points beside it"
-        )
-
-
-def _reach_m(points_m: FloatArray) -> float:
-    """Return the largest coordinate, by magnitude, of the middle of the points."""
-    return float(np.abs(np.median(points_m, axis=0)).max())
-
-
-def _check_resolution(points_m: FloatArray, radius_m: float) -> None:
-    """Refuse points so far from the origin that the 32-bit floats of a mesh file are too coarse."""
-    step_m = float(np.spacing(np.float32(_reach_m(points_m))))
-    if step_m > _COARSE * radius_m:
-        raise InputError(
-            f"The cloud reaches {_reach_m(points_m):.4g} m from the origin, where the numbers of a mesh file "
-            f"are {step_m:.2g} m apart; try to move it nearer to the origin"
-        )
-
-
-def _warn_of_rounding(points_m: FloatArray, radius_m: float) -> None:
-    """Log that the positions of a far cloud were rounded to 32-bit numbers, if balls see their steps."""
-    reach_m = _reach_m(points_m)
-    step_m = float(np.spacing(np.float32(reach_m)))
-    if step_m <= _COARSE * radius_m or too_coarse(points_m):
-        return
-    axis = int(np.abs(np.median(points_m, axis=0)).argmax())
-    steps_m = np.diff(np.unique(points_m[:, axis]))
-    if len(steps_m) and steps_m.min() < 1.5 * step_m:  # a grid of heights has larger steps
-        _log.warning(
-            "The cloud is %.4g m from the origin, where 32-bit numbers are %.2g m apart, and its positions "
-            "are rounded to them; try to export it with 64-bit numbers, or nearer to the origin",
-            reach_m,
-            step_m,
-        )

@@ -161,3 +161,15 @@ def test_normals_of_a_registration_have_unit_length_or_are_left_out(caplog):
     assert not caplog.records
     assert without_bad_normals(with_signs(0.5), "source").normals is None
     assert "normals of the source cloud cannot be used (" in caplog.text
+
+
+def test_pieces_of_a_surface_whose_normals_point_to_both_sides_are_a_warning_with_a_remedy(caplog):
+    halves = np.where(BALL.points_m[:, 2:] > 0.0, 1.0, -1.0)
+    torn = drain(iterate_mesh_cloud(replace(BALL, normals=halves * BALL.normals), MeshOptions()))
+    assert torn.surface.quality.components > 1
+    assert "try --estimate-normals" in caplog.text
+    caplog.clear()
+    options = MeshOptions(estimate_normals=True)
+    whole = drain(iterate_mesh_cloud(replace(BALL, normals=halves * BALL.normals), options))
+    assert whole.surface.quality.components == 1
+    assert not caplog.text

@@ -8,6 +8,7 @@ import pytest
 
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
+from pipeline.surface.cloud_checks import doubtful_unit, usable_points, width_of
 from pipeline.surface.mesh_cloud import (
     ESTIMATED_OUTWARDS,
     ESTIMATED_VIEWPOINT,
@@ -15,11 +16,8 @@ from pipeline.surface.mesh_cloud import (
     GIVEN_TURNED,
     MeshOptions,
     chosen_radii,
-    doubtful_unit,
     iterate_mesh_cloud,
     mesh_report,
-    usable_points,
-    width_of,
 )
 from pipeline.surface.radii import spacing
 from pipeline.surface.surrounding import surrounding_radii
