@@ -16,7 +16,7 @@ from packetmesh.errors import InputError
 from packetmesh.files import MAX_TEXT_BYTES, json_object, read_json, read_text
 from pipeline.importing.cameras import camera_of
 from pipeline.importing.found_poses import found_poses
-from pipeline.importing.pairing import color_folder, paired, pose_indices, require, thinned
+from pipeline.importing.pairing import color_folder, paired, pose_indices, require, thinned, visible
 from pipeline.importing.sequence import DEPTH_SUFFIXES, Candidate, Sequence, posed
 from pipeline.importing.stray import CONFIDENCE_NOTE
 from pipeline.io.intrinsics import check_camera
@@ -42,7 +42,7 @@ def read_polycam(folder: Path, intrinsics: Path | None) -> Sequence:
     assert frames is not None
     corrected = all(_filled(frames / f"corrected_{name}") for name in ("cameras", "images"))
     prefix = "corrected_" if corrected else ""
-    files, rare = thinned(sorted((frames / f"{prefix}cameras").glob("*.json")))
+    files, rare = thinned(visible((frames / f"{prefix}cameras").glob("*.json")))
     found = [(file, *images) for file in files if (images := _polycam_images(frames, prefix, file.stem))]
     require(found, frames, f"an image in {prefix}images/ and depth/ with a name of {prefix}cameras/")
     read = {file: _polycam_camera(file) for file, _, _ in found}

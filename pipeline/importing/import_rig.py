@@ -17,7 +17,7 @@ from pipeline.importing.depth_units import depth_in
 from pipeline.importing.kinds import kind_of, recognise
 from pipeline.importing.rig_folder import NodeImages, new_folder, write_node
 from pipeline.importing.sequence import Candidate, Sequence, distinct
-from pipeline.io.images import read_color
+from pipeline.io.images import NoDepthError, ReadDepth, read_color
 from pipeline.io.same_view import depth_camera_of, same_view_note
 from pipeline.kernels.geometry import rigid
 from pipeline.types import MAX_NODES, AnyPath, FloatArray
@@ -103,8 +103,7 @@ def iterate_import(
     candidates, repeated = distinct(sequence.candidates)
     sequence = replace(sequence, candidates=candidates, notes=(*sequence.notes, *repeated))
     yield Progress("choice of frames", 0.2)
-    middle = depth_in(sequence.candidates[len(sequence.candidates) // 2], sequence)
-    chosen = choose(sequence, frames, float(np.nanmedian(middle.depth.z_m)))
+    sequence, chosen, middle = _chosen(sequence, frames)
     written = []
     with new_folder(out) as folder_of_rig:
         T_up_world = _upright([sequence.candidates[index] for index in chosen])
@@ -142,6 +141,32 @@ def _from_bag(
             written.append(ImportedFrame.of(node, done, time_s))
     notes = (*bag.notes, _scale_note(written, bag.units_per_metre))
     return ImportReport("bag", str(path), bag.candidates, bag.units_per_metre, tuple(written), notes)
+
+
+def _chosen(sequence: Sequence, frames: int) -> tuple[Sequence, tuple[int, ...], ReadDepth]:
+    """Choose frames; returns the sequence without frames that have no depth, their indices, and its middle.
+
+    Raises:
+        InputError: no frame has depth, or one cannot be read.
+    """
+    left_out = 0
+    while True:
+        number = len(sequence.candidates)
+        at = number // 2
+        try:
+            middle = depth_in(sequence.candidates[at], sequence)
+            chosen = choose(sequence, frames, float(np.nanmedian(middle.depth.z_m)))
+            for at in chosen:
+                depth_in(sequence.candidates[at], sequence)
+        except NoDepthError:
+            if number == 1:
+                raise
+            left_out += 1
+            kept = sequence.candidates[:at] + sequence.candidates[at + 1 :]
+            sequence = replace(sequence, candidates=kept)
+            continue
+        notes = (f"{left_out} frames without any depth were left out",) if left_out else ()
+        return replace(sequence, notes=(*sequence.notes, *notes)), chosen, middle
 
 
 def _same_view_notes(sequence: Sequence, node: NodeImages) -> tuple[str, ...]:

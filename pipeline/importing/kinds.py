@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from packetmesh.errors import InputError
-from pipeline.importing import arkit, associated, colmap, numbered, stray, tum
+from pipeline.importing import arkit, associated, colmap, nerfstudio, numbered, stray, tum
 from pipeline.importing.bag import SUFFIXES
 from pipeline.importing.sequence import Sequence
 
@@ -44,6 +44,12 @@ KINDS = (
         "Stray Scanner", "rgb/, depth/, camera_matrix.csv and odometry.csv", stray.is_stray, stray.read_stray
     ),
     Kind("Polycam", "keyframes/ with images/, cameras/ and depth/", arkit.is_polycam, arkit.read_polycam),
+    Kind(
+        "nerfstudio",
+        "transforms.json with depth_file_path",
+        nerfstudio.is_nerfstudio,
+        nerfstudio.read_nerfstudio,
+    ),
     Kind("Record3D", "metadata.json, rgb/ and depth/ of EXR images", arkit.is_record3d, arkit.read_record3d),
     Kind(
         "ICL-NUIM or ORB-SLAM",

@@ -18,6 +18,7 @@ from pipeline.importing.pairing import (
     pose_indices,
     require,
     thinned,
+    visible,
 )
 from pipeline.importing.sequence import Candidate, Sequence, posed
 from pipeline.io.images import read_color, read_depth_values
@@ -138,13 +139,13 @@ def read_trajectory_log(file: Path) -> dict[int, FloatArray]:
 def is_sunrgbd(folder: Path) -> bool:
     """Return whether a folder contains one image in image/, depth_bfx/ or depth/, and intrinsics.txt."""
     depth = (folder / "depth_bfx").is_dir() or (folder / "depth").is_dir()
-    image = (folder / "image").is_dir() and len(list((folder / "image").iterdir())) == 1
+    image = (folder / "image").is_dir() and len(visible((folder / "image").iterdir())) == 1
     return image and depth and (folder / "intrinsics.txt").is_file()
 
 
 def read_sunrgbd(folder: Path, intrinsics: Path | None) -> Sequence:
     """Read the frame of a SUN RGB-D folder (Song et al., CVPR 2015), with merged depth if available."""
-    colors = [path for path in sorted((folder / "image").iterdir()) if path.suffix.lower() in COLOR_SUFFIXES]
+    colors = [path for path in visible((folder / "image").iterdir()) if path.suffix.lower() in COLOR_SUFFIXES]
     depths = [path for name in ("depth_bfx", "depth") for path in depth_images(folder / name, "*")]
     require(colors, folder, "an image in image/")
     require(depths, folder, "an image in depth_bfx/ or depth/")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -44,7 +45,7 @@ def paired(colors: Path, depths: Path) -> tuple[list[Pair], tuple[str, ...]]:
         InputError: no two images have the same number, or two images of a folder have.
     """
     by_number = [
-        _by_number(folder, [path for path in folder.iterdir() if path.suffix.lower() in suffixes])
+        _by_number(folder, [path for path in visible(folder.iterdir()) if path.suffix.lower() in suffixes])
         for folder, suffixes in ((colors, COLOR_SUFFIXES), (depths, DEPTH_SUFFIXES))
     ]
     if all(_is_time(path) for own in by_number for path in own.values()):
@@ -81,7 +82,12 @@ def pose_indices(pairs: list[Pair], count: int) -> list[int]:
 
 def depth_images(folder: Path, pattern: str) -> list[Path]:
     """List the depth images, sorted by name."""
-    return [path for path in sorted(folder.glob(pattern)) if path.suffix.lower() in DEPTH_SUFFIXES]
+    return [path for path in visible(folder.glob(pattern)) if path.suffix.lower() in DEPTH_SUFFIXES]
+
+
+def visible(paths: Iterable[Path]) -> list[Path]:
+    """Return the sorted paths without hidden files, such as the ._0.png of ZIP files made on a Mac."""
+    return sorted(path for path in paths if not path.name.startswith("."))
 
 
 def _by_number(folder: Path, paths: list[Path]) -> _Numbered:

@@ -83,3 +83,14 @@ def test_a_bag_that_cannot_be_used_is_one_sentence_and_leaves_no_folder(capsys, 
     got = run(capsys, "reconstruct", "--rig", tmp_path / "broken.bag", "--out", tmp_path / "out")
     check_one_sentence(got, 1, "cannot be read")
     assert not (tmp_path / "out").exists()
+
+
+def test_given_poses_that_no_other_camera_confirms_have_no_share_of_agreement(capsys, tmp_path):
+    """As of translations in millimetres that are read as metres."""
+    first, second, _ = load_demo("office").frames
+    far = second.T_world_camera.copy()
+    far[:3, 3] += 300.0
+    save_rig(tmp_path / "rig", Rig("far", (first, replace(second, T_world_camera=far))))
+    _, _, err = run(capsys, "reconstruct", "--rig", tmp_path / "rig", "--out", tmp_path / "out", *QUICK)
+    assert "nan" not in err
+    assert "node_01 stands by its given pose alone: no other camera measured what it sees" in err

@@ -181,13 +181,13 @@ def write_bag(
 def _tree(bag: BagWriter, rig: Rig, T_color_depth: np.ndarray | None) -> Any:
     links: list[Any] = []
     for index, frame in enumerate(rig.frames):
-        links.append(_link(bag, "map", f"cam{index}_optical", frame.T_world_camera))
+        links.append(link(bag, "map", f"cam{index}_optical", frame.T_world_camera))
         if T_color_depth is not None:
-            links.append(_link(bag, f"cam{index}_optical", f"cam{index}_depth", T_color_depth))
+            links.append(link(bag, f"cam{index}_optical", f"cam{index}_depth", T_color_depth))
     return bag.make("tf2_msgs/msg/TFMessage", links)
 
 
-def _link(bag: BagWriter, parent: str, child: str, T: np.ndarray) -> Any:
+def link(bag: BagWriter, parent: str, child: str, T: np.ndarray) -> Any:
     place = bag.make("geometry_msgs/msg/Vector3", *T[:3, 3].tolist())
     quaternion = Rotation.from_matrix(T[:3, :3]).as_quat().tolist()
     turn = bag.make("geometry_msgs/msg/Quaternion", *quaternion)

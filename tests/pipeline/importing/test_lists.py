@@ -115,9 +115,10 @@ def test_a_quaternion_has_the_order_of_its_heading(tmp_path, written, heading, f
     [
         lambda T: T[:3].ravel(),
         lambda T: T.ravel(),
+        lambda T: np.eye(4)[:3].ravel(),
         lambda T: [*T[:3, 3], *(2.0 * Rotation.from_matrix(T[:3, :3]).as_quat())],
     ],
-    ids=["3 x 4", "4 x 4", "length 2"],
+    ids=["3 x 4", "4 x 4", "3 x 4 of the first camera", "length 2"],
 )
 def test_a_trajectory_of_other_numbers_is_refused(tmp_path, written, row_of):
     file = tmp_path / "recording" / "groundtruth.txt"
