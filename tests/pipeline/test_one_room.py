@@ -13,6 +13,9 @@ import pytest
 
 from packetmesh.progress import drain
 from pipeline.importing import iterate_import
+from pipeline.importing.bag import SUFFIXES, is_bag
+from pipeline.importing.kinds import KINDS, kind_of
+from pipeline.io.clouds import _PARSERS
 from pipeline.io.meshes import read_mesh
 from pipeline.io.rigs import load_rig
 from pipeline.reconstruct import reconstruct
@@ -50,6 +53,7 @@ RECORDINGS = [
     Recording("Redwood", data_sets.write_redwood, "voxels along other axes", own_world=True),
     Recording("Open3D", data_sets.write_open3d, "JPEG colours, poses to 1e-8"),
     Recording("SUN RGB-D", data_sets.write_sun_rgbd, "JPEG colours", nodes=1, own_world=True),
+    Recording("nerfstudio", data_sets.write_nerfstudio, "nothing"),
     Recording("COLMAP, depth maps", colmap.write_colmap_dense, "depth in float32"),
     Recording("COLMAP, sensor", colmap.write_colmap_sensor, "the scale, from points to 1e-6"),
     Recording("Stray Scanner", phones.write_stray, "nothing", times=2, nodes=2),
@@ -90,11 +94,15 @@ CLOUDS = [
     Cloud("NPY", ".npy", clouds.write_npy, "float32"),
     Cloud("KITTI", ".bin", clouds.write_kitti, "float32, no normals"),
     Cloud("XYZ", ".xyz", clouds.write_open3d_ascii, "1e-10 m, no normals"),
+    Cloud("OBJ", ".obj", clouds.write_model, "1e-8 m, no normals"),
+    Cloud("GLB", ".glb", clouds.write_model, "float32, no normals"),
+    Cloud("STL", ".stl", clouds.write_model, "float32, no normals"),
+    Cloud("VTK", ".vtk", clouds.write_vtk, "no normals"),
     Cloud("PTS", ".pts", texts.write_pts, "1e-6 m, no normals"),
     Cloud("commas, titles", ".csv", texts.write_comma, "0.1 mm, no normals"),
     Cloud("semicolons, decimal commas", ".csv", texts.write_semicolon, "0.1 mm, no normals"),
     Cloud("tabs, millimetres", ".txt", texts.write_tab_mm, "0.1 mm, no normals"),
-    Cloud("time first", ".txt", texts.write_time_first, "0.1 mm, no normals"),
+    Cloud("time first", ".asc", texts.write_time_first, "0.1 mm, no normals"),
 ]
 
 
@@ -108,6 +116,13 @@ def test_a_recording_of_the_room_gives_its_mesh(tmp_path, kind):
         first = expected.placement.T_world_camera[0], found.placement.T_world_camera[0]
         T_room_world = first[0] @ np.linalg.inv(first[1])
     assert_same(moved(found.after, T_room_world), expected.after, kind)
+
+
+def test_every_kind_of_file_is_in_the_tables(tmp_path):
+    paths = [kind.write(tmp_path / str(index), room(1)) for index, kind in enumerate(RECORDINGS)]
+    assert {kind_of(path) for path in paths if not is_bag(path)} == set(KINDS)
+    assert {path.suffix for folder in paths for path in (folder, *folder.glob("*"))} >= set(SUFFIXES)
+    assert {kind.suffix for kind in CLOUDS} == set(_PARSERS)
 
 
 @pytest.mark.parametrize("times", [2, 3, 4])

@@ -71,6 +71,23 @@ def write_kitti(path: Path, cloud: PointCloud) -> None:
     np.hstack([cloud.points_m, reflectance]).astype("<f4").tofile(path)
 
 
+def write_model(path: Path, cloud: PointCloud) -> None:
+    """By trimesh: OBJ, STL and GLB by the suffix. The points are the corners of any triangles.
+
+    glTF says that y is up (section 3.3), so that a room with z up is turned for a GLB.
+    """
+    x, y, z = cloud.points_m.T
+    points_m = np.stack([x, z, -y], axis=1) if path.suffix == ".glb" else cloud.points_m
+    corners = np.resize(np.arange(len(cloud)), (len(cloud) // 3 + 1, 3))
+    trimesh.Trimesh(points_m, corners, process=False).export(path)
+
+
+def write_vtk(path: Path, cloud: PointCloud) -> None:
+    """Legacy VTK, binary: big-endian float64."""
+    head = f"# vtk DataFile Version 3.0\nroom\nBINARY\nDATASET POLYDATA\nPOINTS {len(cloud)} double\n"
+    path.write_bytes(head.encode() + cloud.points_m.astype(">f8").tobytes() + b"\n")
+
+
 def _open3d(cloud: PointCloud) -> o3d.geometry.PointCloud:
     own = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points_m))
     own.colors = o3d.utility.Vector3dVector(cloud.colors / 255.0)

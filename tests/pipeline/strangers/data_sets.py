@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import cv2
@@ -9,6 +10,7 @@ import numpy as np
 
 from pipeline.types import Rig
 from tests.pipeline.strangers.images import (
+    ARKIT,
     depth_units,
     photograph,
     quaternion,
@@ -126,4 +128,19 @@ def write_sun_rgbd(folder: Path, rig: Rig) -> Path:
     rotated = (millimetres << 3) | (millimetres >> 13)
     cv2.imwrite(str(folder / "depth" / "0000001.png"), rotated.astype(np.uint16))
     (folder / "intrinsics.txt").write_text(text_of(frame.intrinsics.matrix, 6) + "\n")
+    return folder
+
+
+def write_nerfstudio(folder: Path, rig: Rig) -> Path:
+    """Camera axes are ARKit's, and a pixel's centre has the coordinate 0.5."""
+    K, frames = rig.frames[0].intrinsics, []
+    for index, frame in enumerate(rig.frames, start=1):
+        names = f"images/frame_{index:05d}.png", f"depths/frame_{index:05d}.png"
+        save_color(folder / names[0], frame.rgb)
+        save_depth(folder / names[1], frame)
+        pose = (frame.T_world_camera @ ARKIT).tolist()
+        frames.append({"file_path": names[0], "depth_file_path": names[1], "transform_matrix": pose})
+    camera = {"fl_x": K.fx_px, "fl_y": K.fy_px, "cx": K.cx_px + 0.5, "cy": K.cy_px + 0.5}
+    camera |= {"w": K.width_px, "h": K.height_px, "camera_model": "OPENCV"}
+    (folder / "transforms.json").write_text(json.dumps(camera | {"frames": frames}))
     return folder
