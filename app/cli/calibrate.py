@@ -106,7 +106,8 @@ def calibrate(
         calibrate_cameras(nodes, out, *how, json)
         return
     files = image_files(images, one_camera)
-    report = drain(iterate_calibration(files, board, lens, held_out, without, board_warp), say_progress)
+    steps = iterate_calibration(files, board, lens, held_out, without, board_warp, one_camera)
+    report = drain(steps, say_progress)
     report = with_depth(report, depth_beside(files), depth_scale=depth_scale)
     trust = assess(report.calibration, report.views, board, range_m, accuracy_mm / 1000.0)
     writable_folder(out)

@@ -205,6 +205,8 @@ def _window(board: Board, T_camera_board: FloatArray, intrinsics: CameraIntrinsi
         for a, b in zip(corners_m, np.roll(corners_m, -1, axis=0), strict=True)
     ]
     seen_px = project(intrinsics, np.concatenate(edges_m))
+    if np.isnan(seen_px).any():  # the sheet reaches beyond the lens's range, where it has no pixels
+        return slice(0, intrinsics.height_px), slice(0, intrinsics.width_px)
     low = np.clip(np.floor(seen_px.min(axis=0)).astype(int) - 2, 0, None)
     high = np.ceil(seen_px.max(axis=0)).astype(int) + 3
     high = np.minimum(high, (intrinsics.width_px, intrinsics.height_px))

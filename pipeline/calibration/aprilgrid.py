@@ -14,7 +14,17 @@ import numpy as np
 from pipeline.calibration.board import Board
 from pipeline.calibration.detection import Detection, not_found
 from pipeline.calibration.dictionaries import APRILGRID, FAMILIES
-from pipeline.calibration.markers import FITS, LEAST_MARKERS, Fit, Markers, dictionaries_in, fit, markers_of
+from pipeline.calibration.markers import (
+    FITS,
+    LEAST_MARKERS,
+    Fit,
+    Markers,
+    changed_image,
+    dictionaries_in,
+    fit,
+    markers_of,
+    placed,
+)
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 ENLARGED = (1, 2)
@@ -23,6 +33,8 @@ BORDERS = (2, 1)
 """Widths of a tag's black border in cells: that of Kalibr, and that of other programs."""
 CELLS = 6
 """Cells along a tag of 36h11 inside its border."""
+OTHER_SPACING = 0.05
+"""Difference from which on the gap between tags is not that of the board."""
 ENOUGH = 0.9
 """Share of the tags with which the search stops."""
 WINDOW, WINDOW_PX = 0.6, (2, 8)
@@ -52,10 +64,19 @@ def find_aprilgrid(gray: ByteArray, board: Board) -> Detection:
     numbers, corners_px = seen.ids[fitted.in_place], seen.corners_px[fitted.in_place]
     indices = points[numbers][:, _turn(board, points[numbers], corners_px)]
     refined_px = _refined(gray, board, corners_px, border)
+    spacing = _tag_spacing(board, fitted, refined_px)
+    if abs(spacing - board.tag_spacing) > OTHER_SPACING:
+        return not_found(
+            f"The gap between the tags is {spacing:.2f} of a tag's side, not {board.tag_spacing:g}; try "
+            f"--tag-spacing {spacing:.2f}, or what the board's maker states"
+        )
     predicted_px = _predicted(board, points[numbers], indices, refined_px)
     stray = _apart(refined_px, predicted_px) > STRAY
     refined_px = _refined(gray, board, np.where(stray[:, :, None], predicted_px, refined_px), border)
-    good = _apart(refined_px, predicted_px) <= WRONG
+    size_px = np.array(gray.shape[::-1])
+    good = (_apart(refined_px, predicted_px) <= WRONG) & ((refined_px >= 0) & (refined_px < size_px)).all(
+        axis=2
+    )
     order = np.argsort(indices[good])
     return Detection(refined_px[good][order], indices[good][order])
 
@@ -72,6 +93,14 @@ def tag_points(board: Board, upwards: bool = True) -> IntArray:
         row = board.rows - 1 - row
     first = 2 * row * 2 * board.columns + 2 * column
     return np.stack([first, first + 1, first + 1 + 2 * board.columns, first + 2 * board.columns], axis=1)
+
+
+def _tag_spacing(board: Board, fitted: Fit, corners_px: FloatArray) -> float:
+    """Return the gap between tags over a tag's side, as it is in the image."""
+    corners = placed(fitted.on_board, corners_px.reshape(-1, 2)).reshape(-1, 4, 2)
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    pitch = (1.0 + board.tag_spacing) * board.spacing_m
+    return pitch / float(np.median(sides)) - 1.0
 
 
 def _layouts(board: Board) -> tuple[IntArray, ...]:
@@ -121,14 +150,18 @@ def _turn(board: Board, points: IntArray, corners_px: FloatArray) -> list[int]:
 
 
 def _refined(gray: ByteArray, board: Board, corners_px: FloatArray, border: int) -> FloatArray:
-    """Return (T, 4, 2) corners with subpixel accuracy."""
+    """Return (T, 4, 2) corners with subpixel accuracy; those outside the image as they are."""
     room_px = _sides_px(corners_px) * min(border / (CELLS + 2 * border), board.tag_spacing)
     until = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-3)
-    refined = np.empty_like(corners_px)
-    for row, (start, room) in enumerate(zip(corners_px, room_px, strict=True)):
+    refined = corners_px.copy()
+    most_px = np.array(gray.shape[::-1]) - 1.0
+    inside = np.asarray(((corners_px >= 0.0) & (corners_px <= most_px)).all(axis=2), bool)
+    for row, room in enumerate(room_px):
         window = int(np.clip(WINDOW * room, *WINDOW_PX))
-        near = start[:, None].astype(np.float32)
-        refined[row] = cv2.cornerSubPix(gray, near, (window, window), (-1, -1), until)[:, 0]
+        near = corners_px[row][inside[row]][:, None].astype(np.float32)
+        if len(near):
+            near = cv2.cornerSubPix(gray, near, (window, window), (-1, -1), until)
+            refined[row, inside[row]] = near[:, 0]
     return refined
 
 
@@ -177,6 +210,9 @@ def _why_not(gray: ByteArray, board: Board, seen: Markers) -> str:
                 f"No AprilGrid is seen, but {other.title}; try --pattern charuco, or a grid of AprilTags of "
                 "the family 36h11"
             )
+        changed = changed_image(gray)
+        if changed:
+            return changed
         return (
             f"{len(seen.ids)} of the {board.markers} AprilTags (36h11) are seen, and it takes "
             f"{LEAST_MARKERS}; have "

@@ -100,13 +100,15 @@ def assess(
         following = next_view(calibration, board, range_m)
     except ReconstructionError:
         following = None
+    outliers = outlier_views(calibration, views)
+    likely, names = likely_error(calibration, range_m), [one.name for one in outliers]
     return Trust(
         sd,
         halves,
         coverage(calibration.views, calibration.size_px),
-        outlier_views(calibration, views),
+        outliers,
         following,
-        verdict(calibration, likely_error(calibration, range_m), accuracy_m, following),
+        verdict(calibration, likely, accuracy_m, following, names),
     )
 
 

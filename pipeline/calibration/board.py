@@ -20,6 +20,8 @@ RING = (0.45, 0.75)
 centre stays dark, because detectors of dark circles look there."""
 MARKER_SHARE = 0.75
 """Ratio of a ChArUco marker's side to that of its square."""
+SPACINGS_M = 1e-4, 10.0
+"""Least and largest spacing: no printer draws a smaller one, and metres given as millimetres are smaller."""
 MOST_POINTS = 50
 """Most points in a row or column."""
 TAG_SPACING = 0.3
@@ -49,8 +51,12 @@ class Board:
         for name, count in (("columns", self.columns), ("rows", self.rows)):
             if not 2 <= count <= MOST_POINTS:
                 raise InputError(f"A board with {count} {name} cannot be used; try 2 to {MOST_POINTS}")
-        if not 0.0 < self.spacing_m < 10.0:
-            raise InputError(f"A spacing of {self.spacing_m:g} m cannot be used; try 0.035")
+        least_m, most_m = SPACINGS_M
+        if not least_m <= self.spacing_m < most_m:
+            raise InputError(
+                f"A spacing of {1000.0 * self.spacing_m:g} mm cannot be used; give it in millimetres, from "
+                f"{1000.0 * least_m:g} to below {1000.0 * most_m:g}, for example 35"
+            )
         if not 0.0 < self.tag_spacing <= 1.0:
             raise InputError(
                 f"A tag spacing of {self.tag_spacing:g} cannot be used; try 0.3, the gap over the tag's side"

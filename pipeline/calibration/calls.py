@@ -41,7 +41,7 @@ def calibrate(
     """
     files = image_files([str(word) for word in images], one_camera)
     asked = board_beside(images) if board is None else board
-    return drain(iterate_calibration(files, asked, lens, held_out))
+    return drain(iterate_calibration(files, asked, lens, held_out, one_camera=one_camera))
 
 
 def calibrate_cameras(

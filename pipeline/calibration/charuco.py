@@ -9,12 +9,14 @@ import numpy as np
 
 from pipeline.calibration.board import MOST_POINTS, Board
 from pipeline.calibration.detection import Detection, not_found
-from pipeline.calibration.dictionaries import FAMILIES, markers_in
+from pipeline.calibration.dictionaries import APRILGRID, FAMILIES, markers_in
 from pipeline.calibration.markers import (
     FITS,
     LEAST_MARKERS,
+    Fit,
     Markers,
     centres_of,
+    changed_image,
     dictionaries_in,
     fit,
     markers_of,
@@ -48,7 +50,7 @@ def find_charuco(gray: ByteArray, board: Board) -> Detection:
 
 def _by_markers(gray: ByteArray, board: Board, seen: Markers) -> tuple[Detection | None, int]:
     """Return the detection by these markers in the layout that they fit better, and the number of corners."""
-    if not len(seen.ids) or board.markers > markers_in(seen.dictionary):
+    if not len(seen.ids) or seen.border_cells > 1 or board.markers > markers_in(seen.dictionary):
         return None, 0
     most = 0
     for legacy in _layouts(board, seen):
@@ -64,16 +66,18 @@ def _by_markers(gray: ByteArray, board: Board, seen: Markers) -> tuple[Detection
     return None, most
 
 
+def _fit(board: Board, seen: Markers, legacy: bool) -> Fit | None:
+    places = centres_of(board.charuco(seen.dictionary, legacy))
+    return fit(seen, places, 2.0**0.5 * board.spacing_m)
+
+
 def _layouts(board: Board, seen: Markers) -> list[bool]:
     """Return whether to try the old layout, the likelier one first; for an odd number of rows of squares,
     both layouts are the same.
     """
     if board.rows % 2 == 0:
         return [False]
-    fits = [
-        fit(seen, centres_of(board.charuco(seen.dictionary, legacy)), 2.0**0.5 * board.spacing_m)
-        for legacy in (False, True)
-    ]
+    fits = [_fit(board, seen, legacy) for legacy in (False, True)]
     new, old = (0.0 if one is None else one.share for one in fits)
     return [True, False] if old > new else [False, True]
 
@@ -82,23 +86,30 @@ def _why_not(gray: ByteArray, board: Board, seen: Markers, corners: int) -> str:
     """Return what was seen instead of the board, and what to change."""
     if len(seen.ids) < LEAST_MARKERS:
         others = max(
-            dictionaries_in(gray, [name for name in FAMILIES if name != seen.dictionary])
+            dictionaries_in(gray, [name for name in FAMILIES if name == APRILGRID or name != seen.dictionary])
             if board.dictionary
             else (),
             key=lambda one: len(one.ids),
             default=None,
         )
+        if others is not None and others.border_cells > 1:
+            return _aprilgrid(others)
         if others is not None:
             return (
                 f"No markers of {board.dictionary} are seen, but {others.title}; "
                 f"try --dictionary {others.dictionary}"
             )
+        changed = changed_image(gray)
+        if changed:
+            return changed
         what = f"of {board.dictionary}" if board.dictionary else "of any dictionary that OpenCV knows"
         return (
             f"{len(seen.ids) or 'No'} marker{'' if len(seen.ids) == 1 else 's'} {what} "
             f"{'is' if len(seen.ids) == 1 else 'are'} seen; have the board larger in the picture, sharp and "
             "evenly lit, or check --pattern"
         )
+    if seen.border_cells > 1:
+        return _aprilgrid(seen)
     told = f"{seen.title} are seen"
     size = _size_of(board, seen)
     if size is not None and size != board.size:
@@ -117,6 +128,10 @@ def _why_not(gray: ByteArray, board: Board, seen: Markers, corners: int) -> str:
     )
 
 
+def _aprilgrid(seen: Markers) -> str:
+    return f"{seen.title} with the double border of an AprilGrid are seen; try --pattern aprilgrid"
+
+
 def _size_of(board: Board, seen: Markers) -> tuple[int, int] | None:
     """Return columns and rows of the board whose places the markers fit: the given ones if they do."""
     sizes = [board.size]
@@ -128,7 +143,7 @@ def _size_of(board: Board, seen: Markers) -> tuple[int, int] | None:
             continue
         other = Board("charuco", columns, rows, board.spacing_m)
         for legacy in (False, True):
-            fitted = fit(seen, centres_of(other.charuco(seen.dictionary, legacy)), 2.0**0.5 * board.spacing_m)
+            fitted = _fit(other, seen, legacy)
             if fitted is not None and fitted.share >= FITS and not fitted.mirrored:
                 return columns, rows
     return None

@@ -63,11 +63,13 @@ def _found(gray: ByteArray, board: Board) -> tuple[Detection | None, bool]:
 
 def _why_not(gray: ByteArray, board: Board, goes_on: bool) -> str:
     """Return what was seen instead of the board, and what to change."""
-    size = _other_size(gray, board.columns >= board.rows)
+    size = chessboard_size(gray, board.columns >= board.rows)
     if size is not None:
+        smaller = size[0] * size[1] < board.columns * board.rows
+        first = "have the whole board in the picture, or " if smaller else ""
         return (
             f"A chessboard of {size[0]} x {size[1]} inner corners is seen, not of {board.columns} x "
-            f"{board.rows}; try --columns {size[0]} --rows {size[1]}"
+            f"{board.rows}; {first}try --columns {size[0]} --rows {size[1]}"
         )
     if goes_on:
         return (
@@ -85,7 +87,7 @@ def _why_not(gray: ByteArray, board: Board, goes_on: bool) -> str:
     )
 
 
-def _other_size(gray: ByteArray, wide: bool) -> tuple[int, int] | None:
+def chessboard_size(gray: ByteArray, wide: bool) -> tuple[int, int] | None:
     """Return columns and rows of a whole chessboard of any size, more columns if it is ``wide``; None if none
     is seen.
     """

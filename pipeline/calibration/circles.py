@@ -9,6 +9,8 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from pipeline.calibration.board import RING, Board
+from pipeline.calibration.chessboard import chessboard_size
+from pipeline.calibration.circle_lattice import board_seen, orders_on
 from pipeline.calibration.detection import Detection, brightness, not_found, whole
 from pipeline.calibration.grid_order import even_steps, upright_orders
 from pipeline.types import ByteArray, FloatArray, IntArray
@@ -20,6 +22,8 @@ SIZES = 4.0
 """Ratio of the largest to the smallest circle of a tilted board, and to the marked circle's core."""
 MARK_STEP = 0.25
 """Least brightness at which the white ring is recognised: 0 is that of a circle, 1 that of the paper."""
+LETTER = 0.6
+"""Blobs smaller than this share of the median diameter may be letters on the sheet."""
 LINK = 2.0
 """Blobs farther from the others than this many median neighbour distances are not on the board."""
 NEAR, MOST_OF_A_SIDE = 0.3, 0.8
@@ -27,26 +31,32 @@ NEAR, MOST_OF_A_SIDE = 0.3, 0.8
 
 
 def find_circles(gray: ByteArray, board: Board) -> Detection:
-    """Find a grid of circles by several detectors in turn.
+    """Find a grid of circles by several detectors in turn; if OpenCV finds no grid, by growing a lattice.
 
     Args:
         gray: (H, W) uint8.
         board: the board to find.
     """
     most: FloatArray = np.zeros((0, 2))
+    groups: list[FloatArray] = []
     wanted = board.columns * board.rows
     for picture, detector in _blob_detectors(gray):
         all_px: FloatArray = np.zeros((0, 2))
         for blobs_px, sizes_px in _groups(detector.detect(picture), board):
             all_px = blobs_px if len(blobs_px) > len(all_px) else all_px
             most = all_px if len(all_px) > len(most) else most
+            groups += [blobs_px, blobs_px[sizes_px > LETTER * np.median(sizes_px)]]
             if len(blobs_px) < wanted:
                 continue
             for orders in _grids(board, blobs_px, sizes_px, gray.shape, detector):
                 if _goes_on(board, orders[0], all_px):
-                    return not_found(_more_circles(board), all_px)
+                    return not_found(_more_circles(board, groups), all_px)
                 return _marked(gray, board, orders)
-    return not_found(_why_no_circles(board, most), most)
+    for blobs_px in groups:
+        orders = [blobs_px[order] for order in orders_on(board, blobs_px)]
+        if orders and not _goes_on(board, orders[0], most):
+            return _marked(gray, board, orders)
+    return not_found(_why_no_circles(gray, board, most, groups), most)
 
 
 def _grids(
@@ -128,12 +138,21 @@ def _only(blobs_px: FloatArray, sizes_px: FloatArray, shape: tuple[int, ...]) ->
     return picture
 
 
-def _why_no_circles(board: Board, blobs_px: FloatArray) -> str:
+def _why_no_circles(gray: ByteArray, board: Board, blobs_px: FloatArray, groups: Sequence[FloatArray]) -> str:
     wanted = board.columns * board.rows
     if not len(blobs_px):
         return (
             "Nothing in it looks like a circle; have the board in the picture, sharp and evenly lit, or "
             "check --pattern"
+        )
+    other = _seen(board, groups)
+    if other is not None and (other.pattern, other.size) != (board.pattern, board.size):
+        size = chessboard_size(gray, board.columns >= board.rows)  # its squares look like shifted circles
+        chessboard = "" if size is None else f", or --pattern chessboard --columns {size[0]} --rows {size[1]}"
+        first = "show the whole board, or " if other.columns * other.rows < wanted else ""
+        return (
+            f"{_grid_name(other)} are seen, not {_grid_name(board)}; {first}try --pattern {other.pattern} "
+            f"--columns {other.columns} --rows {other.rows}{chessboard}"
         )
     if len(blobs_px) < wanted:
         return (
@@ -145,6 +164,16 @@ def _why_no_circles(board: Board, blobs_px: FloatArray) -> str:
         f"{len(blobs_px)} circles are seen, but no {kind} of {board.columns} x {board.rows} among them; "
         "check --pattern, --columns and --rows, and that nothing round lies beside the board"
     )
+
+
+def _seen(board: Board, groups: Sequence[FloatArray]) -> Board | None:
+    """Return the board that the first group of blobs with a whole grid forms."""
+    return next((one for group in groups if (one := board_seen(group, board)) is not None), None)
+
+
+def _grid_name(board: Board) -> str:
+    kind = "shifted rows" if board.pattern == "circles-asymmetric" else "straight rows"
+    return f"{board.columns} x {board.rows} circles in {kind}"
 
 
 def _goes_on(board: Board, points_px: FloatArray, blobs_px: FloatArray) -> bool:
@@ -173,8 +202,12 @@ def _places(row: IntArray, column: IntArray, shifted: bool) -> FloatArray:
     return np.column_stack([x, row]).astype(float)
 
 
-def _more_circles(board: Board) -> str:
-    return f"The board has more circles than {board.columns} x {board.rows}; check --columns and --rows"
+def _more_circles(board: Board, groups: Sequence[FloatArray]) -> str:
+    seen = _seen(board, groups)
+    remedy = "check --columns and --rows"
+    if seen is not None and seen.pattern == board.pattern:
+        remedy = f"try --columns {seen.columns} --rows {seen.rows}"
+    return f"The board has more circles than {board.columns} x {board.rows}; {remedy}"
 
 
 def _marked(gray: ByteArray, board: Board, orders: Sequence[FloatArray]) -> Detection:

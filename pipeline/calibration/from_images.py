@@ -27,6 +27,8 @@ from pipeline.calibration.estimate import (
     held_out,
     rms_px,
 )
+from pipeline.calibration.no_image import is_video, why_no_image
+from pipeline.calibration.one_camera import check_series_agree
 from pipeline.calibration.refine import refined_px
 from pipeline.calibration.series import check_one_camera
 from pipeline.calibration.shots import photographs
@@ -140,11 +142,9 @@ def image_files(given: Sequence[str], one_camera: bool = False) -> list[Path]:
         elif any(sign in word for sign in "*?["):
             named = sorted(Path(path.anchor or ".").glob(str(path.relative_to(path.anchor))))
         else:
-            named = [path] if path.is_file() else []
+            named = [path] if path.is_file() and not is_video(path) else []
         if not named:
-            raise InputError(
-                f"{word} names no image; try files, a folder with images, or a pattern in quotes"
-            )
+            raise InputError(f"{word} names no image{why_no_image(path)}")
         files += named
     files = list(dict.fromkeys(files))
     if not one_camera:
@@ -159,6 +159,7 @@ def iterate_calibration(
     folds: int = 0,
     without: Sequence[str] = (),
     warp: bool = False,
+    one_camera: bool = False,
 ) -> Generator[Progress, None, CameraReport]:
     """Find the board in every image and estimate the camera.
 
@@ -172,13 +173,14 @@ def iterate_calibration(
             views the number is increased so that three remain for the lens.
         without: names of images to leave out.
         warp: whether to also estimate the board's points, and use them if held-out views then fit better.
+        one_camera: whether one camera took all images even if series of their names fit better alone.
 
     Yields:
         Progress before each image.
 
     Raises:
-        InputError: images are unreadable or differ in size, too few show the board, or an image to leave out
-            does not exist.
+        InputError: images are unreadable, differ in size or are of several cameras, too few show the board,
+            or an image to leave out does not exist.
         ReconstructionError: the views do not determine the lens, or the camera that fits best cannot exist.
     """
     detections, paths, size_px = yield from _detections(files, board)
@@ -194,6 +196,8 @@ def iterate_calibration(
         raise InputError(_too_few(detections, without, board, len(views)))
     yield Progress("estimating the camera", 0.7)
     calibration = calibrate(views, size_px, lens)
+    if not one_camera:
+        check_series_agree(calibration, views, paths)
     if board.pattern in ("circles", "circles-asymmetric"):
         again: list[View] = []
         for view, fitted in zip(views, calibration.views, strict=True):

@@ -29,6 +29,8 @@ class Markers:
     """(M,)"""
     corners_px: FloatArray
     """(M, 4, 2) clockwise from the upper left of the marker's own picture."""
+    border_cells: int = 1
+    """Width of the black border of the markers."""
 
     @property
     def centres_px(self) -> FloatArray:
@@ -78,9 +80,10 @@ def markers_of(gray: ByteArray, name: str, border_cells: int = 1) -> Markers:
     settings.markerBorderBits = border_cells
     corners, ids, _ = cv2.aruco.ArucoDetector(dictionary(name), settings).detectMarkers(gray)
     if ids is None:
-        return Markers(name, np.zeros(0, np.int64), np.zeros((0, 4, 2)))
+        return Markers(name, np.zeros(0, np.int64), np.zeros((0, 4, 2)), border_cells)
     numbers, first = np.unique(np.asarray(ids).ravel(), return_index=True)
-    return Markers(name, numbers.astype(np.int64), np.asarray(corners, float).reshape(-1, 4, 2)[first])
+    corners_px = np.asarray(corners, float).reshape(-1, 4, 2)[first]
+    return Markers(name, numbers.astype(np.int64), corners_px, border_cells)
 
 
 def dictionaries_in(gray: ByteArray, names: Iterable[str] = FAMILIES) -> Iterator[Markers]:
@@ -91,6 +94,20 @@ def dictionaries_in(gray: ByteArray, names: Iterable[str] = FAMILIES) -> Iterato
             seen = markers_of(gray, name, 2)
         if len(seen.ids) >= LEAST_MARKERS:
             yield seen
+
+
+def changed_image(gray: ByteArray) -> str:
+    """Return what was done to an image without markers, and the remedy, if its mirror image or its negative
+    shows markers; else an empty sentence.
+    """
+    for picture, what, remedy in (
+        (np.ascontiguousarray(gray[:, ::-1]), "mirror images", "turn off mirroring in the camera's program"),
+        (255 - gray, "white on black", "print the board black on white, or invert the images"),
+    ):
+        seen = next(dictionaries_in(picture), None)
+        if seen is not None:
+            return f"{seen.title} are seen, but as {what}; {remedy}"
+    return ""
 
 
 def fit(seen: Markers, centres: FloatArray, pitch: float) -> Fit | None:

@@ -26,6 +26,10 @@ _CAMERAS = tuple(
     )
 )
 """Signs of a camera in a file's name: the group tells the cameras apart."""
+LEAST_MOMENTS = 3
+"""Least number of moments that unknown cameras have in common."""
+_PARTS = re.compile(r"[^\W\d_]+|\d+|[\W_]+")
+"""Words, numbers and what is between them in a file's name."""
 _BODY = (ExifTags.Base.Make, ExifTags.Base.Model, ExifTags.Base.BodySerialNumber)
 _FOCAL = ExifTags.Base.FocalLength
 
@@ -47,6 +51,29 @@ def camera_series(files: Sequence[Path]) -> dict[str, dict[Path, str]]:
         if len(found) > 1:
             return dict(sorted(found.items()))
     return {}
+
+
+def same_moments(files: Sequence[Path]) -> dict[str, dict[Path, str]]:
+    """Return images by the word or number of their names that has fewest values, each with the same moments,
+    such as front_1.png and back_1.png, front_2.png and back_2.png; empty if there is none.
+
+    These may be several cameras, or several series of one.
+    """
+    names = {path: _PARTS.findall(path.stem) for path in files}
+    lengths = {len(parts) for parts in names.values()}
+    best: dict[str, dict[Path, str]] = {}
+    for position in range(lengths.pop() if len(lengths) == 1 else 0):
+        found: dict[str, dict[Path, str]] = {}
+        for path, parts in names.items():
+            rest = "".join(parts[:position] + parts[position + 1 :])
+            found.setdefault(parts[position].lower(), {})[path] = rest
+        moments = [set(rests.values()) for rests in found.values()]
+        shared = len(set.intersection(*moments))
+        if len(found) < 2 or shared < max(LEAST_MOMENTS, 0.5 * max(map(len, moments))):
+            continue
+        if not best or len(found) < len(best):
+            best = found
+    return dict(sorted(best.items()))
 
 
 def check_one_camera(files: Sequence[Path]) -> None:

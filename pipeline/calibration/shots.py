@@ -15,11 +15,11 @@ from typing import cast
 from packetmesh.errors import InputError
 from packetmesh.files import read_json
 from pipeline.calibration.board import TAG_SPACING, Board
-from pipeline.calibration.series import camera_series
+from pipeline.calibration.series import camera_series, same_moments
 from pipeline.config import Pattern
 from pipeline.types import AnyPath
 
-ENDINGS = (".png", ".jpg", ".jpeg", ".pgm", ".ppm")
+ENDINGS = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".tif", ".tiff")
 MOST_CAMERAS = 6
 BOARD_FILE = "board.json"
 INFRARED = "/infrared"
@@ -86,23 +86,33 @@ def series_shots(files: Sequence[Path]) -> tuple[NodeShots, ...]:
     """Return the images of several cameras in one folder, told apart by their names: node_00 and so on, in
     the order of the cameras' names.
 
+    The moment is all that is left of a name without its camera if the last number does not tell the moments
+    apart, as in left-1700000000.250.png.
+
     Raises:
-        InputError: the names tell no cameras apart, or two images are of one moment.
+        InputError: the names tell no cameras apart, an image is of none of them, or two are of one moment.
     """
-    series = camera_series(files)
+    series = camera_series(files) or same_moments(files)
     if not series:
         raise InputError(
             f"The names of the images ({files[0].name} and so on) do not tell cameras apart; name them as "
             "left-0000.png and right-0000.png or cam0_00.png and cam1_00.png, or give a folder for each "
             "camera"
         )
+    others = set(files).difference(*series.values())
+    if others:
+        raise InputError(
+            f"The name of {min(others).name} does not tell its camera, as the others' do "
+            f"({' and '.join(series)}); rename it, or leave it out with a pattern in quotes"
+        )
     if len(series) > MOST_CAMERAS:
         raise InputError(f"The images are of {len(series)} cameras, and a rig has at most {MOST_CAMERAS}")
+    numbered = all(len({_moment(rest) for rest in paths.values()}) == len(paths) for paths in series.values())
     return tuple(
         NodeShots(
             f"node_{index:02d}",
             next(iter(paths)).parent,
-            tuple(Shot(moment, path) for moment, path in _by_moment(paths).items()),
+            tuple(Shot(moment, path) for moment, path in _by_moment(paths, numbered).items()),
         )
         for index, paths in enumerate(series.values())
     )
@@ -184,7 +194,10 @@ def photographs(folder: Path) -> list[Path]:
 
 
 def _images(folder: Path) -> list[Path]:
-    return sorted(path for path in folder.iterdir() if path.suffix.lower() in ENDINGS)
+    """Return the image files in a folder; macOS adds hidden files with names such as ._color_00.png."""
+    return sorted(
+        path for path in folder.iterdir() if path.suffix.lower() in ENDINGS and not path.name.startswith(".")
+    )
 
 
 def _shots(folder: Path) -> tuple[Shot, ...]:
@@ -200,11 +213,11 @@ def _shots(folder: Path) -> tuple[Shot, ...]:
     )
 
 
-def _by_moment(images: Mapping[Path, str]) -> dict[str, Path]:
-    """Return images by moment, from the part of each name that holds it."""
+def _by_moment(images: Mapping[Path, str], numbered: bool = True) -> dict[str, Path]:
+    """Return images by moment, from the part of each name that holds it: its last number, or all of it."""
     found: dict[str, Path] = {}
     for path, stem in images.items():
-        moment = _moment(stem)
+        moment = _moment(stem) if numbered else stem
         if moment in found:
             raise InputError(
                 f"{found[moment]} and {path.name} are both of moment {moment}; give each camera's images a "

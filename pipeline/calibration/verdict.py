@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,7 +73,11 @@ class Verdict:
 
 
 def verdict(
-    calibration: Calibration, likely: LikelyError, accuracy_m: float, following: NextView | None = None
+    calibration: Calibration,
+    likely: LikelyError,
+    accuracy_m: float,
+    following: NextView | None = None,
+    outliers: Sequence[str] = (),
 ) -> Verdict:
     """Judge a camera at the distance of its likely error.
 
@@ -81,6 +86,7 @@ def verdict(
         likely: result of ``likely_error``.
         accuracy_m: largest error of a point that is accepted.
         following: the best view to take next, for the advice.
+        outliers: names of views that do not fit the others.
 
     Raises:
         InputError: the accuracy is impossible.
@@ -95,7 +101,7 @@ def verdict(
         f"the image with a probability of {percent(probability)}, {_over_most(likely, of_most_m)}: "
         f"{_word(probability)}."
     )
-    advice = [] if probability >= PASS else _advice(calibration, likely, following)
+    advice = [] if probability >= PASS else _advice(calibration, likely, following, outliers)
     return Verdict(
         *(probability, likely.range_m, accuracy_m, likely.map_m(LEVEL)),
         *(likely.share_within(accuracy_m, LEVEL), of_most_m, likely.wrong_lens, likely.bent),
@@ -114,13 +120,16 @@ def _word(probability: float) -> str:
     return "pass" if probability >= PASS else "fail" if probability <= FAIL else "not decided"
 
 
-def _advice(calibration: Calibration, likely: LikelyError, following: NextView | None) -> list[str]:
-    """Return sentences on what to change: the lens model, the board, or the views."""
+def _advice(
+    calibration: Calibration, likely: LikelyError, following: NextView | None, outliers: Sequence[str]
+) -> list[str]:
+    """Return sentences on what to change: wrong views, the lens model, the board, or more views."""
     advice = []
     if likely.wrong_lens >= CERTAIN:
         other = OTHER_LENS[calibration.lens]
         advice.append(
-            f"The residuals show a lens that the model '{calibration.lens}' cannot describe: try --lens {other}."
+            f"The residuals show a lens that the model '{calibration.lens}' cannot describe: "
+            f"try --lens {other}."
         )
     if likely.bent >= CERTAIN:
         remedy = (
@@ -129,6 +138,9 @@ def _advice(calibration: Calibration, likely: LikelyError, following: NextView |
             else ("glue it onto a flat plate, or try --board-warp (one camera at a time)")
         )
         advice.append(f"The residuals show a bent board: {remedy}.")
+    if advice and outliers:  # a wrong view looks like a wrong lens or a bent board
+        which = f"{outliers[0]} does" if len(outliers) == 1 else f"{len(outliers)} images do"
+        return [f"{which} not fit the others: leave out what is wrong, then judge again."]
     if advice:
         return advice
     if following is None:

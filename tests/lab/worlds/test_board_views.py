@@ -7,7 +7,7 @@ import pytest
 
 from lab.worlds.board_files import load_board_views, save_board_views
 from lab.worlds.board_poses import propose_poses, sees
-from lab.worlds.board_views import BoardCamera, BoardViews, render_board_views
+from lab.worlds.board_views import BoardCamera, BoardViews, _window, render_board_views
 from lab.worlds.depth_bias import DepthBias
 from lab.worlds.staging import arc
 from packetmesh.errors import InputError
@@ -166,3 +166,12 @@ def test_no_place_for_a_board_is_said() -> None:
     camera = BoardCamera(scaled(LENS, 0.1), np.eye(4))
     with pytest.raises(InputError, match="take a smaller board"):
         propose_poses(BOARD, [camera], 4, seed=0)
+
+
+def test_a_board_wider_than_the_range_of_the_lens_may_cover_the_whole_picture() -> None:
+    """The lens has no image beyond 34°, and the sheet reaches farther on both sides."""
+    lens = replace(LENS, distortion=np.array([-0.7, 0.0, 0.0, 0.0, 0.0]))
+    board = Board("chessboard", 8, 5, 0.2)
+    T = rigid(np.eye(3), np.array([0.0, 0.0, 0.9]))
+    assert np.isnan(project(lens, apply(T, board.points_m))).any()
+    assert _window(board, T, lens) == (slice(0, 480), slice(0, 640))

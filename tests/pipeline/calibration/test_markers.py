@@ -3,6 +3,7 @@ true.
 """
 
 import re
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -197,3 +198,44 @@ def test_a_camera_is_calibrated_by_an_aprilgrid():
     camera = calibrate(views, (640, 480))
     assert camera.matrix[0, 0] == pytest.approx(CAMERA.fx_px, rel=0.005)
     assert camera.rms_px < 0.15
+
+
+@pytest.mark.parametrize("board", [Board("charuco", 6, 4, 0.03), Board("aprilgrid", 5, 4, 0.05)])
+def test_mirror_images_and_negatives_are_named(board):
+    picture = photograph(board, poses(board, 2)[1])
+    for changed, says in (
+        (picture[:, ::-1], "as mirror images; turn off"),
+        (255 - picture, "white on black"),
+    ):
+        found = detect(np.ascontiguousarray(changed), board)
+        assert not found.found
+        assert says in found.reason
+
+
+@pytest.mark.parametrize("given", [0.1, 0.2, 0.4, 0.9])
+def test_a_wrong_tag_spacing_is_refused_with_the_right_one(given):
+    board = Board("aprilgrid", 5, 4, 0.05, tag_spacing=0.3)
+    for T in poses(board, 4):
+        found = detect(photograph(board, T), replace(board, tag_spacing=given))
+        assert not found.found
+        told = float(re.search(r"try --tag-spacing ([\d.]+),", found.reason)[1])
+        assert told == pytest.approx(0.3, abs=0.03)
+        assert detect(photograph(board, T), replace(board, tag_spacing=told)).found
+
+
+def test_an_aprilgrid_is_not_taken_for_a_charuco_board():
+    picture = photograph(Board("aprilgrid", 5, 4, 0.05), poses(Board("aprilgrid", 5, 4, 0.05), 2)[1])
+    for dictionary_name in ("", "4X4_50", "APRILTAG_36H11"):
+        found = detect(picture, Board("charuco", 5, 4, 0.05, dictionary_name))
+        assert not found.found
+        assert "try --pattern aprilgrid" in found.reason
+
+
+def test_tags_predicted_outside_of_the_image_are_no_error():
+    board = Board("aprilgrid", 5, 4, 0.05)
+    for shift in (0.3, 0.4, 0.5, 0.6):
+        T = poses(board, 2)[1].copy()
+        T[0, 3] += shift * np.ptp(board.points_m[:, 0])
+        found = detect(photograph(board, T), replace(board, tag_spacing=0.27))
+        if found.found:
+            assert ((found.points_px >= 0.0) & (found.points_px < (CAMERA.width_px, CAMERA.height_px))).all()

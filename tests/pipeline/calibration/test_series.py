@@ -9,7 +9,7 @@ from PIL import Image
 
 from packetmesh.errors import InputError
 from pipeline.calibration.from_images import image_files
-from pipeline.calibration.series import camera_series, check_one_camera, made_by
+from pipeline.calibration.series import camera_series, check_one_camera, made_by, same_moments
 from pipeline.calibration.shots import series_shots
 
 
@@ -124,3 +124,47 @@ def test_images_without_exif_data_or_no_images_are_left_to_their_reader(tmp_path
     (tmp_path / "c.png").write_bytes(b"no image")
     check_one_camera([tmp_path / name for name in ("a.jpg", "b.png", "c.png", "missing.png")])
     assert made_by(tmp_path / "c.png") == ""
+
+
+@pytest.mark.parametrize(
+    ("patterns", "cameras"),
+    [
+        (("front_{}.png", "back_{}.png"), ["back", "front"]),
+        (("A{:02d}.png", "B{:02d}.png"), ["a", "b"]),
+        (("{:04d}_0.png", "{:04d}_1.png"), ["0", "1"]),
+        (("img_0_{}.png", "img_1_{}.png", "img_2_{}.png"), ["0", "1", "2"]),
+        (("{:04d}-Süd.png", "{:04d}-Nord.png"), ["nord", "süd"]),
+    ],
+)
+def test_names_with_the_same_moments_may_be_of_several_cameras_and_are_a_rig(patterns, cameras):
+    files = named(*patterns, count=5)
+    assert camera_series(files) == {}
+    assert list(same_moments(files)) == cameras
+    nodes = series_shots(files)
+    assert len(nodes) == len(cameras)
+    assert all([shot.moment for shot in node.shots] == ["0", "1", "2", "3", "4"] for node in nodes)
+
+
+@pytest.mark.parametrize(
+    "patterns",
+    [("IMG_{:04d}.jpg",), ("view{}.png", "wall.png"), ("a{}.png", "b1{}.png"), ("2024-01-0{}_12-3{}.png",)],
+)
+def test_other_names_have_no_moments_in_common(patterns):
+    files = [Path(pattern.format(index, index)) for index in range(5) for pattern in patterns]
+    assert same_moments(files) == {}
+
+
+def test_an_image_that_tells_no_camera_is_not_silently_left_out_of_a_rig():
+    files = [*named("left{}.png", "right{}.png"), Path("extra.png")]
+    with pytest.raises(InputError, match=r"The name of extra\.png does not tell its camera"):
+        series_shots(files)
+
+
+def test_time_stamps_with_a_fraction_are_moments():
+    stamps = ("1700000000.250", "1700000001.250", "1700000001.750")
+    left, right = series_shots(
+        [Path(f"{side}-{stamp}.png") for stamp in stamps for side in ("left", "right")]
+    )
+    assert [shot.color.name for shot in left.shots] == [f"left-{stamp}.png" for stamp in stamps]
+    assert [shot.moment for shot in left.shots] == [shot.moment for shot in right.shots]
+    assert len({shot.moment for shot in left.shots}) == 3

@@ -104,3 +104,20 @@ def test_an_impossible_accuracy_is_refused(found, likely):
     for accuracy_m in (0.0, -1.0, np.nan):
         with pytest.raises(InputError, match="accuracy"):
             verdict(found, likely, accuracy_m)
+
+
+def test_a_view_of_another_camera_is_not_taken_for_a_wrong_lens(found):
+    given = views(0.05, 0, 12)
+    other = views(0.05, 1, 12)[4]
+    center = other.points_px.mean(axis=0)
+    away_px = other.points_px - center
+    given[4] = replace(other, points_px=center + away_px * (1.0 + 0.03 * (away_px**2).sum(1)[:, None] / 1e4))
+    wrong = calibrate(given, SIZE)
+    trust = assess(wrong, given, BOARD, 2.0, 0.005)
+    assert trust.verdict.failed
+    assert trust.verdict.wrong_lens >= 0.95
+    assert [one.name for one in trust.outliers] == [given[4].name]
+    assert f"{given[4].name} does not fit the others: leave out what is wrong" in trust.verdict.sentence
+    assert "--lens" not in trust.verdict.sentence
+    right = given[:4] + given[5:]
+    assert assess(calibrate(right, SIZE), right, BOARD, 2.0, 0.005).verdict.passed
