@@ -99,7 +99,7 @@ def _lines(trust: Trust, lens: Calibration, may_bend: bool) -> Iterator[str]:
     lens_wrong, bent = judged.wrong_lens >= CERTAIN, judged.bent >= CERTAIN
     if (lens_wrong or bent) and not judged.passed:
         if lens_wrong:
-            yield "This lens model cannot describe the lens, as the residuals show: try another under Advanced."
+            yield "The residuals show that the lens model does not fit: try another lens under Advanced."
         if bent:
             allow = ", or allow a bent board under Advanced" if may_bend else ""
             yield f"The residuals show a bent board: glue it onto a flat plate{allow}."
