@@ -216,7 +216,7 @@ def test_the_capture_map_is_computed_and_a_cell_starts_a_race(fuse):
     before = numbers(fuse, "Start error")
     unfold(fuse, "Capture range")
     fuse.get_by_role("button", name="Compute the map").click()
-    fuse.get_by_text(re.compile("Of 25 starts")).wait_for()
+    fuse.get_by_text(re.compile("Starts that end within .*, of 25")).wait_for()
     cells = fuse.locator("button[data-packetmesh-press]")
     assert cells.count() == 25
     marks = [cells.nth(index).inner_text()[0] for index in range(25)]
