@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from network_sim.bounds.limits import check_limits
 from packetmesh.checks import above, at_least, finite, one_each, one_of, several, share
 from packetmesh.errors import InputError
 
@@ -355,6 +356,8 @@ class NetworkConfig:
     run: RunConfig = field(default_factory=RunConfig)
 
     def __post_init__(self) -> None:
+        for name in ("radio", "mac", "loss", "nodes", "uplink", "scheme", "street", "energy", "run"):
+            check_limits(getattr(self, name), name)
         if self.scenario == "street-grid":
             if self.mac.kind == "replay":
                 raise InputError("mac.kind is replay, but vehicles have no link to record; try ieee80211b")

@@ -18,6 +18,7 @@ from app.cli.infer_depth import infer_depth
 from app.cli.mesh import mesh
 from app.cli.reconstruct import reconstruct
 from app.cli.register import register
+from app.cli.repeated import joined
 from app.cli.reproduce import reproduce
 from app.cli.scenes import scenes
 from app.cli.serve import serve
@@ -53,12 +54,15 @@ def run(argv: list[str] | None) -> None:
             COMMANDS,
             prog="packetmesh",
             description="From a camera node's packets to a surface mesh.",
-            args=argv,
+            args=joined(sys.argv[1:] if argv is None else argv),
             config=(tyro.conf.FlagCreatePairsOff,),
         )
         sys.stdout.flush()
     except PacketMeshError as error:
         say(f"packetmesh: {error}")
+        sys.exit(1)
+    except MemoryError as error:
+        say(f"packetmesh: There is not enough memory ({error}); try fewer images or nodes, or a shorter run")
         sys.exit(1)
     except BrokenPipeError:  # the reader of the output has gone
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from app.cli.options import Images, PresetName, Settings
 from app.cli.text import print_json, say, say_progress
 from packetmesh.progress import drain
+from packetmesh.settings import config_named, key_of, settings, with_settings
 
 if TYPE_CHECKING:
     from network_sim.config import NetworkConfig
@@ -60,7 +61,7 @@ def deliver(
 
     source, imported = drain(iterate_imported(named, out), say_progress)
     if link_trace is not None:
-        network = replace(network, mac=replace(network.mac, kind="replay", trace=str(link_trace)))
+        network = _with_link(network, link_trace, of_network)
     _say_notes(network, before, preset, of_network)
     delivery_spec = DeliverySpec(Spec(source, chain, config), network, coding, moments, down)
     steps = iterate_delivery(delivery_spec, processes=min(2, os.cpu_count() or 1))
@@ -88,7 +89,6 @@ def _settings(
     Each change goes to the one that has its key.
     """
     from network_sim.presets import PRESETS as NETWORKS
-    from packetmesh.settings import config_named, settings, with_settings
     from pipeline.config import PRESETS
 
     network, config = config_named(preset, NETWORKS), config_named(chain, PRESETS)
@@ -98,16 +98,28 @@ def _settings(
     return network, with_settings(network, of_network), with_settings(config, of_chain), of_network
 
 
+def _with_link(network: NetworkConfig, link_trace: Path, changes: list[str]) -> NetworkConfig:
+    """Return the network over the recorded link, and say which given settings it replaces."""
+    replayed = replace(network, mac=replace(network.mac, kind="replay", trace=str(link_trace)))
+    for change in changes:
+        key, value = key_of(change), change.partition("=")[2].strip()
+        if key in ("mac.kind", "mac.trace") and settings(replayed)[key] != value:
+            say(f"{change} changes nothing here: --link-trace sets {key}={settings(replayed)[key]}")
+    return replayed
+
+
 def _say_notes(network: NetworkConfig, before: NetworkConfig, preset: str, changes: list[str]) -> None:
     """Say which of the network's settings change nothing, and how recorded links were read."""
     from app.cli.simulate import say_network_notes
-    from packetmesh.settings import key_of
     from pipeline.delivery.plan import replaced_settings
 
     replaced = replaced_settings(network)
     for key in dict.fromkeys(map(key_of, changes)):
         if key in replaced:
             say(f"{key} changes nothing here: {replaced[key]}")
+    placed = network.nodes.places_m or network.mac.kind in ("serial", "replay")
+    if "nodes.layout" in map(key_of, changes) and not placed:
+        say("nodes.layout changes nothing here if the rig has poses: the nodes stand where the poses are")
     others = [change for change in changes if key_of(change) not in replaced]
     say_network_notes(network, before, preset, others, placed=False)
 

@@ -49,7 +49,8 @@ def simulate(
     if describe:
         _describe(config, json)
         return
-    say_network_notes(config, before, preset, set)
+    kept = set if sweep is None else _without_swept(set, sweep)
+    say_network_notes(config, before, preset, kept)
     if sweep is not None:
         _sweep(config, preset, sweep, replications, scheduler, out, json)
     else:
@@ -75,9 +76,12 @@ def say_network_notes(
     from network_sim.config import NetworkConfig
     from network_sim.presets import PRESETS
     from network_sim.radio.link_file import link_notes
-    from packetmesh.settings import differences, key_of
+    from packetmesh.settings import differences, key_of, settings
 
     given = [key_of(change) for change in changes]
+    for key in dict.fromkeys(given):
+        if given.count(key) > 1:
+            say(f"{key} is given {given.count(key)} times; the last value counts: {settings(config)[key]}")
     if preset not in PRESETS:
         given += [key_of(change) for change in differences(before, NetworkConfig())]
         before = NetworkConfig()
@@ -160,6 +164,16 @@ def _sweep(
     for value, estimates in cases.items():
         print(f"{key}={value}")
         _show(estimates, json=False)
+
+
+def _without_swept(changes: Sequence[str], sweep: str) -> list[str]:
+    """Say which given settings the sweep replaces, and return the others."""
+    from packetmesh.settings import key_of
+
+    swept = [change for change in changes if key_of(change) == key_of(sweep)]
+    for change in swept:
+        say(f"{change} changes nothing here: --sweep sets {key_of(sweep)}")
+    return [change for change in changes if change not in swept]
 
 
 def _say_idle_sweep(config: NetworkConfig, key: str, values: Sequence[str]) -> None:

@@ -84,7 +84,8 @@ class Entrance:
                 return connection.respond(http.HTTPStatus.FORBIDDEN, NOT_THAT)
             response = connection.respond(http.HTTPStatus.SEE_OTHER, "")
             home = WELCOME if token is self.teacher else "/"
-            response.headers["Location"] = f"/?{urlencode(given)}" if given else home
+            place = f"/?{urlencode(given)}" if given else home
+            response.headers["Location"] = f".{place}"  # relative: a proxy may have a path of its own
             response.headers["Set-Cookie"] = f"{token.cookie}={token.text}; Path=/; HttpOnly; SameSite=Lax"
             return response
 

@@ -13,6 +13,8 @@ from packetmesh.errors import InputError
 OPTION = "--allow-host"
 _NAME = re.compile(r"(?!-)[a-z0-9_-]{1,63}(?<!-)(\.(?!-)[a-z0-9_-]{1,63}(?<!-))*")
 _MOST_LETTERS = 253
+_NUMBER = re.compile(r"[0-9]+|0x[0-9a-f]*")
+"""A last part that makes browsers read the whole name as an IPv4 address, such as 127.1 or 8080."""
 
 
 def allowed_names(given: Iterable[str]) -> frozenset[str]:
@@ -29,7 +31,11 @@ def _allowed(given: str) -> str:
     if name is not None:
         return name
     found = host_name(given.partition("://")[2] if "://" in given else given)
-    hint = f"{OPTION} {found}" if found else f"{OPTION} lab.example.org, without protocol, port and path"
+    hint = (
+        f"{OPTION} {found}"
+        if found
+        else f"{OPTION} lab.example.org, one name without protocol, port, path and *"
+    )
     raise InputError(f"{OPTION} has '{given}', which is not a host name; try {hint}")
 
 
@@ -50,4 +56,6 @@ def plain_name(text: str) -> str | None:
         name = text.rstrip(".").encode("idna").decode().lower()
     except UnicodeError:
         return None
-    return name if len(name) <= _MOST_LETTERS and _NAME.fullmatch(name) else None
+    if len(name) > _MOST_LETTERS or not _NAME.fullmatch(name) or _NUMBER.fullmatch(name.rpartition(".")[2]):
+        return None
+    return name

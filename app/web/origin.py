@@ -6,7 +6,8 @@ up as ``Host``: the two must be equal, and must name this machine. The person wh
 further names, for a proxy in front of it; a proxy may replace ``Host``, so that an allowed ``Origin`` is
 accepted with every ``Host`` of this machine.
 
-Pages cannot see why a websocket is refused. So the page asks for ``WHY`` and shows the answer.
+Pages cannot see why a websocket is refused, or that a proxy does not pass it on. So the page asks for ``WHY``
+and shows the answer.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ import contextlib
 import functools
 import http
 import ipaddress
+import math
 import re
 import socket
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from functools import partial
@@ -34,7 +37,16 @@ ONCE = ("Host", "Origin", "Upgrade", "Cookie", "Accept-Encoding")
 NOT_WELL_FORMED = "This is not a request that PacketMesh understands.\n"
 REFUSED = "PacketMesh answers only its own page: open the address that it printed when it started.\n"
 WHY = "/why-refused"
-"""Path that answers with the reason why a page of ``?origin=`` gets no websocket; empty if it gets one."""
+"""Path that answers with the reason why a page of ``?origin=`` gets no websocket; empty if it gets one. With
+``&waited=1`` the page has tried for ``RECENT_S``."""
+NOT_PASSED_ON = (
+    "No websocket of this page reaches PacketMesh: let the proxy in front of it pass on websockets, with the "
+    "headers Upgrade, Connection and Origin as the browser sends them; if the proxy shows PacketMesh under a "
+    "path such as /pm/, also for /pm\n"
+)
+RECENT_S = 10.0
+"""Time within which a page that waits tries to open its websocket."""
+_MOST_ORIGINS = 1000
 _NOBODY: frozenset[str] = frozenset()
 _ADDRESS = re.compile(r"[A-Za-z0-9._:\[\]-]{1,260}")
 
@@ -64,19 +76,40 @@ def _page_name(origin: str | None) -> str | None:
     return host_name(address) if separator and protocol in ("http", "https") and "@" not in address else None
 
 
-def refusal(headers: Mapping[str, str]) -> str:
-    """Return the sentence for a refused request: the address that it used, and the option that allows it."""
-    origin, address = headers.get("Origin"), headers.get("Host", "")
-    name = host_name(address) if origin is None else _page_name(origin)
-    if name is None:
+def refusal(headers: Mapping[str, str], allowed: frozenset[str] = _NOBODY) -> str:
+    """Return the sentence for a refused request: the address that it used, and the options that allow it.
+
+    A proxy may also replace ``Host`` by a name that it knows the server by, such as a container's: then both
+    names have to be allowed.
+    """
+    missing = dict(_missing(headers, allowed))
+    if None in missing or not missing:
         return REFUSED
-    if origin is not None:
-        address = origin.partition("://")[2]
-    shown = address.lower() if _ADDRESS.fullmatch(address) else name
+    shown = " and ".join(missing.values())
+    options = " ".join(f"{OPTION} {name}" for name in missing)
+    start = f"also with: {options}" if allowed else f"with: packetmesh serve {options}"
     return (
         f"PacketMesh does not answer pages of {shown}: open the address that it printed when it started, or, "
-        f"if {shown} is your proxy, start the server with: packetmesh serve {OPTION} {name}\n"
+        f"if you reach it through a proxy, start the server {start}\n"
     )
+
+
+def _missing(headers: Mapping[str, str], allowed: frozenset[str]) -> Iterator[tuple[str | None, str]]:
+    """Yield the names that are not allowed, each with the address to show; None if an address has no name."""
+    origin, host = headers.get("Origin"), headers.get("Host", "")
+    if origin is not None:
+        address = origin.partition("://")[2]
+        name = _page_name(origin)
+        if address.lower() != host.lower() and name not in allowed:
+            yield name, _shown(address, name)
+    name = host_name(host)
+    if name is None or not (_names_this_machine(name) or name in allowed):
+        yield name, _shown(host, name)
+
+
+def _shown(address: str, name: str | None) -> str:
+    """Return the address with its port, if it is one; else the name."""
+    return address.lower() if _ADDRESS.fullmatch(address) else name or ""
 
 
 def _names_this_machine(name: str) -> bool:
@@ -135,21 +168,34 @@ def answering(change: Callable[[Answer], Answer]) -> Iterator[None]:
 
 def _guard(allowed: frozenset[str], answer: Answer) -> Answer:
     """Return the server's answer function, which now refuses requests from other sites."""
+    attempts_s = dict[str, float]()
+    """Time of the last websocket of each origin."""
 
     def guarded(connection: Any, request: Any) -> Any:
+        if "Upgrade" in request.headers:
+            if len(attempts_s) >= _MOST_ORIGINS:
+                attempts_s.clear()
+            attempts_s[request.headers.get("Origin", "").lower()] = time.monotonic()
         if not is_own(request.headers, allowed):
-            return connection.respond(http.HTTPStatus.FORBIDDEN, refusal(request.headers))
+            return connection.respond(http.HTTPStatus.FORBIDDEN, refusal(request.headers, allowed))
         path, _, query = request.path.partition("?")
         if path == WHY and "Upgrade" not in request.headers:
-            return connection.respond(
-                http.HTTPStatus.OK, _why(request.headers.get("Host", ""), query, allowed)
-            )
+            page = {name: values[0] for name, values in parse_qs(query).items()}
+            sentence = _why(request.headers.get("Host", ""), page.get("origin", ""), allowed)
+            recent_s = time.monotonic() - RECENT_S
+            if (
+                not sentence
+                and "waited" in page
+                and attempts_s.get(page["origin"].lower(), -math.inf) < recent_s
+            ):
+                sentence = NOT_PASSED_ON
+            return connection.respond(http.HTTPStatus.OK, sentence)
         return answer(connection, request)
 
     return guarded
 
 
-def _why(host: str, query: str, allowed: frozenset[str]) -> str:
-    """Return why a page of the query's origin gets no websocket under this ``Host``; empty if it gets one."""
-    page = {"Host": host, "Origin": parse_qs(query).get("origin", [""])[0]}
-    return "" if is_own(page, allowed) else refusal(page)
+def _why(host: str, origin: str, allowed: frozenset[str]) -> str:
+    """Return why a page of this origin gets no websocket under this ``Host``; empty if it gets one."""
+    page = {"Host": host, "Origin": origin}
+    return "" if is_own(page, allowed) else refusal(page, allowed)

@@ -92,9 +92,9 @@ class Page:
             _file("packetmesh", "css", styles),
         )
         *scripted, style = files
-        head = Markup('<link rel="stylesheet" href="{}">').format(style.path)
+        head = Markup('<link rel="stylesheet" href="{}">').format(_relative(style))
         head += Markup("").join(
-            Markup('<script defer src="{}"></script>').format(one.path) for one in scripted
+            Markup('<script defer src="{}"></script>').format(_relative(one)) for one in scripted
         )
         usual = self._page(head, Markup(""))
         self._files = {one.path: one for one in files} | {"/": usual, "/index.html": usual}
@@ -120,6 +120,11 @@ class Page:
             return found.response(request.headers.get("Accept-Encoding", ""))
 
         return answered
+
+
+def _relative(one: File) -> str:
+    """Return a file's address for the page, which a proxy may show under a path of its own."""
+    return one.path.removeprefix("/")
 
 
 def _file(name: str, suffix: str, parts: Sequence[Path]) -> File:

@@ -220,7 +220,8 @@ def _ratios(
 ) -> Iterator[NDArray[np.float64]]:
     """Yield the ratios of powers (N, N) that decide about overlapping frames, fading and bit errors."""
     yield np.array([radio.capture_ratio if config.nodes.count > 1 else 0.0])
-    yield power_w / power_w.max(axis=0)
+    strongest_w = power_w.max(axis=0)
+    yield power_w / np.where(strongest_w > 0.0, strongest_w, 1.0)
     if config.radio.nakagami_m is not None:
         yield np.array([config.radio.nakagami_m])
         yield power_w / radio.rx_threshold_w

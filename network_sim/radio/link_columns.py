@@ -47,8 +47,12 @@ _TIME_UNIT = {
     **dict.fromkeys(("ns", "nsec", "nanos", "nanoseconds"), "ns"),
 }
 _RATE_UNIT = re.compile(r"([kmg]?)(bits?|bytes?|b)(ps|/s|/sec|pers|persec|persecond)", re.IGNORECASE)
+LIMITS = ((0.0, 1e9), (1e-6, 1e9), (0.0, 1e9))
+"""Least and most time, rate above 0 and round trip, in the usual units."""
 EPOCH_S = (9e8, 5e9)
 """Seconds since 1970 from 1998 to 2128."""
+USUAL_MBPS = 300.0
+"""Rate up to which a file without a header is as the documentation says; a faster one is said."""
 FAST_MBPS, SLOW_STEP_S, SHORT_MS, LONG_MS = 1000.0, 5.0, 1.0, 5000.0
 """Rate, step in time, and short and long round trip, beyond which another unit is as likely."""
 MOST_SHARE = 2.0

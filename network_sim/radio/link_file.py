@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 import re
 from collections.abc import Iterable, Sequence
@@ -15,8 +16,10 @@ from network_sim.radio.link_columns import (
     EPOCH_S,
     FACTORS,
     HEADER,
+    LIMITS,
     QUANTITIES,
     USUAL,
+    USUAL_MBPS,
     Column,
     FloatArray,
     column_named,
@@ -26,6 +29,8 @@ from network_sim.radio.link_trace import LinkTrace
 from packetmesh.errors import InputError
 from packetmesh.files import read_text
 
+SHORTEST_S = 1e-7
+"""Shortest time between rows: less than the time of a bit on links that can be simulated."""
 HOLE_ROWS = 10.0
 HOLE_S = 1.0
 """A step longer than both ``HOLE_S`` and ``HOLE_ROWS`` times the median step between rows is a hole."""
@@ -50,15 +55,20 @@ class Form:
     separator: str | None
     """None is white space."""
     decimal_comma: bool
+    ended: bool = False
+    """Whether all rows have a separator at their end, after which there is no field."""
 
     def fields(self, text: str) -> list[str]:
-        """Return the fields of a line; a separator at its end is no field."""
-        fields = [field.strip().strip('"') for field in text.split(self.separator)]
-        return fields[:-1] if len(fields) > 1 and not fields[-1] else fields
+        """Return the fields of a line."""
+        parts = text.split() if self.separator is None else next(csv.reader([text], delimiter=self.separator))
+        fields = [field.strip().strip('"') for field in parts]
+        return fields[:-1] if self.ended and not fields[-1] else fields
 
     def number(self, field: str) -> float | None:
         """Return the number in a field; None if there is none."""
         try:
+            if "_" in field:
+                raise ValueError("Python reads 1_0 as 10")
             return float(field.replace(",", ".") if self.decimal_comma else field)
         except ValueError:
             return None
@@ -109,11 +119,18 @@ def _read(path: str | Path) -> tuple[LinkTrace, str]:
     units = units_of(list(table), named, str(path))
     _check_ranges(table, units, rows, str(path))
     scaled = [values * FACTORS[index][units[index]] for index, values in enumerate(_from_zero(table))]
-    _check_times(scaled[0], [line.number for line in rows], path)
+    numbers = [line.number for line in rows]
+    _check_limits(scaled, units, numbers, str(path))
+    _check_times(scaled[0], numbers, path)
     if not table[1].any():
         raise InputError(f"The recorded link {path} has a rate of 0 throughout; try another recording")
     trace = LinkTrace(scaled[0], 1e6 * scaled[1], 1e-3 * scaled[2], np.maximum(scaled[3], 0.0))
-    return trace, _note(str(path), form, units, table[0][0], more=width > len(order))
+    note = _note(str(path), form, units, table[0][0], more=width > len(order))
+    most = float(table[1].max())
+    if named[1] is None and most > USUAL_MBPS:
+        note = note or f"The recorded link {path} was read with rate in Mbit/s"
+        note += f" (up to {most:g}); if that is wrong, name the unit in a header"
+    return trace, note
 
 
 def _wanted() -> list[str]:
@@ -135,12 +152,12 @@ def _form(rows: Sequence[Line], path: str) -> Form:
     line = next((row for row in below if "," in row.text), below[-1])
     for separator in (";", "\t"):
         if separator in line.text:
-            return Form(separator, decimal_comma="," in line.text)
+            return Form(separator, decimal_comma="," in line.text, ended=_ended(below, separator))
     if "," not in line.text:
         return Form(None, decimal_comma=False)
     if len(line.text.split()) > 1 and all(map(_DECIMAL_COMMA.fullmatch, line.text.split())):
         return Form(None, decimal_comma=True)
-    form, usual = Form(",", decimal_comma=False), len(QUANTITIES)
+    form, usual = Form(",", decimal_comma=False, ended=_ended(below, ",")), len(QUANTITIES)
     count, titles = len(form.fields(line.text)), form.fields(rows[0].text)
     titled = len(titles) == count and form.number(titles[0]) is None
     if usual < count <= 2 * usual and not titled:
@@ -149,6 +166,10 @@ def _form(rows: Sequence[Line], path: str) -> Form:
             "if commas are decimal"
         )
     return form
+
+
+def _ended(rows: Sequence[Line], separator: str) -> bool:
+    return all(row.text.endswith(separator) for row in rows)
 
 
 def _header(
@@ -161,9 +182,12 @@ def _header(
         if len(rows) == 1:
             raise InputError(f"The recorded link {path} has no rows below its header; try another recording")
         titles = _titles(first.text, form)
-        columns = [column_named(title, where) for title in titles]
-        if len(titles) != width or set(_quantities(columns)) != set(range(len(QUANTITIES))):
-            raise InputError(f"{where} does not name the four columns; try a header such as: {HEADER}")
+        columns = _named_columns(titles, where)
+        missing = [name for index, name in enumerate(QUANTITIES) if index not in _quantities(columns)]
+        if missing or len(titles) != width:
+            found = f"not found: {', '.join(missing)}" if missing else f"the rows have {width} columns"
+            hint = f"try a header such as: {HEADER} ({found})"
+            raise InputError(f"{where} does not name the four columns; {hint}")
         return columns, rows[1:]
     above = [line for line in lines if line.is_comment and line.number < first.number]
     if above:
@@ -184,8 +208,20 @@ def _quantities(columns: Iterable[Column | None]) -> list[int]:
     return [column.quantity for column in columns if column is not None]
 
 
+def _named_columns(titles: Sequence[str], where: str) -> list[Column | None]:
+    """Return the columns that titles name; a doubtful one is left out if the others name all four.
+
+    Raises:
+        InputError: one of the four is named in doubt.
+    """
+    columns = [_plainly_named(title, where) for title in titles]
+    if set(_quantities(columns)) == set(range(len(QUANTITIES))):
+        return columns
+    return [column_named(title, where) for title in titles]
+
+
 def _plainly_named(title: str, where: str) -> Column | None:
-    """Return the column that a title in a comment names; None if it names none, or in doubt."""
+    """Return the column that a title names; None if it names none, or in doubt."""
     try:
         return column_named(title, where)
     except InputError:
@@ -210,7 +246,8 @@ def _unit_in(header: Sequence[Column | None], index: int) -> str | None:
 def _row(form: Form, line: Line, width: int, order: Sequence[int], path: str) -> list[float]:
     fields, where = form.fields(line.text), f"{path}, line {line.number}"
     if len(fields) != width:
-        raise InputError(f"{where} has {len(fields)} columns; try {width}: {', '.join(_wanted())}")
+        count = f"{len(fields)} column{'s' * (len(fields) != 1)}"
+        raise InputError(f"{where} has {count}; try {width}: {', '.join(_wanted())}")
     row = []
     for name, index in zip(_wanted(), order, strict=True):
         value = form.number(fields[index])
@@ -236,6 +273,18 @@ def _check_ranges(table: FloatArray, units: Sequence[str], rows: Sequence[Line],
             raise InputError(f"{found} in {units[index]}; try {hint}")
 
 
+def _check_limits(scaled: Sequence[FloatArray], units: Sequence[str], lines: list[int], path: str) -> None:
+    """Raise if a time, rate or round trip is larger or smaller than any link's."""
+    for name, unit, usual, values, (least, most) in zip(
+        QUANTITIES, units, USUAL, scaled, LIMITS, strict=False
+    ):
+        wrong = (values > most) | ((values > 0.0) & (values < least))
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            found = f"{path}, line {lines[row]} has a {name} of {values[row]:g} {usual}, read in {unit}"
+            raise InputError(f"{found}; try to check the number and the header's unit")
+
+
 def _from_zero(table: FloatArray) -> list[FloatArray]:
     """Return the columns with times that count from the first, in their own unit, so that none is rounded."""
     return [table[0] - table[0][0], *table[1:]]
@@ -245,10 +294,14 @@ def _check_times(t_s: FloatArray, lines: list[int], path: str | Path) -> None:
     if len(t_s) < 2:
         return
     steps_s = np.diff(t_s)
-    if (steps_s <= 0.0).any():
-        row = int(np.argmax(steps_s <= 0.0)) + 1
-        where = f"{path}, line {lines[row]}"
-        raise InputError(f"{where} is at {t_s[row]:g} s, after {t_s[row - 1]:g} s; try rows in order of time")
+    if (steps_s < SHORTEST_S).any():
+        row = int(np.argmax(steps_s < SHORTEST_S)) + 1
+        step_s, where = float(steps_s[row - 1]), f"{path}, line {lines[row]}"
+        if step_s < 0.0:
+            raise InputError(f"{where} is {-step_s:g} s before the row above; try rows in order of time")
+        if step_s == 0.0:
+            raise InputError(f"{where} has the time of the row above; try one row for each time")
+        raise InputError(f"{where} comes {step_s:g} s after the row above; try to check the unit of time")
     usual_s = float(np.median(steps_s))
     holes = steps_s > max(HOLE_S, HOLE_ROWS * usual_s)
     if holes.any():

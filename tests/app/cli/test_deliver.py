@@ -144,11 +144,30 @@ def test_network_settings_that_change_nothing_and_the_form_of_a_recorded_link_ar
         "nodes.retransmit=true",
         "nodes.count=9",
         "mac.ack=false",
+        "mac.kind=ideal",
+        "nodes.layout=line",
     )
     code, _, err = run(capsys, "deliver", *words, *given)
     assert code == 0
     said = [
         line.partition(" changes nothing here: ")[0] for line in err.splitlines() if "changes nothing" in line
     ]
-    assert sorted(said) == ["nodes.count", "nodes.images", "radio.capture_db"]
+    assert sorted(said) == [
+        "mac.kind=ideal",
+        "nodes.count",
+        "nodes.images",
+        "nodes.layout",
+        "radio.capture_db",
+    ]
     assert f"The recorded link {link} was read with loss in per cent\n" in err
+
+
+def test_a_layout_counts_only_for_a_rig_without_poses_and_that_is_said(capsys):
+    from app.cli.deliver import _say_notes
+    from network_sim.presets import PRESETS
+    from packetmesh.settings import with_settings
+
+    office = PRESETS["office"]
+    for changes, said in ((["nodes.layout=line"], 1), (["nodes.layout=line", "mac.kind=serial"], 1), ([], 0)):
+        _say_notes(with_settings(office, changes), office, "office", changes)
+        assert capsys.readouterr().err.count("nodes.layout changes nothing here") == said

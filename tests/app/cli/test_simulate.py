@@ -174,6 +174,30 @@ def test_a_given_setting_that_changes_nothing_is_said(capsys, given, said):
     assert idle(err) == said
 
 
+def test_settings_given_twice_or_set_by_the_sweep_are_said(capsys):
+    code, _, err = run(capsys, "--set", *TINY, "--set", "nodes.count=2", "nodes.count=3")
+    assert code == 0
+    assert "nodes.count is given 2 times; the last value counts: 3\n" in err
+    code, out, _ = run(capsys, "--set", *TINY, "--set", "nodes.count=2", "--json")
+    assert (
+        json.loads(out)["goodput"]["mean"]
+        == measured(with_settings(CONFIG, ["nodes.count=2"]))["goodput"].value
+    )
+    code, _, err = run(capsys, "--set", *TINY, "mac.retries=1", "--sweep", "mac.retries=0,3")
+    assert code == 0
+    assert "mac.retries=1 changes nothing here: --sweep sets mac.retries\n" in err
+
+
+def test_more_memory_than_there_is_is_one_sentence(capsys, monkeypatch):
+    def fail(config):
+        raise MemoryError("Unable to allocate 185 GiB")
+
+    monkeypatch.setattr("network_sim.simulate.iterate_simulation", fail)
+    code, out, err = run(capsys, "--set", *TINY)
+    assert (code, out) == (1, "")
+    assert "not enough memory (Unable to allocate 185 GiB); try" in err
+
+
 def test_a_config_file_s_settings_count_as_given_and_a_preset_s_do_not(capsys, tmp_path):
     serial = ["--preset", "greenhouse", "--set", *TINY, "mac.kind=serial"]
     code, _, err = run(capsys, *serial, "--out", tmp_path)

@@ -72,7 +72,7 @@ def test_without_the_link_there_is_one_sentence_and_no_page(server, path):
 @pytest.mark.parametrize("token", [ENTRANCE.visitor, ENTRANCE.teacher], ids=["token", "teacher"])
 def test_a_link_gives_a_cookie_that_lets_in_and_keeps_the_rest_of_the_address(server, token):
     response = get(server, f"/{token.query}&scene=office&set=depth.reach%3D0.2")
-    assert (response.status, response.headers["Location"]) == (303, "/?scene=office&set=depth.reach%3D0.2")
+    assert (response.status, response.headers["Location"]) == (303, "./?scene=office&set=depth.reach%3D0.2")
     assert token.text not in response.headers["Location"]
     assert "HttpOnly" in response.headers["Set-Cookie"]
     cookie = cookie_of(server, token)

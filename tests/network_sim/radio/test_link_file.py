@@ -59,6 +59,11 @@ EQUAL = {
         "t,rate,rtt,loss,cell\n0,2.5,35,0.03,7\n0.5,0,29.5,0,7\n1.0,12.25,26,0.97,8\n",
         "other columns left out",
     ),
+    "other columns whose unit or kind is in doubt": (
+        "time_s,rate_mbps,rtt_ms,rtt_jitter_ms,latency_ms,loss,note\n"
+        '0,2.5,35,1,17,0.03,"a, b"\n0.5,0,29.5,1,15,0,"c"\n1.0,12.25,26,1,13,0.97,""\n',
+        "other columns left out",
+    ),
     "a header of the usual units": ("time_s rate_mbps rtt_ms loss\n" + PLAIN, ""),
     "quotes": (
         '"time_s","rate_mbps","rtt_ms","loss"\n"0","2.5","35","0.03"\n"0.5","0","29.5","0"\n'
@@ -229,3 +234,32 @@ def test_real_recordings_are_in_the_usual_form(shared_data, name):
     path = shared_data / "link_traces" / f"{name}.txt"
     assert note_of(path) == ""
     np.testing.assert_array_equal(read_link_trace(path).rate_bps, 1e6 * np.loadtxt(path)[:, 1])
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("0 1_0 20 0\n", "has '1_0' as rate"),
+        ("time,DL_bitrate,UL_bitrate\n0,1,2\n", "(not found: rate, round trip, loss)"),
+        ("time,rate,rtt,loss\n0,1,2\n", "(the rows have 3 columns)"),
+        ("0\n1\n3\n", "line 1 has 1 column; try 4"),
+        ("1700000001 1 2 0\n1700000000 1 2 0\n", "line 2 is 1 s before the row above; try rows in order"),
+        ("0 1 2 0\n1e-12 1 2 0\n", "line 2 comes 1e-12 s after the row above; try to check the unit of time"),
+        ("t_s rate_bps rtt_ms loss\n0 1e300 2 0\n", "line 2 has a rate of 1e+294 Mbit/s, read in bit/s"),
+        ("t_s rate_bps rtt_ms loss\n0 0.01 2 0\n", "line 2 has a rate of 1e-08 Mbit/s, read in bit/s"),
+        ("t_s rate_bps rtt_s loss\n0 1e6 1e99 0\n", "line 2 has a round trip of 1e+102 ms, read in s"),
+        ("t_s rate_bps rtt_s loss\n0 1e6 1 0\n1e10 1e6 1 0\n", "line 3 has a time of 1e+10 s, read in s"),
+    ],
+)
+def test_values_and_rows_that_no_link_has_are_named(tmp_path, text, says):
+    with pytest.raises(InputError) as error:
+        read_link_trace(written(tmp_path, text))
+    assert says in str(error.value)
+
+
+def test_a_rate_that_may_be_in_kbit_s_is_said_and_a_header_settles_it(tmp_path):
+    assert note_of(written(tmp_path, "0 800 20 0\n1 400 20 0\n")).endswith(
+        "was read with rate in Mbit/s (up to 800); if that is wrong, name the unit in a header"
+    )
+    assert note_of(written(tmp_path, "time_s rate_mbps rtt_ms loss\n0 800 20 0\n1 400 20 0\n")) == ""
+    assert note_of(written(tmp_path, "0 300 20 0\n1 40 20 0\n")) == ""

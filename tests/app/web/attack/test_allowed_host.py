@@ -14,7 +14,7 @@ from websockets.sync.client import connect
 
 from app.web.headers import strict_headers
 from app.web.names import allowed_names
-from app.web.origin import WHY, is_own, only_own_page
+from app.web.origin import NOT_PASSED_ON, WHY, is_own, only_own_page, refusal
 
 ALLOWED = allowed_names(["lab.example.org", "büro.example"])
 
@@ -147,3 +147,43 @@ def test_the_policy_names_the_websocket_of_the_allowed_names_only(plain, allowin
     assert "ws://lab.example.org:* wss://lab.example.org:*" in policies[1]
     assert "example" not in policies[0]
     assert " * " not in policies[1]
+
+
+def asked(port, origin, waited="", host=REWRITTEN):
+    return get(port, f"{WHY}?origin={quote(origin)}{waited}", host=host).text
+
+
+@pytest.mark.parametrize(
+    ("host", "origin", "options"),
+    [
+        ("packetmesh:8080", "https://lab.example.org", "also with: --allow-host packetmesh"),
+        (
+            "packetmesh:8080",
+            "https://x.example",
+            "also with: --allow-host x.example --allow-host packetmesh",
+        ),
+        (REWRITTEN, "https://x.example", "also with: --allow-host x.example"),
+    ],
+)
+def test_the_options_of_a_refusal_are_those_that_are_missing_and_they_help(host, origin, options):
+    """A proxy in Docker sends the container's name as Host."""
+    headers = {"Host": host, "Origin": origin}
+    text = refusal(headers, ALLOWED)
+    assert text.endswith(f"start the server {options}\n")
+    named = allowed_names(options.partition("with: ")[2].replace("--allow-host ", "").split())
+    assert is_own(headers, ALLOWED | named)
+    assert not any(is_own(headers, ALLOWED | (named - {one})) for one in named)
+
+
+def test_a_page_whose_websocket_a_proxy_drops_learns_that_after_a_while():
+    server = serve(ALLOWED)
+    try:
+        port, origin = server.get_port(), "https://lab.example.org:9001"
+        assert asked(port, origin) == ""
+        assert asked(port, origin, "&waited=1") == NOT_PASSED_ON
+        websocket(port, origin, REWRITTEN)
+        assert asked(port, origin, "&waited=1") == ""
+        assert asked(port, "https://lab.example.org:9002", "&waited=1") == NOT_PASSED_ON
+        assert "--allow-host evil.example" in asked(port, "https://evil.example", "&waited=1")
+    finally:
+        server.stop()

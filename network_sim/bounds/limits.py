@@ -1,0 +1,48 @@
+"""Largest and smallest values of settings, by the unit at the end of their names.
+
+Beyond them, powers and times leave the range of floating-point numbers, or of 64-bit nanoseconds.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+from packetmesh.errors import InputError
+
+_MOST = {"db": 300.0, "dbm": 300.0, "s": 1e9, "m": 1e9, "hz": 1e15, "bps": 1e15, "gain": 1e9, "loss": 1e30}
+"""Largest value, and negated the smallest, by the last word of a name."""
+_LEAST = {"s": 1e-9, "m": 1e-9, "hz": 1.0, "bps": 1.0, "gain": 1e-9}
+"""Smallest value above 0; times are simulated in nanoseconds."""
+MOST_NODES = 10_000
+_LEAST_BY_NAME = {"reference_m": 1e-3}
+_MOST_BY_NAME = {
+    "path_loss_exponent": 20.0,
+    "reference_m": 1e6,
+    "nakagami_m": 1e9,
+    "failures_per_h": 1e9,
+    "count": MOST_NODES,
+    "vehicles": MOST_NODES,
+    "access_points": MOST_NODES,
+    "blocks": 1000,
+}
+
+
+def check_limits(part: Any, name: str) -> None:
+    """Raise an ``InputError`` if a number of a part of the config is beyond what can be computed.
+
+    Args:
+        part: for example a ``RadioConfig``.
+        name: its name in the config, for example ``radio``.
+    """
+    for field in dataclasses.fields(part):
+        value, word = getattr(part, field.name), field.name.rpartition("_")[2]
+        most = _MOST_BY_NAME.get(field.name, _MOST.get(word, math.inf))
+        for number in value if isinstance(value, tuple) else (value,):
+            if isinstance(number, int | float) and abs(number) > most:
+                hint = f"at most {most:g}" if number > 0 else f"at least {-most:g}"
+                raise InputError(f"{name}.{field.name} is {number:g}; try {hint}")
+        least = _LEAST_BY_NAME.get(field.name, _LEAST.get(word, 0.0))
+        if isinstance(value, float) and 0.0 < value < least:
+            raise InputError(f"{name}.{field.name} is {value:g}; try at least {least:g}")
