@@ -32,10 +32,10 @@ def one_of(key: str, value: float, choices: Iterable[float]) -> None:
         raise InputError(f"{key} is {value:g}; try one of {', '.join(f'{one:g}' for one in choices)}")
 
 
-def one_each(key: str, values: Sized, wanted: int, what: str) -> None:
-    """Raise unless there are no values or ``wanted`` of them; ``what`` explains these in the message."""
-    if len(values) not in (0, wanted):
-        raise InputError(f"{key} has {len(values)} numbers; try {wanted}: {what}")
+def one_each(key: str, values: Sized, expected: int, what: str) -> None:
+    """Raise unless there are no values or ``expected`` of them; ``what`` explains these in the message."""
+    if len(values) not in (0, expected):
+        raise InputError(f"{key} has {len(values)} numbers; try {expected}: {what}")
 
 
 def several(key: str, values: Sized, each: int, what: str) -> None:

@@ -62,5 +62,5 @@ def part(
             step = next(steps)
         except StopIteration as stop:
             return stop.value
-        told = f"{stage}: {step.stage}" if detail else stage
-        yield Progress(told, begin + step.fraction * (end - begin))
+        name = f"{stage}: {step.stage}" if detail else stage
+        yield Progress(name, begin + step.fraction * (end - begin))

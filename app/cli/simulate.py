@@ -182,9 +182,9 @@ def _say_idle_sweep(config: NetworkConfig, key: str, values: Sequence[str]) -> N
     from packetmesh.settings import with_settings
 
     first, *others = (with_settings(config, [f"{key}={value}"]) for value in values)
-    said = [without_effect(other, [key], first) for other in others]
-    if said and all(said):
-        say(said[0][0])
+    sentences = [without_effect(other, [key], first) for other in others]
+    if sentences and all(sentences):
+        say(sentences[0][0])
 
 
 def _run_with_progress(steps: Generator[Progress, None, Result]) -> Result:

@@ -319,10 +319,10 @@ def resume(config: TrainingConfig, model: DepthNet, optimizer: torch.optim.Optim
     file = config.out / "last.pt"
     checkpoint = torch.load(file, weights_only=True, map_location="cpu")
     for option in ("width", "initial"):
-        saved, asked = checkpoint["config"][option], getattr(config, option)
-        if saved != asked:
+        saved, given = checkpoint["config"][option], getattr(config, option)
+        if saved != given:
             raise InputError(
-                f"{file} was started with {option} {saved}, not {asked}: continue it with {saved}, "
+                f"{file} was started with {option} {saved}, not {given}: continue it with {saved}, "
                 "or train into another folder."
             )
     model.load_state_dict(checkpoint["model"])

@@ -71,14 +71,14 @@ GROUPS = (
 
 def counts(verdicts: Sequence[dict[str, Any]]) -> dict[str, int]:
     """Count verdicts, and those that the truth contradicts."""
-    told = {"judged": len(verdicts)}
+    numbers = {"judged": len(verdicts)}
     for word, wrong_if in (("pass", False), ("fail", True), ("not decided", True)):
-        said = [one for one in verdicts if one["word"] == word]
-        told[word] = len(said)
-        told[f"{word}, wrong" if word != "not decided" else "not decided, good"] = sum(
-            one["good"] is wrong_if for one in said
+        found = [one for one in verdicts if one["word"] == word]
+        numbers[word] = len(found)
+        numbers[f"{word}, wrong" if word != "not decided" else "not decided, good"] = sum(
+            one["good"] is wrong_if for one in found
         )
-    return told
+    return numbers
 
 
 def main() -> None:
@@ -96,10 +96,10 @@ def main() -> None:
         answers = drain(
             trials, lambda progress: sys.stderr.write(f"{progress.fraction:4.0%} {progress.stage}\n")
         )
-        told = {"seed": options.seed, "mrcal": with_mrcal, **summary(answers)}
+        record = {"seed": options.seed, "mrcal": with_mrcal, **summary(answers)}
     except PacketMeshError as error:
         sys.exit(f"verdicts: {error}")
-    sys.stdout.write(f"{json.dumps(finite(told), allow_nan=False)}\n")
+    sys.stdout.write(f"{json.dumps(finite(record), allow_nan=False)}\n")
 
 
 if __name__ == "__main__":

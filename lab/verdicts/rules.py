@@ -39,7 +39,7 @@ def judge(task: tuple[int, int, bool]) -> dict[str, Any]:
     """
     seed, number, with_mrcal = task
     session = draw_session(seed, number)
-    told: dict[str, Any] = {
+    answer: dict[str, Any] = {
         "lens": session.optics.lens,
         "chosen": session.chosen,
         "right_lens": session.right_lens,
@@ -51,17 +51,17 @@ def judge(task: tuple[int, int, bool]) -> dict[str, Any]:
     try:
         found = calibrate(session.views, session.size_px, session.chosen)
     except PacketMeshError:
-        return told
+        return answer
     good = truly_good(session, found.optics)
     judged = verdict(found, likely_error(found, session.range_m), session.accuracy_m)
-    told["probability"], told["good"] = judged.probability, good
-    told["verdicts"][OURS] = {"word": judged.word, "good": good}
+    answer["probability"], answer["good"] = judged.probability, good
+    answer["verdicts"][OURS] = {"word": judged.word, "good": good}
     for limit_px in RMS_LIMITS_PX:
         word = "pass" if found.rms_px < limit_px else "fail"
-        told["verdicts"][RMS.format(limit_px)] = {"word": word, "good": good}
+        answer["verdicts"][RMS.format(limit_px)] = {"word": word, "good": good}
     if with_mrcal:
-        told["verdicts"] |= _by_mrcal(session, found)
-    return told
+        answer["verdicts"] |= _by_mrcal(session, found)
+    return answer
 
 
 def _mrcal_input(session: Session, found: Calibration) -> dict[str, Any]:
@@ -104,10 +104,10 @@ def _by_mrcal(session: Session, found: Calibration) -> dict[str, dict[str, Any]]
     )
     if done.returncode:
         return {}
-    told = json.loads(done.stdout)
-    good = truly_good(session, _optics(told["camera"], session))
+    answer = json.loads(done.stdout)
+    good = truly_good(session, _optics(answer["camera"], session))
     verdicts = {}
-    for name, error_m in (("uncertainty", told["uncertainty_m"]), ("two halves", told["apart_m"])):
+    for name, error_m in (("uncertainty", answer["uncertainty_m"]), ("two halves", answer["apart_m"])):
         if error_m is not None:
             share = np.mean(np.nan_to_num(np.array(error_m, float), nan=np.inf) <= session.accuracy_m)
             verdicts[MRCAL.format(name)] = {"word": "pass" if share >= LEAST_SHARE else "fail", "good": good}

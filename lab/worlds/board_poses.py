@@ -67,12 +67,12 @@ def propose_poses(
             f"Only {len(pool)} places were found where a camera sees the whole board; take a smaller board, "
             "or let it be farther away"
         )
-    told: Counter[Hashable] = Counter()
+    counts: Counter[Hashable] = Counter()
     chosen = []
     for _ in range(count):
-        gains = [sum(worth / 2.0 ** told[what] for what, worth in shown.items()) for _, shown in pool]
+        gains = [sum(worth / 2.0 ** counts[what] for what, worth in shown.items()) for _, shown in pool]
         T, shown = pool.pop(int(np.argmax(gains)))
-        told.update(shown.keys())
+        counts.update(shown.keys())
         chosen.append(T)
     return tuple(chosen)
 

@@ -140,8 +140,8 @@ def _of_nodes(config: NetworkConfig) -> Reasons:
         yield ("nodes.deadline_s",), "the run stops at run.horizon_s, before an image can be that old"
     if kind == "serial" and not _loses(config):
         yield ("nodes.retransmit",), "no packet gets lost"
-    asked = nodes.retransmit and kind == "replay" and not config.mac.ack
-    if kind in ("serial", "replay") and not nodes.failures_per_h and not asked:
+    requests = nodes.retransmit and kind == "replay" and not config.mac.ack
+    if kind in ("serial", "replay") and not nodes.failures_per_h and not requests:
         yield ("energy.rx_w",), "no camera receives anything"
     if uplink.trace is not None:
         yield ("uplink.rate_bps", "uplink.latency_s", "uplink.loss"), "uplink.trace replaces it"

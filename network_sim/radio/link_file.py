@@ -315,13 +315,13 @@ def _check_times(t_s: FloatArray, lines: list[int], path: str | Path) -> None:
 def _note(path: str, form: Form, units: Sequence[str], first: float, more: bool) -> str:
     """Return how the file was read, where that is not the usual form; empty if it is."""
     since_1970 = EPOCH_S[0] < first * FACTORS[0][units[0]] < EPOCH_S[1]
-    said = [
+    parts = [
         f"{name} in {unit}{' since 1970' if since_1970 and name == 'time' else ''}"
         for name, unit, usual in zip(QUANTITIES, units, USUAL, strict=True)
         if unit != usual or (since_1970 and name == "time")
     ]
     if form.decimal_comma:
-        said.append("decimal commas")
+        parts.append("decimal commas")
     if more:
-        said.append("other columns left out")
-    return f"The recorded link {path} was read with {', '.join(said)}" if said else ""
+        parts.append("other columns left out")
+    return f"The recorded link {path} was read with {', '.join(parts)}" if parts else ""

@@ -129,11 +129,11 @@ class Street:
         heard = yield from self._send_summary(vehicle, access_point, leave_ns, offered)
         cells, captured_ns = snapshots.tags(vehicle, heard)
         wanted = scheme.wanted(cells, captured_ns, int(env.now))
-        asked = len(wanted)
+        requested = len(wanted)
         if scheme.asks:
-            asked = yield from self._send_request(vehicle, access_point, len(wanted))
+            requested = yield from self._send_request(vehicle, access_point, len(wanted))
         images, taken_ns = heard[wanted].tolist(), captured_ns[wanted].tolist()
-        sent = yield from self._upload(vehicle, access_point, leave_ns, images[:asked], taken_ns)
+        sent = yield from self._upload(vehicle, access_point, leave_ns, images[:requested], taken_ns)
         missed = set(images).difference(sent)
         for image, cell, image_ns in zip(images, cells[wanted].tolist(), taken_ns, strict=True):
             if image in missed:

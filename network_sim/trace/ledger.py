@@ -44,10 +44,10 @@ class Delays:
         """Return a percentile of the delays, exact to one bin; NaN without delays."""
         if not self.count:
             return float("nan")
-        wanted = max(percent / 100.0 * self.count, 1.0)
+        rank = max(percent / 100.0 * self.count, 1.0)
         reached = np.cumsum(self.histogram)
-        place = int(np.searchsorted(reached, wanted))
-        share = (wanted - (reached[place] - self.histogram[place])) / self.histogram[place]
+        place = int(np.searchsorted(reached, rank))
+        share = (rank - (reached[place] - self.histogram[place])) / self.histogram[place]
         return float(SHORTEST_S * 10.0 ** ((place + share) / BINS_PER_DECADE))
 
 

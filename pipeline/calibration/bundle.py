@@ -164,13 +164,13 @@ def _linearised(sighting: Sighting, bundle: Bundle) -> tuple[FloatArray, FloatAr
     """Return (2 N, 12 + P) derivatives by camera, board and lens, and (2 N,) observed minus predicted."""
     T_camera_first = bundle.T_camera_first[sighting.camera]
     first_m = apply(bundle.T_first_board[sighting.moment], sighting.board_m)
-    told = bundle.optics[sighting.camera].linearised(first_m, T_camera_first)
-    by_camera_m = told.by_pose[:, 3:]
+    linear = bundle.optics[sighting.camera].linearised(first_m, T_camera_first)
+    by_camera_m = linear.by_pose[:, 3:]
     by_first_m = by_camera_m @ T_camera_first[:3, :3]
     camera_m, first_m = (np.repeat(points, 2, axis=0) for points in (apply(T_camera_first, first_m), first_m))
     turns = np.cross(camera_m, by_camera_m), np.cross(first_m, by_first_m)
-    J = np.hstack([turns[0], by_camera_m, turns[1], by_first_m, told.by_lens])
-    return J, (sighting.points_px - told.points_px).ravel()
+    J = np.hstack([turns[0], by_camera_m, turns[1], by_first_m, linear.by_lens])
+    return J, (sighting.points_px - linear.points_px).ravel()
 
 
 def _moved(poses: Sequence[FloatArray], step: FloatArray) -> tuple[FloatArray, ...]:

@@ -40,8 +40,8 @@ def calibrate(
     (542, True)
     """
     files = image_files([str(word) for word in images], one_camera)
-    asked = board_beside(images) if board is None else board
-    return drain(iterate_calibration(files, asked, lens, held_out, one_camera=one_camera))
+    given = board_beside(images) if board is None else board
+    return drain(iterate_calibration(files, given, lens, held_out, one_camera=one_camera))
 
 
 def calibrate_cameras(
@@ -68,5 +68,5 @@ def calibrate_cameras(
     (25, 0.93)
     >>> pm.write_calibration("calibration", report.nodes())
     """
-    asked = board_beside(folders) if board is None else board
-    return drain(iterate_rig_calibration(node_shots(folders), asked, lens, held_out))
+    given = board_beside(folders) if board is None else board
+    return drain(iterate_rig_calibration(node_shots(folders), given, lens, held_out))

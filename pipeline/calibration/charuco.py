@@ -110,20 +110,20 @@ def _why_not(gray: ByteArray, board: Board, seen: Markers, corners: int) -> str:
         )
     if seen.border_cells > 1:
         return _aprilgrid(seen)
-    told = f"{seen.title} are seen"
+    found = f"{seen.title} are seen"
     size = _size_of(board, seen)
     if size is not None and size != board.size:
         return (
-            f"{told}, which are those of a board of {size[0]} x {size[1]} inner corners, not of "
+            f"{found}, which are those of a board of {size[0]} x {size[1]} inner corners, not of "
             f"{board.columns} x {board.rows}; try --columns {size[0]} --rows {size[1]}"
         )
     if size is None:
         return (
-            f"{told}, but not in the places of a board of {board.columns} x {board.rows} inner corners, with "
-            f"the numbers 0 to {board.markers - 1} row by row; check --pattern, --columns and --rows"
+            f"{found}, but not in the places of a board of {board.columns} x {board.rows} inner corners, "
+            f"with the numbers 0 to {board.markers - 1} row by row; check --pattern, --columns and --rows"
         )
     return (
-        f"{told}, but only {corners} of the corners between them, and it takes {FEW_CORNERS}; have more of "
+        f"{found}, but only {corners} of the corners between them, and it takes {FEW_CORNERS}; have more of "
         "the board in the picture, larger and sharp"
     )
 

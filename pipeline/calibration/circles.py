@@ -39,14 +39,14 @@ def find_circles(gray: ByteArray, board: Board) -> Detection:
     """
     most: FloatArray = np.zeros((0, 2))
     groups: list[FloatArray] = []
-    wanted = board.columns * board.rows
+    expected = board.columns * board.rows
     for picture, detector in _blob_detectors(gray):
         all_px: FloatArray = np.zeros((0, 2))
         for blobs_px, sizes_px in _groups(detector.detect(picture), board):
             all_px = blobs_px if len(blobs_px) > len(all_px) else all_px
             most = all_px if len(all_px) > len(most) else most
             groups += [blobs_px, blobs_px[sizes_px > LETTER * np.median(sizes_px)]]
-            if len(blobs_px) < wanted:
+            if len(blobs_px) < expected:
                 continue
             for orders in _grids(board, blobs_px, sizes_px, gray.shape, detector):
                 if _goes_on(board, orders[0], all_px):
@@ -103,7 +103,7 @@ def _groups(blobs: Sequence[cv2.KeyPoint], board: Board) -> Iterator[tuple[Float
     """Yield (B, 2) centres and (B,) diameters of groups of blobs that may be the board's circles: the largest
     group of similar size, then the largest blobs, because letters on the sheet are smaller than circles.
     """
-    wanted = board.columns * board.rows
+    expected = board.columns * board.rows
     sizes_px = np.array([blob.size for blob in blobs])
     if not len(sizes_px):
         return
@@ -111,11 +111,11 @@ def _groups(blobs: Sequence[cv2.KeyPoint], board: Board) -> Iterator[tuple[Float
     alike = max(((sizes_px >= one) & (sizes_px <= SIZES * one) for one in sizes_px), key=np.sum)
     near_px, near_sizes_px = _together(centres_px[alike], sizes_px[alike], board)
     yield near_px, near_sizes_px
-    if len(near_px) > wanted:
-        largest = np.sort(np.argsort(-near_sizes_px, kind="stable")[:wanted])
+    if len(near_px) > expected:
+        largest = np.sort(np.argsort(-near_sizes_px, kind="stable")[:expected])
         yield near_px[largest], near_sizes_px[largest]
-    if len(sizes_px) > wanted and alike.sum() >= wanted:
-        largest = sizes_px >= np.sort(sizes_px)[-wanted]
+    if len(sizes_px) > expected and alike.sum() >= expected:
+        largest = sizes_px >= np.sort(sizes_px)[-expected]
         yield _together(centres_px[largest], sizes_px[largest], board)
 
 
@@ -139,7 +139,7 @@ def _only(blobs_px: FloatArray, sizes_px: FloatArray, shape: tuple[int, ...]) ->
 
 
 def _why_no_circles(gray: ByteArray, board: Board, blobs_px: FloatArray, groups: Sequence[FloatArray]) -> str:
-    wanted = board.columns * board.rows
+    expected = board.columns * board.rows
     if not len(blobs_px):
         return (
             "Nothing in it looks like a circle; have the board in the picture, sharp and evenly lit, or "
@@ -149,14 +149,14 @@ def _why_no_circles(gray: ByteArray, board: Board, blobs_px: FloatArray, groups:
     if other is not None and (other.pattern, other.size) != (board.pattern, board.size):
         size = chessboard_size(gray, board.columns >= board.rows)  # its squares look like shifted circles
         chessboard = "" if size is None else f", or --pattern chessboard --columns {size[0]} --rows {size[1]}"
-        first = "show the whole board, or " if other.columns * other.rows < wanted else ""
+        first = "show the whole board, or " if other.columns * other.rows < expected else ""
         return (
             f"{_grid_name(other)} are seen, not {_grid_name(board)}; {first}try --pattern {other.pattern} "
             f"--columns {other.columns} --rows {other.rows}{chessboard}"
         )
-    if len(blobs_px) < wanted:
+    if len(blobs_px) < expected:
         return (
-            f"{len(blobs_px)} of {wanted} circles are seen; show the whole board, without glare, or check "
+            f"{len(blobs_px)} of {expected} circles are seen; show the whole board, without glare, or check "
             "--pattern, --columns and --rows"
         )
     kind = "shifted rows" if board.pattern == "circles-asymmetric" else "straight rows"

@@ -67,8 +67,8 @@ def _distance(view: FittedView, optics: Optics) -> tuple[FloatArray, float]:
     """Return the (P,) derivative of a view's distance by the lens, with its pose adapted, and the distance's
     own variance for noise of 1 px.
     """
-    told = optics.linearised(view.board_m, view.T_camera_board)
+    linear = optics.linearised(view.board_m, view.T_camera_board)
     away = view.T_camera_board[:3, 3]
     outward = np.concatenate([np.zeros(3), away / np.linalg.norm(away)])
-    known = np.linalg.solve(told.by_pose.T @ told.by_pose, outward)
-    return -told.by_lens.T @ (told.by_pose @ known), float(outward @ known)
+    known = np.linalg.solve(linear.by_pose.T @ linear.by_pose, outward)
+    return -linear.by_lens.T @ (linear.by_pose @ known), float(outward @ known)

@@ -178,8 +178,8 @@ def _samples_of(
 
 def _moved_boards(view: FittedView, lens: Optics, errors: FloatArray) -> list[FloatArray]:
     """Return (4, 4) apparent poses of the board under each error of the lens, to first order."""
-    told = lens.linearised(view.board_m, view.T_camera_board)
-    steps = -np.linalg.lstsq(told.by_pose, told.by_lens @ errors, rcond=None)[0]
+    linear = lens.linearised(view.board_m, view.T_camera_board)
+    steps = -np.linalg.lstsq(linear.by_pose, linear.by_lens @ errors, rcond=None)[0]
     turn, move = cv2.Rodrigues(view.T_camera_board[:3, :3])[0].ravel(), view.T_camera_board[:3, 3]
     return [pose_of(turn + step[:3], move + step[3:]) for step in steps.T]
 

@@ -73,26 +73,26 @@ def separable(samples: DepthSamples) -> Choice:
     """Determine which models the views can separate, from the positions of their boards."""
     away_m = [float(np.median(samples.true_m[rows])) for rows in rows_of_views(samples)]
     near_m, far_m = min(away_m), max(away_m)
-    said, models = [], len(LADDER)
+    sentences, models = [], len(LADDER)
     if far_m < APART * near_m:
         models = 3
-        said.append(
+        sentences.append(
             f"The board was always {near_m:.2f} to {far_m:.2f} m away, which cannot tell an offset from a "
             "scale; take views from 0.5 m to 2 m"
         )
     elif far_m < FAR_APART * near_m:
         models = 4
-        said.append(
+        sentences.append(
             f"Views from {near_m:.2f} to {far_m:.2f} m cannot tell a curvature; take some at twice the "
             "distance of the nearest"
         )
     unseen = int((~_seen_parts(samples)).sum())
     if unseen:
-        said.append(
+        sentences.append(
             f"{unseen} of the image's 12 parts have the board in fewer than {VIEWS_OF_A_PART} views, so that "
             "no map over the image is known; take views with the board in its corners"
         )
-    return Choice(LADDER[:models], not unseen, ". ".join(said))
+    return Choice(LADDER[:models], not unseen, ". ".join(sentences))
 
 
 def _seen_parts(samples: DepthSamples) -> BoolArray:

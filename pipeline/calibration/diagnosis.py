@@ -106,11 +106,11 @@ def radial_curve(calibration: Calibration) -> RadialCurve:
     rays = optics.rays(pixels)
     rays = rays[np.isfinite(rays[:, 2])]
     angle = np.arctan2(rays[:, 0], rays[:, 2])
-    told = optics.linearised(rays)
-    radius_px = told.points_px[:, 0] - middle_px[0]
+    linear = optics.linearised(rays)
+    radius_px = linear.points_px[:, 0] - middle_px[0]
     plain = angle if calibration.lens == "fisheye" else np.tan(angle)
     # Principal point and focal length are the reference of the curve, so their errors are not included.
-    bends = told.by_lens[::2, 4:]
+    bends = linear.by_lens[::2, 4:]
     variance_px2 = np.einsum("ki,ij,kj->k", bends, calibration.covariance[4:, 4:], bends)
     seen_px = np.concatenate([view.points_px for view in calibration.views])
     return RadialCurve(

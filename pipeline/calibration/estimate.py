@@ -298,18 +298,18 @@ def settle(
     It minimises the image distances by the Levenberg-Marquardt method.
     """
     pose = np.concatenate([cv2.Rodrigues(T_camera_points[:3, :3])[0].ravel(), T_camera_points[:3, 3]])
-    damping, told = 1e-3, optics.linearised(points_m, T_camera_points)
-    off_px = (points_px - told.points_px).ravel()
+    damping, linear = 1e-3, optics.linearised(points_m, T_camera_points)
+    off_px = (points_px - linear.points_px).ravel()
     for _ in range(SETTLE_STEPS):
-        normal = told.by_pose.T @ told.by_pose
+        normal = linear.by_pose.T @ linear.by_pose
         try:
-            step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), told.by_pose.T @ off_px)
+            step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), linear.by_pose.T @ off_px)
         except np.linalg.LinAlgError:  # the image does not depend on some motion: the board is far off
             break
         nearer = optics.linearised(points_m, pose_of(pose[:3] + step[:3], pose[3:] + step[3:]))
         nearer_px = (points_px - nearer.points_px).ravel()
         if nearer_px @ nearer_px <= off_px @ off_px:
-            pose, told, off_px, damping = pose + step, nearer, nearer_px, 0.1 * damping
+            pose, linear, off_px, damping = pose + step, nearer, nearer_px, 0.1 * damping
         else:
             damping *= 10.0
         if np.abs(step).max() < 1e-12:
@@ -334,13 +334,15 @@ def held_out(
             f"{len(views)} views in {folds} folds leave {left} for the lens, and it takes {LEAST_VIEWS}; "
             "hold out fewer at a time with more folds, or take more images"
         )
-    told: dict[int, FittedView] = {}
+    placed: dict[int, FittedView] = {}
     for fold in range(folds):
         rest = [view for index, view in enumerate(views) if index % folds != fold]
         lens_of_rest = best_fit(rest, size_px, lens)
         for index in range(fold, len(views), folds):
-            told[index] = place(views[index], lens_of_rest.matrix, lens_of_rest.distortion, lens_of_rest.lens)
-    return tuple(told[index] for index in range(len(views)))
+            placed[index] = place(
+                views[index], lens_of_rest.matrix, lens_of_rest.distortion, lens_of_rest.lens
+            )
+    return tuple(placed[index] for index in range(len(views)))
 
 
 def _tilt_deg(poses: Sequence[FloatArray]) -> float:
@@ -363,17 +365,17 @@ def information(fitted: Sequence[FittedView], optics: Optics) -> FloatArray:
     )
 
 
-def inverted(told: FloatArray) -> FloatArray:
+def inverted(information: FloatArray) -> FloatArray:
     """Invert (P, P) information to a covariance; poorly determined parameters get a large variance."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(told), LEAST_INFORMATION))
-    values, turns = np.linalg.eigh(told * np.outer(scale, scale))
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(information), LEAST_INFORMATION))
+    values, turns = np.linalg.eigh(information * np.outer(scale, scale))
     root = scale[:, None] * turns / np.sqrt(np.maximum(values, LEAST_INFORMATION))
     return root @ root.T
 
 
 def informed(board_m: FloatArray, T_camera_board: FloatArray, optics: Optics) -> FloatArray:
     """Return the (P, P) information of one view, whose pose is unknown, about the lens."""
-    told = optics.linearised(board_m, T_camera_board)
-    base = np.linalg.qr(told.by_pose)[0]
-    left = told.by_lens - base @ (base.T @ told.by_lens)
+    linear = optics.linearised(board_m, T_camera_board)
+    base = np.linalg.qr(linear.by_pose)[0]
+    left = linear.by_lens - base @ (base.T @ linear.by_lens)
     return left.T @ left

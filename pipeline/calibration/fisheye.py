@@ -44,8 +44,8 @@ def estimate_fisheye(
         placed = [place(row, optics) for row in range(len(boards))]
         poses = [pose for pose in placed if pose is not None]
         if len(poses) == len(boards):
-            told = [optics.linearised(board, T) for (board, _), T in zip(boards, poses, strict=True)]
-            beginnings.append((_cost(told, [pixels for _, pixels in boards]), optics, poses))
+            linear = [optics.linearised(board, T) for (board, _), T in zip(boards, poses, strict=True)]
+            beginnings.append((_cost(linear, [pixels for _, pixels in boards]), optics, poses))
     beginnings = sorted(beginnings, key=lambda one: one[0])[:TRIED]
     ends = [adjust(boards, optics, poses) for _, optics, poses in beginnings]
     return min(ends, key=lambda one: one[0])[1:] if ends else None
@@ -58,10 +58,10 @@ def adjust(
     lens = _numbers(optics)
     turns = [np.concatenate([cv2.Rodrigues(T[:3, :3])[0].ravel(), T[:3, 3]]) for T in poses]
     seen = [pixels for _, pixels in boards]
-    told = [optics.linearised(board, T) for (board, _), T in zip(boards, poses, strict=True)]
-    cost, damping = _cost(told, seen), 1e-3
+    linear = [optics.linearised(board, T) for (board, _), T in zip(boards, poses, strict=True)]
+    cost, damping = _cost(linear, seen), 1e-3
     for _ in range(STEPS):
-        by_lens, by_poses = _step(told, seen, damping)
+        by_lens, by_poses = _step(linear, seen, damping)
         trial, moved = lens + by_lens, [pose + step for pose, step in zip(turns, by_poses, strict=True)]
         tried = [
             _optics(trial).linearised(board, _pose(pose))
@@ -74,20 +74,20 @@ def adjust(
                 break
             continue
         gain, damping = (cost - after) / max(cost, 1e-300), 0.1 * damping
-        lens, turns, told, cost = trial, moved, tried, after
+        lens, turns, linear, cost = trial, moved, tried, after
         if gain < STILL:
             break
     return cost, _optics(lens), [_pose(pose) for pose in turns]
 
 
 def _step(
-    told: Sequence[Projection], seen: Sequence[FloatArray], damping: float
+    linear: Sequence[Projection], seen: Sequence[FloatArray], damping: float
 ) -> tuple[FloatArray, list[FloatArray]]:
     """Return the changes of the lens and of each pose, with the poses eliminated first."""
-    count = told[0].by_lens.shape[1]
+    count = linear[0].by_lens.shape[1]
     normal, right = np.zeros((count, count)), np.zeros(count)
     reduced, parts = np.zeros((count, count)), []
-    for one, pixels in zip(told, seen, strict=True):
+    for one, pixels in zip(linear, seen, strict=True):
         off_px = (pixels - one.points_px).ravel()
         own = _damped(one.by_pose.T @ one.by_pose, damping)
         both = one.by_pose.T @ np.column_stack([one.by_lens, off_px])
@@ -104,8 +104,8 @@ def _damped(normal: FloatArray, damping: float) -> FloatArray:
     return normal + damping * np.diag(np.diag(normal))
 
 
-def _cost(told: Sequence[Projection], seen: Sequence[FloatArray]) -> float:
-    return float(sum(((pixels - one.points_px) ** 2).sum() for one, pixels in zip(told, seen, strict=True)))
+def _cost(linear: Sequence[Projection], seen: Sequence[FloatArray]) -> float:
+    return float(sum(((pixels - one.points_px) ** 2).sum() for one, pixels in zip(linear, seen, strict=True)))
 
 
 def _numbers(optics: Optics) -> FloatArray:

@@ -232,21 +232,21 @@ def _detections(
         image = read_color(path)
         sizes.setdefault((image.shape[1], image.shape[0]), path.name)
         if len(sizes) > 1:
-            told = " and ".join(f"{name} of {width} x {height}" for (width, height), name in sizes.items())
+            listed = " and ".join(f"{name} of {width} x {height}" for (width, height), name in sizes.items())
             raise InputError(
-                f"The images are not of one size: {told}; give each camera's images a folder of its own, and "
-                "hold a camera upright or sideways in all of them"
+                f"The images are not of one size: {listed}; give each camera's images a folder of its own, "
+                "and hold a camera upright or sideways in all of them"
             )
         name = path.name if path.name not in detections else str(path)
         detections[name], paths[name] = detect(image, board), path
     return detections, paths, next(iter(sizes))
 
 
-def _folds(wanted: int, views: int) -> int:
+def _folds(most: int, views: int) -> int:
     """Return how many folds leave enough views for the lens; 0 if none are requested or possible."""
-    if not wanted or views <= LEAST_VIEWS:
+    if not most or views <= LEAST_VIEWS:
         return 0
-    return next(folds for folds in range(min(wanted, views), views + 1) if _left(views, folds) >= LEAST_VIEWS)
+    return next(folds for folds in range(min(most, views), views + 1) if _left(views, folds) >= LEAST_VIEWS)
 
 
 def _left(views: int, folds: int) -> int:

@@ -94,8 +94,8 @@ class Optics:
 
     def _slopes(self, rays: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return (N, 2) pixels of (N, 3) rays with z = 1, and their (N, 2, 2) derivatives by x and y."""
-        told = self.linearised(rays)
-        return told.points_px, told.by_pose.reshape(-1, 2, 6)[:, :, 3:5]
+        linear = self.linearised(rays)
+        return linear.points_px, linear.by_pose.reshape(-1, 2, 6)[:, :, 3:5]
 
     def _flat(self, points_px: FloatArray) -> FloatArray:
         """Return (N, 2) points of pixels on the plane z = 1, by Newton's method."""

@@ -66,8 +66,8 @@ class LikelyError:
 
     def map_m(self, level: float) -> FloatArray:
         """Return the (R, C) error that a point does not exceed with a probability; NaN without a ray."""
-        told = np.quantile(self.error_m, level, axis=0, method="higher").reshape(self.shape)
-        return np.where(np.isfinite(told), told, np.nan)
+        exceeded = np.quantile(self.error_m, level, axis=0, method="higher").reshape(self.shape)
+        return np.where(np.isfinite(exceeded), exceeded, np.nan)
 
 
 def likely_error(calibration: Calibration, range_m: float, seed: int = 0) -> LikelyError:
@@ -125,12 +125,12 @@ class _Part:
 
 
 def _linear(view: FittedView, optics: Optics, size_px: tuple[int, int]) -> _Part:
-    told = optics.linearised(view.board_m, view.T_camera_board)
-    by_free = _free(told.points_px, size_px)
-    by_depth = told.by_pose[:, 3:] @ view.T_camera_board[:3, 2]
+    linear = optics.linearised(view.board_m, view.T_camera_board)
+    by_free = _free(linear.points_px, size_px)
+    by_depth = linear.by_pose[:, 3:] @ view.T_camera_board[:3, 2]
     by_bend = by_depth[:, None] * np.repeat(_bends_m(view.board_m), 2, axis=0)
-    columns = np.hstack([told.by_lens, by_free, by_bend])
-    base = np.linalg.qr(told.by_pose)[0]
+    columns = np.hstack([linear.by_lens, by_free, by_bend])
+    base = np.linalg.qr(linear.by_pose)[0]
     residuals = view.residuals_px.ravel()
     return _Part(columns - base @ (base.T @ columns), residuals - base @ (base.T @ residuals))
 
@@ -219,8 +219,10 @@ def _change(seen: Sight, views: Sequence[FittedView], optics: Optics, size_px: t
     """Return (G, 2, Q) derivatives of the grid's pixels by lens, free distortion and bend, with the camera's
     pose that fits the boards best.
     """
-    told = [optics.linearised(view.board_m, view.T_camera_board) for view in views]
-    boards = [np.hstack([optics_told.by_lens, _free(optics_told.points_px, size_px)]) for optics_told in told]
+    linear = [optics.linearised(view.board_m, view.T_camera_board) for view in views]
+    boards = [
+        np.hstack([optics_told.by_lens, _free(optics_told.points_px, size_px)]) for optics_told in linear
+    ]
     # The camera moves as a whole, so that derivatives by its pose are those of points in its own frame.
     in_camera = np.concatenate(
         [view.board_m @ view.T_camera_board[:3, :3].T + view.T_camera_board[:3, 3] for view in views]

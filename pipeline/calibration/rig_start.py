@@ -111,8 +111,8 @@ def _linked(
     errors_px = np.array([_error_px(T_a_b, pairs, optics_b, turns) for T_a_b in tried])
     best = tried[int(errors_px.argmin())]
     apart = np.array([rotation_angle_rad(T[:3, :3].T @ best[:3, :3]) > APART_RAD for T in tried])
-    told = all(a.oriented and b.oriented for a, b in pairs) or errors_px.min() > LOST_PX
-    if not told and (errors_px[apart] < TELLING * errors_px.min()).any():
+    decided = all(a.oriented and b.oriented for a, b in pairs) or errors_px.min() > LOST_PX
+    if not decided and (errors_px[apart] < TELLING * errors_px.min()).any():
         raise ReconstructionError(
             f"{who} see the board together too rarely to tell which way up it was held; show it to both more "
             "often, tilted differently, or use a board with a mark (packetmesh target)"
@@ -129,14 +129,14 @@ def _error_px(
     T_a_b: FloatArray, pairs: Sequence[tuple[Look, Look]], optics_b: Optics, turns: Sequence[FloatArray]
 ) -> float:
     """Return the median over moments of camera b's error, with the board's pose from camera a."""
-    told = [
+    errors = [
         min(
             _off_px(b.sighting, optics_b, inverse(T_a_b) @ a.T_camera_board @ turn)
             for turn in _possible((a, b), turns)
         )
         for a, b in pairs
     ]
-    return float(np.median(told))
+    return float(np.median(errors))
 
 
 def _off_px(sighting: Sighting, optics: Optics, T_camera_board: FloatArray) -> float:

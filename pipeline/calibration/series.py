@@ -126,11 +126,11 @@ def made_by(path: Path) -> str:
     """Return camera and focal length from an image's EXIF data; empty if there are none."""
     try:
         with Image.open(path) as image:
-            told = image.getexif()
-            detail = told.get_ifd(ExifTags.IFD.Exif)
+            exif = image.getexif()
+            detail = exif.get_ifd(ExifTags.IFD.Exif)
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
         return ""  # the image's reader says what is wrong with it
-    body = [_text(told.get(key, detail.get(key))) for key in _BODY]
+    body = [_text(exif.get(key, detail.get(key))) for key in _BODY]
     focal = detail.get(_FOCAL)
     try:
         words = [*body, "" if focal is None else f"{float(focal):g} mm"]

@@ -113,9 +113,9 @@ def sight(optics: Optics, size_px: tuple[int, int], range_m: float) -> Sight:
     points_m = range_m * rays
     by_pose = np.full((len(rays), 2, 6), np.nan)
     by_lens = np.full((len(rays), 2, len(FREE[optics.lens])), np.nan)
-    told = optics.linearised(points_m[known])
-    by_pose[known] = told.by_pose.reshape(-1, 2, 6)
-    by_lens[known] = told.by_lens.reshape(-1, 2, by_lens.shape[2])
+    linear = optics.linearised(points_m[known])
+    by_pose[known] = linear.by_pose.reshape(-1, 2, 6)
+    by_lens[known] = linear.by_lens.reshape(-1, 2, by_lens.shape[2])
     across = _across(rays[known])
     metres = np.full((len(rays), 2, 2), np.nan)
     metres[known] = np.linalg.inv(by_pose[known][:, :, 3:] @ across.transpose(0, 2, 1))
@@ -140,8 +140,8 @@ def placing(views: Sequence[tuple[FloatArray, FloatArray]], optics: Optics) -> F
         views: (N, 3) points of each board and its (4, 4) pose in the camera's frame.
         optics: the lens.
     """
-    told = optics.linearised(_in_camera(views))
-    return -np.linalg.lstsq(told.by_pose, told.by_lens, rcond=None)[0]
+    linear = optics.linearised(_in_camera(views))
+    return -np.linalg.lstsq(linear.by_pose, linear.by_lens, rcond=None)[0]
 
 
 def projected_sd_px(calibration: Calibration, range_m: float) -> ErrorMap:
@@ -210,9 +210,9 @@ def half_difference_px(
     )
     difference_px[known] = other_px - one_px
     across_m = (seen.metres @ difference_px[:, :, None])[:, :, 0]
-    told = seen.map_of(np.linalg.norm(difference_px, axis=1), np.linalg.norm(across_m, axis=1))
+    difference = seen.map_of(np.linalg.norm(difference_px, axis=1), np.linalg.norm(across_m, axis=1))
     ratio, most = _over_noise(difference_px[known], change, halves[0].covariance + halves[1].covariance)
-    return HalfDifference(told, ratio, most)
+    return HalfDifference(difference, ratio, most)
 
 
 def _over_noise(difference_px: FloatArray, change: FloatArray, covariance: FloatArray) -> tuple[float, float]:

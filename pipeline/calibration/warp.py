@@ -81,19 +81,19 @@ def board_warp(
         raise InputError("A board's warp takes views of the whole board; leave out those of a part of it")
     flat = held_out(views, size_px, folds, lens)
     calibration, board_m = _released(views, size_px, board, lens)
-    told: dict[int, FittedView] = {}
+    placed: dict[int, FittedView] = {}
     for fold in range(folds):
         rest, rest_board_m = _released(
             [view for row, view in enumerate(views) if row % folds != fold], size_px, board, lens
         )
         for row in range(fold, len(views), folds):
             unseen = replace(views[row], board_m=rest_board_m)
-            told[row] = place(unseen, rest.matrix, rest.distortion, lens)
+            placed[row] = place(unseen, rest.matrix, rest.distortion, lens)
     return BoardWarp(
         board_m,
         _off_plane_m(board_m),
         calibration,
-        tuple(told[row] for row in range(len(views))),
+        tuple(placed[row] for row in range(len(views))),
         rms_px(np.concatenate([view.residuals_px for view in flat])),
     )
 

@@ -142,6 +142,6 @@ def _rebuilt(
 
 def spec_of(sending: Sending, frames: Sequence[RgbdFrame], present: Sequence[int]) -> Spec:
     """Return the spec of the chain for the nodes that have been received."""
-    asked = sending.spec.spec
+    given = sending.spec.spec
     rig = Rig(sending.rig.name, tuple(frames[index] for index in present))
-    return Spec(LoadedRig(rig), asked.preset, asked.config)
+    return Spec(LoadedRig(rig), given.preset, given.config)

@@ -140,9 +140,9 @@ def solved(grid: Grid, start: FloatArray, output: FloatArray) -> FloatArray:
     if grid.known.all():
         return grid.log_z
     rows, columns = grid.known.shape
-    said = output[:, :rows, :columns].astype(np.float64)
-    guess = (start + said[0])[~grid.known]
-    system, force = _balance(grid, guess, said)
+    predicted = output[:, :rows, :columns].astype(np.float64)
+    guess = (start + predicted[0])[~grid.known]
+    system, force = _balance(grid, guess, predicted)
     jacobi = diags(1.0 / system.diagonal())
     filled, _ = cg(system, force, guess, rtol=TOLERANCE, maxiter=STEPS, M=jacobi)
     log_z = grid.log_z.copy()
@@ -150,19 +150,19 @@ def solved(grid: Grid, start: FloatArray, output: FloatArray) -> FloatArray:
     return log_z
 
 
-def _balance(grid: Grid, guess: FloatArray, said: FloatArray) -> tuple[csr_matrix, FloatArray]:
+def _balance(grid: Grid, guess: FloatArray, predicted: FloatArray) -> tuple[csr_matrix, FloatArray]:
     """Build the linear system (N, N) and its right side (N,) for the unknown pixels' depth."""
     rows, columns = grid.known.shape
     count = len(guess)
     place = np.full(grid.known.shape, -1)
     place[~grid.known] = np.arange(count)
-    diagonal = _stiffness(said[1])[~grid.known]
+    diagonal = _stiffness(predicted[1])[~grid.known]
     force = diagonal * guess
     links: csr_matrix = csr_matrix((count, count))
     for number, (near, far) in enumerate(_ends(rows, columns)):
         i, j = place[near].ravel(), place[far].ravel()
-        k = _stiffness(said[3 + 2 * number])[near].ravel()
-        pull = k * said[2 + 2 * number][near].ravel()
+        k = _stiffness(predicted[3 + 2 * number])[near].ravel()
+        pull = k * predicted[2 + 2 * number][near].ravel()
         for here, there, sign, beyond in ((i, j, -1.0, far), (j, i, 1.0, near)):
             free = here >= 0
             diagonal += np.bincount(here[free], k[free], count)

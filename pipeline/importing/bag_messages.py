@@ -150,8 +150,8 @@ def _rvl(data: bytes) -> np.ndarray | None:
 
 def _rows(message: Any, type_: np.dtype, channels: int, topic: str) -> np.ndarray:
     """Return the (H, W * channels) values without the padding of the rows."""
-    wanted = message.width * channels * type_.itemsize
-    if message.step < wanted or len(message.data) < message.step * message.height:
+    needed = message.width * channels * type_.itemsize
+    if message.step < needed or len(message.data) < message.step * message.height:
         raise InputError(f"An image of {topic} is shorter than its size says; try to record again")
     rows = np.asarray(message.data)[: message.step * message.height].reshape(message.height, message.step)
-    return np.ascontiguousarray(rows[:, :wanted]).view(type_)
+    return np.ascontiguousarray(rows[:, :needed]).view(type_)

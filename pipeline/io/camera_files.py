@@ -262,7 +262,7 @@ def listed(values: np.ndarray, between: str = ", ") -> str:
 
 def _refuse(camera: CameraIntrinsics, lens: np.ndarray | bool, what: str, instead: str) -> None:
     if np.any(lens):
-        told = ", ".join(f"{value:.4g}" for value in camera.distortion)
+        values = ", ".join(f"{value:.4g}" for value in camera.distortion)
         names = "a fisheye of k1, k2, k3, k4" if camera.fisheye else "k1, k2, p1, p2, k3"
         names += ", k4 and so on" if len(camera.distortion) > 5 else ""
-        raise InputError(f"{what} cannot hold {names} = {told}; {instead}")
+        raise InputError(f"{what} cannot hold {names} = {values}; {instead}")

@@ -6,7 +6,6 @@ import logging
 from pathlib import PurePath
 
 import numpy as np
-from scipy.stats import ks_2samp
 
 from packetmesh.errors import InputError
 from pipeline.io.cloud_columns import say_columns, table_named, table_of_columns
@@ -132,6 +131,8 @@ def _mixed(rows: FloatArray) -> bool:
     """Return whether columns two apart are alike, as if rows of another width were read."""
     if len(rows) < _LEAST_ROWS:
         return False
+    from scipy.stats import ks_2samp  # takes a second to import
+
     return all(ks_2samp(rows[:, k], rows[:, k + 2], method="asymp").statistic < _MIXED for k in (0, 1))
 
 

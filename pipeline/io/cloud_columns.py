@@ -110,9 +110,9 @@ def say_columns(
         decimal_comma: whether commas are decimal marks in the file.
     """
     parts = ["commas are decimal marks"] if decimal_comma else []
-    for group, said in ((POSITION, "x, y, z are"), (NORMAL, "the normals are"), (COLOR, "the colours are")):
+    for group, phrase in ((POSITION, "x, y, z are"), (NORMAL, "the normals are"), (COLOR, "the colours are")):
         if set(group) <= set(names):
-            parts.append(f"{said} {_places([list(names).index(name) for name in group], titles)}")
+            parts.append(f"{phrase} {_places([list(names).index(name) for name in group], titles)}")
     unused = [k for k, name in enumerate(names) if name == UNUSED]
     if len(unused) > 4:
         parts.append(f"the other {len(unused)} columns are not used")

@@ -33,14 +33,14 @@ def patch_normals(tree: KdTree, neighbours: int, places: IntArray | None = None)
     Returns:
         (M, 3) normals; for all points (N, 3) in the order of the original points.
     """
-    asked = np.arange(len(tree)) if places is None else places
-    normals = np.empty((len(asked), 3))
+    queries = np.arange(len(tree)) if places is None else places
+    normals = np.empty((len(queries), 3))
     count = min(neighbours, len(tree))
 
     def work(first: int, last: int) -> None:
-        _normals(*tree.parts, asked, first, last, count, normals)
+        _normals(*tree.parts, queries, first, last, count, normals)
 
-    in_parts(work, len(asked))
+    in_parts(work, len(queries))
     if places is None:
         normals[tree.order] = normals.copy()
     return normals
@@ -63,13 +63,13 @@ def onto_patches(
     tree = KdTree(points_m)
     place = np.empty(len(tree), np.int64)
     place[tree.order] = np.arange(len(tree))
-    asked = np.sort(place[rows])
+    queries = np.sort(place[rows])
     moved_m, normals = np.empty((len(tree), 3)), np.empty((len(tree), 3))
 
     def work(first: int, last: int) -> None:
-        _move(*tree.parts, tree.order, asked[first:last], neighbours, kernel_share, moved_m, normals)
+        _move(*tree.parts, tree.order, queries[first:last], neighbours, kernel_share, moved_m, normals)
 
-    in_parts(work, len(asked))
+    in_parts(work, len(queries))
     return moved_m[rows], normals[rows]
 
 
@@ -79,7 +79,7 @@ def _normals(
     axes: ByteArray,
     splits: FloatArray,
     levels: int,
-    asked: IntArray,
+    queries: IntArray,
     first: int,
     last: int,
     count: int,
@@ -90,8 +90,8 @@ def _normals(
     near, weights, center, spread = rows[:count], np.ones(count), np.empty(3), np.empty((3, 3))
     farthest = np.inf
     for i in range(first, last):
-        place = points[asked[i]]
-        limit = _reach(points[asked[max(first, i - 1)]], place, farthest)
+        place = points[queries[i]]
+        limit = _reach(points[queries[max(first, i - 1)]], place, farthest)
         farthest = search_many(
             points, axes, splits, levels, place, count, limit, squared, rows, stack, bounds
         )
@@ -106,7 +106,7 @@ def _move(
     splits: FloatArray,
     levels: int,
     order: IntArray,
-    asked: IntArray,
+    queries: IntArray,
     count: int,
     kernel_share: float,
     moved: FloatArray,
@@ -116,7 +116,7 @@ def _move(
     squared, rows = np.empty(room_for(count)), np.zeros(room_for(count), dtype=np.intp)
     near, weights, center, spread = rows[:count], np.empty(count), np.empty(3), np.empty((3, 3))
     farthest, before = np.inf, points[0]
-    for i in asked:
+    for i in queries:
         place, row = points[i], order[i]
         limit = _reach(before, place, farthest)
         farthest = search_many(

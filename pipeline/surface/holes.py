@@ -118,10 +118,10 @@ def half_edges(triangles: IntArray, edges: IntArray) -> IntArray:
     count = int(max(triangles.max(), edges.max(initial=0))) + 1
     start, end = directed_edges(triangles).T
     keys = start * count + end
-    wanted = edges.astype(np.int64) @ [count, 1]
+    edge_keys = edges.astype(np.int64) @ [count, 1]
     order = stable_order(keys)
-    found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(order) - 1)]
-    return np.where(keys[found] == wanted, found, -1)
+    found = order[np.minimum(np.searchsorted(keys, edge_keys, sorter=order), len(order) - 1)]
+    return np.where(keys[found] == edge_keys, found, -1)
 
 
 def is_closed(triangles: IntArray, added: BoolArray, loop: IntArray) -> bool:

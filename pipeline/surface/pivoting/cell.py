@@ -84,11 +84,11 @@ def _set_plane(cell, plane, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def shrink(cell, near, count, radius, wanted):  # type: ignore[no-untyped-def]
+def shrink(cell, near, count, radius, expected):  # type: ignore[no-untyped-def]
     """Cut by the (count, 4) neighbours x, y, z, |x|^2 / 2 until every far corner is final; count these.
 
     Far means at least ``radius``. Each cut is by the neighbour nearest to the farthest corner. It stops
-    when ``wanted`` corners are final, and returns -1 if the arrays are full.
+    when ``expected`` corners are final, and returns -1 if the arrays are full.
     """
     far2 = radius * radius * (1.0 - 1e-9)
     while True:
@@ -99,7 +99,7 @@ def shrink(cell, near, count, radius, wanted):  # type: ignore[no-untyped-def]
                     n_final += 1
                 elif corner < 0 or cell.at[n, 3] > cell.at[corner, 3]:
                     corner = n
-        if corner < 0 or n_final >= wanted:
+        if corner < 0 or n_final >= expected:
             return n_final
         x, y, z = cell.at[corner, 0], cell.at[corner, 1], cell.at[corner, 2]
         depth, row = -TIE * radius * radius, -1

@@ -58,7 +58,7 @@ def student(lecture, teacher):
 
 def test_the_teachers_link_gives_a_cookie_and_leaves_no_token_in_the_address(lecture):
     response = answer(lecture.teacher_url)
-    assert (response.status, response.headers["Location"]) == (303, "/?welcome")
+    assert (response.status, response.headers["Location"]) == (303, "./?welcome")
     assert "HttpOnly" in response.headers["Set-Cookie"]
     assert "SameSite=Lax" in response.headers["Set-Cookie"]
 
