@@ -23,13 +23,13 @@ PASS, FAIL = 0.75, 0.25
 between them its views do not decide (chosen by the sessions of seed 100 of ``python -m lab.verdicts``)."""
 CERTAIN = 0.95
 """Probability from which on a wrong lens model or a bent board is named."""
-OTHER_LENS: dict[Lens, Lens] = {
-    "thesis": "brown",
-    "brown": "rational",
-    "rational": "fisheye",
-    "fisheye": "rational",
+LENS_REMEDY: dict[Lens, str] = {
+    "thesis": "try --lens brown",
+    "brown": "try --lens rational",
+    "rational": "try --lens fisheye if the lens is one, or sharper images",
+    "fisheye": "try --lens rational, or sharper images",
 }
-"""Lens model to try if one is wrong: with more parameters, or of another kind."""
+"""What to try if the residuals have a pattern: a lens model with more parameters, or of another kind."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,10 +126,9 @@ def _advice(
     """Return sentences on what to change: wrong views, the lens model, the board, or more views."""
     advice = []
     if likely.wrong_lens >= CERTAIN:
-        other = OTHER_LENS[calibration.lens]
         advice.append(
-            f"The residuals show a lens that the model '{calibration.lens}' cannot describe: "
-            f"try --lens {other}."
+            f"The residuals have a pattern over the image that the lens model '{calibration.lens}' leaves: "
+            f"{LENS_REMEDY[calibration.lens]}."
         )
     if likely.bent >= CERTAIN:
         remedy = (
@@ -137,7 +136,7 @@ def _advice(
             if calibration.lens == "fisheye"
             else ("glue it onto a flat plate, or try --board-warp (one camera at a time)")
         )
-        advice.append(f"The residuals show a bent board: {remedy}.")
+        advice.append(f"The residuals have the pattern of a bent board: {remedy}.")
     if advice and outliers:  # a wrong view looks like a wrong lens or a bent board
         which = f"{outliers[0]} does" if len(outliers) == 1 else f"{len(outliers)} images do"
         return [f"{which} not fit the others: leave out what is wrong, then judge again."]

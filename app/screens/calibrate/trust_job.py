@@ -99,10 +99,10 @@ def _lines(trust: Trust, lens: Calibration, may_bend: bool) -> Iterator[str]:
     lens_wrong, bent = judged.wrong_lens >= CERTAIN, judged.bent >= CERTAIN
     if (lens_wrong or bent) and not judged.passed:
         if lens_wrong:
-            yield "The residuals show that the lens model does not fit: try another lens under Advanced."
+            yield "The residuals have a pattern that this lens model leaves: try another lens under Advanced."
         if bent:
             allow = ", or allow a bent board under Advanced" if may_bend else ""
-            yield f"The residuals show a bent board: glue it onto a flat plate{allow}."
+            yield f"The residuals have the pattern of a bent board: glue it onto a flat plate{allow}."
     elif following is not None and not judged.passed:
         yield (
             "The next view to take (under Compare) is predicted to reduce the error from "

@@ -69,7 +69,8 @@ def test_a_bent_board_leads_to_a_flat_plate_which_passes():
     judged = verdict(bent, likely_error(bent, 2.0), 0.004)
     assert not judged.passed
     assert (
-        "The residuals show a bent board: glue it onto a flat plate, or try --board-warp" in judged.sentence
+        "The residuals have the pattern of a bent board: glue it onto a flat plate, or try --board-warp"
+        in judged.sentence
     )
     plate = calibrate(bent_views(0, 0.0)[0], SIZE)
     assert verdict(plate, likely_error(plate, 2.0), 0.004).passed
