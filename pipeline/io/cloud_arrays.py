@@ -93,8 +93,8 @@ def _width(path: AnyPath, data: bytes) -> int:
     if not fits:
         raise InputError(
             f"The point cloud {path} has {size} bytes, which are no rows of four or five 4-byte numbers; "
-            "a .bin file is read as a sweep of KITTI or nuScenes: try --columns if it has other columns, or copy it "
-            "again if it was cut off"
+            "a .bin file is read as a sweep of KITTI or nuScenes: try --columns if it has other columns, or "
+            "copy it again if it was cut off"
         )
     named_nuscenes = str(path).lower().endswith(".pcd.bin") or PurePath(path).name.startswith("LIDAR_TOP")
     if named_nuscenes and _NUSCENES in fits:
