@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 
 from pipeline.config import Lens
-from pipeline.types import BoolArray, FloatArray
+from pipeline.kernels.geometry import undistorted_rays
+from pipeline.types import CameraIntrinsics, FloatArray
 
 FLAGS: dict[Lens, int] = {
     "thesis": cv2.CALIB_FIX_K3 | cv2.CALIB_ZERO_TANGENT_DIST,
@@ -25,13 +26,6 @@ FREE: dict[Lens, tuple[str, ...]] = {
     "fisheye": ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"),
 }
 """Parameters that a calibration estimates."""
-WIDEST_DEG = 89.0
-"""Largest angle from the optical axis: points beyond it are not in front of the camera."""
-_MISSED_PX = 0.01
-"""A ray that projects farther than this from its pixel is invalid: the lens model folds there."""
-_PATH = 9
-"""Points between axis and ray at which the lens model is tested for folding."""
-_NEWTON_STEPS, _LONGEST_STEP = 20, 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,45 +71,6 @@ class Optics:
 
     def rays(self, points_px: FloatArray) -> FloatArray:
         """Return (N, 3) unit directions of (N, 2) pixels; NaN where the lens model has none."""
-        flat = self._flat_fisheye(points_px) if self.lens == "fisheye" else self._flat(points_px)
-        rays = np.column_stack([flat, np.ones(len(flat))])
-        known = np.flatnonzero(np.isfinite(flat).all(axis=1))
-        missed_px = np.linalg.norm(self.project(rays[known]) - points_px[known], axis=1)
-        good = known[(missed_px < _MISSED_PX) & self._unfolded(rays[known])]
-        rays[np.setdiff1d(np.arange(len(rays)), good)] = np.nan
+        camera = CameraIntrinsics(self.matrix, self.distortion.ravel(), 0, 0, self.lens == "fisheye")
+        rays = undistorted_rays(camera, points_px)
         return rays / np.linalg.norm(rays, axis=1, keepdims=True)
-
-    def _unfolded(self, rays: FloatArray) -> BoolArray:
-        """Return (N,) True where the projection does not fold between axis and (N, 3) rays with z = 1."""
-        grows = np.ones(len(rays), bool)
-        for share in np.linspace(0.0, 1.0, _PATH):
-            grows &= np.linalg.det(self._slopes(rays * (share, share, 1.0))[1]) > 0.0
-        return grows
-
-    def _slopes(self, rays: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return (N, 2) pixels of (N, 3) rays with z = 1, and their (N, 2, 2) derivatives by x and y."""
-        linear = self.linearised(rays)
-        return linear.points_px, linear.by_pose.reshape(-1, 2, 6)[:, :, 3:5]
-
-    def _flat(self, points_px: FloatArray) -> FloatArray:
-        """Return (N, 2) points of pixels on the plane z = 1, by Newton's method."""
-        flat = (points_px - self.matrix[:2, 2]) / self.matrix[[0, 1], [0, 1]]
-        for _ in range(_NEWTON_STEPS):
-            seen_px, slopes = self._slopes(np.column_stack([flat, np.ones(len(flat))]))
-            slopes[np.abs(np.linalg.det(slopes)) < 1.0] = self.matrix[:2, :2]
-            step = np.linalg.solve(slopes, (points_px - seen_px)[:, :, None])[:, :, 0]
-            flat = flat + np.clip(step, -_LONGEST_STEP, _LONGEST_STEP)
-        return flat
-
-    def _flat_fisheye(self, points_px: FloatArray) -> FloatArray:
-        """Return (N, 2) points of pixels on the plane z = 1, by Newton's method for the angle to the axis."""
-        bent = (points_px - self.matrix[:2, 2]) / self.matrix[[0, 1], [0, 1]]
-        reach = np.linalg.norm(bent, axis=1)
-        odd = np.array([1.0, *self.distortion.ravel()])
-        angle = np.minimum(reach, np.radians(WIDEST_DEG))
-        for _ in range(_NEWTON_STEPS):
-            powers = angle[:, None] ** np.arange(0, 10, 2)
-            slope = powers @ (odd * np.arange(1, 10, 2))
-            angle = angle - (angle * (powers @ odd) - reach) / np.where(slope > 1e-6, slope, np.nan)
-        angle[~((angle >= 0.0) & (angle <= np.radians(WIDEST_DEG)))] = np.nan
-        return bent * np.divide(np.tan(angle), reach, out=np.ones_like(reach), where=reach > 0.0)[:, None]
