@@ -14,10 +14,10 @@ run: $(VENV)/.core  ## the app in the browser, with a scene reconstructed
 	$(BIN)/packetmesh serve --scene $(SCENE) --open $(ARGS)
 
 test: $(VENV)/.dev  ## all tests, in parallel
-	$(BIN)/python -m pytest -n 3 --dist loadgroup $(ARGS)
+	$(BIN)/python -m pytest -n 3 --dist loadgroup --no-loadscope-reorder $(ARGS)
 
 test-fast: $(VENV)/.dev  ## the quick tests, without a browser
-	$(BIN)/python -m pytest -n 3 --dist loadgroup -m "not browser and not slow" $(ARGS)
+	$(BIN)/python -m pytest -n 3 --dist loadgroup --no-loadscope-reorder -m "not browser and not slow" $(ARGS)
 
 mutants: $(VENV)/.dev  ## plant faults one at a time; docs/mutants.md says which no test sees
 	$(BIN)/python -m lab.mutants $(ARGS)

@@ -32,7 +32,8 @@ _HERE = Path(__file__).parent
 SCRIPTS = tuple(
     _HERE / f"{name}.js"
     for name in (
-        *("window/page", "window/hint", "window/dock_row", "dock/dock_view", "dock/dock", "dock/dock_plots"),
+        *("window/page", "window/plotly", "window/hint", "window/dock_row"),
+        *("dock/dock_view", "dock/dock", "dock/dock_plots"),
         *("session/address", "lesson/lesson", "session/lecture", "screens/fuse/board"),
         *("landing", "web/refused"),
     )

@@ -36,6 +36,8 @@ LIBRARIES = (
     "onnxruntime",
     "simpy",
     "small-gicp",
+    "kiss-matcher",
+    "pycolmap",
 )
 """Libraries whose version can change a result; those that are not installed are skipped."""
 

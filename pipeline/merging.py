@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -17,8 +17,10 @@ from pipeline.surface.normals import estimate_normals
 from pipeline.surface.radii import spacing
 from pipeline.surface.smooth import smooth
 from pipeline.surface.voxel import in_cubes_of, voxel_average, voxel_for_count
-from pipeline.types import FloatArray, IntArray, PointCloud, PointSource, RgbdFrame
+from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud, PointSource, RgbdFrame
 
+SIZING_POINTS = 2_000_000
+"""About the most points from which the voxels' size is chosen; of more, every k-th is used."""
 NOISE_VOXELS = 2.0
 """Least voxel edge over the median noise of the averaged points: smaller voxels only reproduce the noise."""
 
@@ -71,18 +73,18 @@ def merge_fused(
         smoothing_passes: how many times every point is moved onto the plane of its neighbours.
     """
     beside = threads("merging", 2)
-    joint = [node.fused for node in nodes]
+    keep: list[BoolArray | None] = [None] * len(nodes)
     if mode == "fill":
-        without_guesses = partial(without_guesses_in_view, frames, nodes, T_world_camera)
-        joint = list(beside.map(without_guesses, range(len(nodes))))
-    parts_m = [part.points_m for part in joint]
-    points_m = np.concatenate(list(beside.map(geometry.apply, T_world_camera, parts_m)))
-    voxel_m = voxel_for_count(points_m, max_points, NOISE_VOXELS * noise_m(nodes))
+        keep = list(
+            beside.map(partial(not_guessed_in_view, frames, nodes, T_world_camera), range(len(nodes)))
+        )
+    joint = partial(_joint, nodes, keep)
+    voxel_m = _voxel_m(nodes, joint(), T_world_camera, max_points)
     if mode != "fill":
-        fused = merge(joint, T_world_camera, voxel_m, smoothing_passes)
+        fused = merge(joint(), T_world_camera, voxel_m, smoothing_passes)
         return FusedCloud(fused, voxel_m, *spacing(fused.points_m), None)
-    own = beside.submit(thinned, [node.sensor for node in nodes], T_world_camera, voxel_m)
-    whole = thinned(joint, T_world_camera, voxel_m)
+    own = beside.submit(thinned, (node.sensor for node in nodes), T_world_camera, voxel_m)
+    whole = thinned(joint(), T_world_camera, voxel_m)
     sensors = own.result()
     smoothed = beside.submit(smooth, sensors, smoothing_passes)
     guesses = smooth(whole, smoothing_passes, guessed_alone(sensors, whole, voxel_m))
@@ -92,9 +94,27 @@ def merge_fused(
     return FusedCloud(fused, voxel_m, *spacing(fused.points_m), len(measured))
 
 
-def noise_m(nodes: Sequence[NodeClouds]) -> float:
-    """Return the median standard deviation of the measured points along their rays."""
-    return float(np.median(np.concatenate([node.sensor.sigma_m for node in nodes])))
+def _joint(nodes: Sequence[NodeClouds], keep: Sequence[BoolArray | None]) -> Iterator[PointCloud]:
+    """Yield the kept rows of every node's fused cloud, without pixels; one whole cloud exists at a time."""
+    for node, rows in zip(nodes, keep, strict=True):
+        cloud = replace(node.fused, pixels=None)
+        yield cloud if rows is None else cloud.select(rows)
+
+
+def _voxel_m(
+    nodes: Sequence[NodeClouds],
+    joint: Iterable[PointCloud],
+    T_world_camera: Sequence[FloatArray],
+    max_points: int,
+) -> float:
+    """Return the voxel edge that leaves about ``max_points``, but no less than the noise allows."""
+    every = max(1, -(-sum(node.frame.depth.z_m.size for node in nodes) // SIZING_POINTS))
+    parts_m, sigmas_m = [], []
+    for node, cloud, pose in zip(nodes, joint, T_world_camera, strict=True):
+        parts_m.append(geometry.apply(pose, cloud.points_m[::every]))
+        sigmas_m.append(np.asarray(node.sensor.sigma_m)[::every])
+    noise_m = float(np.median(np.concatenate(sigmas_m)))
+    return voxel_for_count(np.concatenate(parts_m), max_points, NOISE_VOXELS * noise_m)
 
 
 def guessed_alone(sensors: PointCloud, whole: PointCloud, voxel_m: float) -> IntArray:
@@ -113,13 +133,13 @@ def guessed_alone(sensors: PointCloud, whole: PointCloud, voxel_m: float) -> Int
 
 
 def merge(
-    clouds: Sequence[PointCloud], T_world_camera: Sequence[FloatArray], voxel_m: float, smoothing_passes: int
+    clouds: Iterable[PointCloud], T_world_camera: Sequence[FloatArray], voxel_m: float, smoothing_passes: int
 ) -> PointCloud:
     """Merge clouds from their nodes' frames into one in the world frame: averaged, with normals, smoothed."""
     return smooth(thinned(clouds, T_world_camera, voxel_m), smoothing_passes)
 
 
-def thinned(clouds: Sequence[PointCloud], T_world_camera: Sequence[FloatArray], voxel_m: float) -> PointCloud:
+def thinned(clouds: Iterable[PointCloud], T_world_camera: Sequence[FloatArray], voxel_m: float) -> PointCloud:
     """Merge like ``merge``, without smoothing."""
     thin = [
         replace(estimate_normals(voxel_average(cloud, voxel_m), np.zeros(3)), pixels=None) for cloud in clouds
@@ -128,24 +148,25 @@ def thinned(clouds: Sequence[PointCloud], T_world_camera: Sequence[FloatArray], 
     return placed[0] if len(placed) == 1 else voxel_average(PointCloud.concatenate(placed), voxel_m)
 
 
-def without_guesses_in_view(
+def not_guessed_in_view(
     frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds], T_world_camera: Sequence[FloatArray], index: int
-) -> PointCloud:
-    """Return one node's fused cloud, in its own frame, without inferred points that another sensor can judge,
-    and without pixels.
+) -> BoolArray:
+    """Return (N,) False for the inferred points of one node's fused cloud that another sensor can judge.
 
     Another node may have measured what one node had to infer: an inferred point is kept only if it is
     hidden from every other node's sensor.
     """
     cloud = nodes[index].fused
     keep = np.ones(len(cloud), dtype=bool)
-    inferred = np.flatnonzero(cloud.source == PointSource.INFERRED)
-    guesses = PointCloud(cloud.points_m.take(inferred, axis=0))
+    left = np.flatnonzero(cloud.source == PointSource.INFERRED)
     for other, frame in enumerate(frames):
-        if other != index:
+        if other != index and len(left):
             T_other_node = geometry.inverse(T_world_camera[other]) @ T_world_camera[index]
-            keep[inferred] &= hidden_from(guesses, T_other_node, frame.intrinsics, frame.depth)
-    return replace(cloud, pixels=None).select(keep)
+            guesses = PointCloud(cloud.points_m.take(left, axis=0))
+            hidden = hidden_from(guesses, T_other_node, frame.intrinsics, frame.depth)
+            keep[left[~hidden]] = False
+            left = left[hidden]
+    return keep
 
 
 def _placed(clouds: Sequence[PointCloud], T_world_camera: Sequence[FloatArray]) -> list[PointCloud]:

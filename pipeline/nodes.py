@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from threading import Lock
+from typing import Any, TypeVar
+from weakref import finalize
 
 import numpy as np
 
@@ -15,6 +21,9 @@ from pipeline.kernels.straight_view import bends_strongly, bent_depth, straight_
 from pipeline.registration import fuse, register
 from pipeline.types import DepthMap, PointCloud, PointSource, RegistrationResult, RgbdFrame
 
+Cloud = TypeVar("Cloud", FilterResult, PointCloud)
+KEPT_NODES = 6
+"""Nodes whose whole clouds are kept after use."""
 COLOR_REACH_PX = 8
 """Largest distance from a pixel that has arrived at which a filled-in colour is used."""
 
@@ -31,13 +40,18 @@ class InferredDepth:
     elapsed_s: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class NodeClouds:
-    """Clouds and depth from one node's images, in its own camera frame."""
+    """Clouds and depth from one node's images, in its own camera frame.
 
-    name: str
-    sensor: PointCloud
-    filtered: FilterResult
+    Whole clouds are computed at first use and kept for the nodes used last (``KEPT_NODES``): those of a rig
+    of many nodes would take 30 MB each.
+    """
+
+    frame: RgbdFrame
+    """The node's images."""
+    acquired: Acquired
+    """Its measured depth, with the outliers marked."""
     network: InferredDepth
     alignment: AlignmentResult
     judged: JudgedDepth
@@ -45,7 +59,59 @@ class NodeClouds:
     inferred: PointCloud
     """Points of the accepted depth; in ``union`` mode of all inferred depth, as in the thesis."""
     inferred_registration: RegistrationResult | None
-    fused: PointCloud
+    mode: FusionMode
+    """How ``fused`` joins the measured and the inferred points."""
+
+    @property
+    def name(self) -> str:
+        """The node's name."""
+        return self.frame.name
+
+    @property
+    def filtered(self) -> FilterResult:
+        """The measured points, split into those that are kept and outliers."""
+        return _kept.get(self, "filtered", lambda: self.acquired.cloud(self.frame))
+
+    @property
+    def sensor(self) -> PointCloud:
+        """The measured points without outliers."""
+        return self.filtered.kept
+
+    @property
+    def fused(self) -> PointCloud:
+        """The measured and the inferred points."""
+        return _kept.get(self, "fused", self._fuse)
+
+    def _fuse(self) -> PointCloud:
+        if not len(self.inferred):
+            return self.sensor
+        return fuse(self.sensor, self.inferred, self.mode, self.frame.depth.valid)
+
+
+class _KeptClouds:
+    """Whole clouds of the nodes used last, as long as the nodes exist."""
+
+    def __init__(self) -> None:
+        self._of: OrderedDict[int, dict[str, Any]] = OrderedDict()
+        self._lock = Lock()
+
+    def get(self, node: NodeClouds, name: str, compute: Callable[[], Cloud]) -> Cloud:
+        """Return a node's cloud; two threads may both compute it, and one of the results is kept."""
+        with self._lock:
+            if id(node) not in self._of:
+                self._of[id(node)] = {}
+                finalize(node, self._of.pop, id(node), None)
+            mine = self._of[id(node)]
+            self._of.move_to_end(id(node))
+            while len(self._of) > KEPT_NODES:
+                self._of.popitem(last=False)
+        if name not in mine:
+            mine[name] = compute()
+        cloud: Cloud = mine[name]
+        return cloud
+
+
+_kept = _KeptClouds()
 
 
 def infer_depth(network: DepthNetwork, frame: RgbdFrame, crop: bool = False) -> InferredDepth:
@@ -87,45 +153,20 @@ def prepare_node(
         registration: moves the inferred cloud rigidly onto the sensor cloud, as the thesis does; None
             does not move it.
     """
-    filtered = acquired.cloud(frame)
-    sensor = filtered.kept
     guide = _guide(frame)
     alignment = _aligned(inferred, guide, depth)
     completed = complete(guide, frame.rgb) if _completes(guide, inferred, depth) else None
     judged = judge(alignment, frame.depth, frame.rgb, depth.reach, depth.least_confidence, completed)
     believed = _guesses(frame, judged.depth if mode == "fill" else alignment.depth)
+    node = partial(NodeClouds, frame, acquired, inferred, alignment, judged)
     if not believed.valid.any():
-        return _measured_only(frame, sensor, filtered, inferred, alignment, judged)
+        return node(acquired.cloud(frame).kept.select(np.empty(0, np.intp)), None, mode)
     cloud = back_project(frame, believed, PointSource.INFERRED)
     result = None
     if registration is not None:
-        result = register(cloud, sensor, registration)
+        result = register(cloud, acquired.cloud(frame).kept, registration)
         cloud = cloud.transformed(result.T_target_source)
-    return NodeClouds(
-        name=frame.name,
-        sensor=sensor,
-        filtered=filtered,
-        network=inferred,
-        alignment=alignment,
-        judged=judged,
-        inferred=cloud,
-        inferred_registration=result,
-        fused=fuse(sensor, cloud, mode, frame.depth.valid),
-    )
-
-
-def _measured_only(
-    frame: RgbdFrame,
-    sensor: PointCloud,
-    filtered: FilterResult,
-    inferred: InferredDepth,
-    alignment: AlignmentResult,
-    judged: JudgedDepth,
-) -> NodeClouds:
-    """Return the clouds of a node without inferred points."""
-    labelled = replace(sensor, source=np.full(len(sensor), PointSource.SENSOR, np.uint8))
-    nothing = labelled.select(np.zeros(len(sensor), bool))
-    return NodeClouds(frame.name, sensor, filtered, inferred, alignment, judged, nothing, None, labelled)
+    return node(cloud, result, mode)
 
 
 def _guide(frame: RgbdFrame) -> DepthMap:

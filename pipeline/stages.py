@@ -225,7 +225,7 @@ def both_clouds(
     """Return the fused cloud and, thinned in the same way, the measured points alone."""
     yield Progress("merging the sensors' clouds", 0.75)
     if fused.measured is None:
-        own = [node.sensor for node in placement.placed(nodes)]
+        own = (node.sensor for node in placement.placed(nodes))
         poses = placement.placed(placement.T_world_camera)
         sensor = merge(own, poses, fused.voxel_m, smoothing_passes)
     else:

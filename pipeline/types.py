@@ -148,13 +148,13 @@ class RigTruth:
     """True camera of every node."""
 
 
-MAX_NODES = 6
+MAX_NODES = 200
 """Largest number of nodes in a rig."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rig:
-    """One to six camera nodes that look at the same place; a single RGB-D pair is a rig of one."""
+    """One to ``MAX_NODES`` camera nodes that look at the same place; a single RGB-D pair is a rig of one."""
 
     name: str
     frames: tuple[RgbdFrame, ...]

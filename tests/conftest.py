@@ -1,10 +1,12 @@
 """What every test may use."""
 
+import gc
 import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # more only spin when tests run side by side
 
 from fnmatch import fnmatch
+from functools import cache
 from pathlib import Path
 
 import hypothesis
@@ -33,15 +35,46 @@ SLOW = (
     ),
 )
 """Files below ``tests`` that ``make test-fast`` leaves out: several seconds each."""
+APART = ("test_table.py", "test_fuzz.py")
+"""Slow files of many tests that share little."""
 LONGEST_ID = 60
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Look for garbage neither while thousands of lasting tests are made, nor later among them."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
+
+
+@pytest.hookimpl(tryfirst=True)  # pytest-xdist looks at the groups afterwards
 def pytest_collection_modifyitems(items):
-    """Mark slow tests."""
+    """Mark slow tests and begin with them, so that no worker is left with one in the end; those of a file
+    stay on one worker, which makes once what they share, as do those that use the store.
+    """
     for item in items:
-        path = item.path.relative_to(ROOT / "tests").as_posix()
-        if any(path.startswith(f"{one}/") or fnmatch(path, one) for one in SLOW):
+        slow = _slow(item.path)
+        if slow:
             item.add_marker(pytest.mark.slow)
+        shares = (slow and item.path.name not in APART) or "store" in item.fixturenames
+        if shares and item.get_closest_marker("xdist_group") is None:
+            item.add_marker(pytest.mark.xdist_group(_below(item.path)))
+    items.sort(key=lambda item: not (_slow(item.path) or _below(item.path).startswith("browser/")))
+
+
+@cache
+def _slow(path):
+    below = _below(path)
+    return any(below.startswith(f"{one}/") or fnmatch(below, one) for one in SLOW)
+
+
+@cache
+def _below(path):
+    return path.relative_to(ROOT / "tests").as_posix()
 
 
 def pytest_make_parametrize_id(val):
@@ -51,6 +84,20 @@ def pytest_make_parametrize_id(val):
     if isinstance(val, bytes | str) and len(val) > LONGEST_ID:
         return f"{val[:20]!a} and so on"
     return None
+
+
+@pytest.fixture(scope="session")
+def store(tmp_path_factory):
+    """A store that all tests share, so that what one has computed is there for the others: of all workers,
+    whose temporary folders lie beside each other.
+    """
+    from app.compute.store import Store
+
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
+    (folder / "store").mkdir(exist_ok=True)
+    return Store(str(folder / "store"))
 
 
 @pytest.fixture(scope="session")

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
 from app.cli.text import answers_table, print_json, say, wrong_use
 from packetmesh.errors import InputError
 
-if TYPE_CHECKING:
-    from pipeline.pairs.register import Answer
+EXIT_CODES = {"sure": 0, "doubtful": 3, "none": 4}
+"""Exit codes of the verdicts; the files are written in any case."""
 
 
 def register(
@@ -32,6 +31,8 @@ def register(
     json: bool = False,
 ) -> None:
     """Register one point cloud with another, in any format that `packetmesh mesh` reads, in metres.
+
+    The last line says whether the pose is sure, doubtful or none, and why; the exit code is 0, 3 or 4.
 
     Args:
         source: Cloud that moves.
@@ -58,8 +59,7 @@ def register(
     from pipeline.folders.pair import answer_metrics, chosen_answer, write_register_folder
     from pipeline.io.poses import read_pose
     from pipeline.pairs.clouds import read_pair
-    from pipeline.pairs.draws import run_draws, with_gate
-    from pipeline.pairs.fit import fit_doubt
+    from pipeline.pairs.found import find_place, judged, moved_away, settled_answer
     from pipeline.pairs.register import chosen_methods, config_for, prepared_pair, run_methods
     from pipeline.registration.methods import METHODS
 
@@ -71,13 +71,14 @@ def register(
     T_init, T_true = (None if path is None else read_pose(path) for path in (init, truth))
     moving, fixed = read_pair(source, target, columns, metres_per_unit)
     pair = prepared_pair(moving, fixed, config, voxel_m, T_init, T_true, metres_per_unit is not None)
+    place = find_place(pair, config, gate_m)
+    config = place.config
     if gate_m is None:
-        config = with_gate(pair, config)
         say(f"Gate chosen from the data: {config.gate_m:.3g} m")
-    answers = []
     alone = len(methods) == 1 and methods[0] in METHODS
-    for answer in run_draws(methods[0], pair, config) if alone else run_methods(methods, pair, config):
-        answers.append(answer)
+    answers = []
+    for answer in [settled_answer(methods[0], place)] if alone else run_methods(methods, place.pair, config):
+        answers.append(answer if alone else judged(answer, place))
         say(f"{answer.method}: {answer.stop_reason}")
     chosen = chosen_answer(answers)  # raises without a pose, before a folder is made
     writable_folder(out)
@@ -92,19 +93,10 @@ def register(
         print_json(metrics)
     else:
         print(answers_table(metrics))
-    doubt = fit_doubt(pair, chosen, config)
-    if doubt is not None:
-        say(doubt)
-    if alone and not answers[0].agreed:
-        say(_disagreement_warning(answers[0]))
-
-
-def _disagreement_warning(answer: Answer) -> str:
-    """Return a warning that random draws of the points disagree, with advice."""
-    ends = f"give poses up to {100.0 * answer.spread_m:.1f} cm from this one, more than 0.5 cm"
-    if not math.isfinite(answer.spread_m):
-        ends = "did not all give a pose"
-    return (
-        f"{answer.draws} random draws of the points {ends}, so the pose is uncertain; try --init with a "
-        "closer start pose, --start global or another --gate-m"
-    )
+    assert chosen.T_target_source is not None
+    assert chosen.verdict is not None
+    if T_init is not None and (away := moved_away(pair, T_init, chosen.T_target_source)):
+        say(away)
+    say(f"The pose is {chosen.verdict.text}")
+    if not chosen.verdict.sure:
+        raise SystemExit(EXIT_CODES[chosen.verdict.word])

@@ -7,6 +7,7 @@ import math
 import plotly.graph_objects as go
 
 from app.drawing.colors import NEUTRAL, css
+from app.drawing.plots import styled_figure
 from pipeline.types import FloatArray, IntArray
 
 
@@ -40,9 +41,7 @@ def mark(
 
 def bar_figure(x_title: str, y_title: str) -> go.Figure:
     """Return an empty histogram."""
-    figure = go.Figure()
-    figure.update_layout(
-        template="plotly_white",
+    return styled_figure(
         margin={"l": 62, "r": 10, "t": 24, "b": 34},
         xaxis={"title": x_title},
         yaxis={"title": y_title, "nticks": 4},
@@ -50,7 +49,6 @@ def bar_figure(x_title: str, y_title: str) -> go.Figure:
         bargap=0,
         font={"size": 11},
     )
-    return figure
 
 
 def add_bars(figure: go.Figure, edges: FloatArray, counts: IntArray, unit: str, what: str) -> None:

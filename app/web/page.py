@@ -86,18 +86,15 @@ class Page:
         self._viser = _viser_page()
         self.script_hashes = tuple(map(_hash, _viser_scripts(self._viser)))
         """Hashes of viser's two scripts, the one in the page and the one that it unpacks, for the policy."""
-        files = (
-            _file("packetmesh", "js", scripts),
-            _file("plotly", "js", [Path(plotly.__file__).parent / "package_data" / "plotly.min.js"]),
-            _file("packetmesh", "css", styles),
-        )
-        *scripted, style = files
-        head = Markup('<link rel="stylesheet" href="{}">').format(_relative(style))
-        head += Markup("").join(
-            Markup('<script defer src="{}"></script>').format(_relative(one)) for one in scripted
-        )
+        plots = Path(plotly.__file__).parent / "package_data" / "plotly.min.js"
+        script, plotted = _file("packetmesh", "js", scripts), _file("plotly", "js", [plots])
+        style = _file("packetmesh", "css", styles)
+        head = Markup(
+            '<link rel="stylesheet" href="{}"><script defer src="{}"></script>'
+            '<meta name="packetmesh-plotly" content="{}">'
+        ).format(*map(_relative, (style, script, plotted)))
         usual = self._page(head, Markup(""))
-        self._files = {one.path: one for one in files} | {"/": usual, "/index.html": usual}
+        self._files = {one.path: one for one in (script, plotted, style)} | {"/": usual, "/index.html": usual}
         self._greetings = {place: self._page(head, greeting) for place, greeting in greetings.items()}
 
     def served(self) -> AbstractContextManager[None]:

@@ -155,7 +155,7 @@
   // viser forgets which folders were open when another screen is shown; the page remembers it in this tab.
   const REMEMBERED = "packetmesh-folders";
   const HEADS = "svg[class*=tabler-icon-chevron-]";
-  const folders = JSON.parse(sessionStorage.getItem(REMEMBERED) ?? "{}"); // open or not, by screen, title and the title's count
+  const folders = () => JSON.parse(sessionStorage.getItem(REMEMBERED) ?? "{}"); // open or not, by screen, title and the title's count
 
   function heads() {
     const screen = document.querySelector("[data-packetmesh-screen]")?.dataset.packetmeshScreen;
@@ -171,14 +171,14 @@
   document.addEventListener("click", event => {
     const clicked = heads().find(one => one.head.contains(event.target));
     if (!clicked) return;
-    folders[clicked.key] = !clicked.open;
-    sessionStorage.setItem(REMEMBERED, JSON.stringify(folders));
+    sessionStorage.setItem(REMEMBERED, JSON.stringify({...folders(), [clicked.key]: !clicked.open}));
   }, true);
 
   // A screen is shown: open and close its folders as they were left.
   calls.shown = () => {
+    const left = folders();
     for (const {head, key, open} of heads())
-      if (folders[key] !== undefined && folders[key] !== open) head.click();
+      if (left[key] !== undefined && left[key] !== open) head.click();
   };
 
   // Open folders and tabs by their titles; retry for a second or two those that are not there yet.

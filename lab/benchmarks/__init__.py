@@ -11,9 +11,9 @@ from lab.benchmarks.benchmark import Benchmark, run_alone
 from packetmesh.errors import InputError
 
 
-def _measure(module: str, **options: Any) -> Benchmark:
-    """Call ``benchmark`` of a module of this package, imported here: other cases' imports would count."""
-    result: Benchmark = import_module(f"lab.benchmarks.{module}").benchmark(**options)
+def _measure(module: str, function: str = "benchmark", **options: Any) -> Benchmark:
+    """Call a function of a module of this package, imported here: other cases' imports would count."""
+    result: Benchmark = getattr(import_module(f"lab.benchmarks.{module}"), function)(**options)
     return result
 
 
@@ -26,6 +26,9 @@ CASES: dict[str, Callable[[], Benchmark]] = {
         _measure, "registration", points=100_000, drawn="ours"
     ),
     "registration: all programs draw them": partial(_measure, "registration", points=100_000, drawn="both"),
+    "places: by overlap": partial(_measure, "places"),
+    "places: any overlap": partial(_measure, "places", "verdicts"),
+    "places: lists of bare clouds": partial(_measure, "place_lists"),
     "surface": partial(_measure, "surface"),
     "depth": partial(_measure, "depth"),
     "network": partial(_measure, "network"),

@@ -21,9 +21,8 @@ from packetmesh.progress import Progress
 from pipeline.config import RegistrationConfig
 from pipeline.io.clouds import read_cloud, write_cloud
 from pipeline.kernels.geometry import apply
-from pipeline.pairs.draws import with_gate
-from pipeline.pairs.register import Pair, prepared_pair
-from pipeline.registration import register
+from pipeline.pairs.found import find_place, settled_answer
+from pipeline.pairs.register import DEFAULT_METHOD, Pair, prepared_pair
 from pipeline.registration.peers import available_peers, run_peer
 from pipeline.types import FloatArray, PointCloud
 
@@ -119,9 +118,9 @@ def iterate_problems(
 
 
 def solve(problem: Problem) -> list[dict[str, Any]]:
-    """Solve one problem by every method, from the same start with the same gate.
+    """Solve one problem by every method from the same start.
 
-    The gate is the one that `packetmesh register` finds from the data; its search counts in our time only.
+    The peers' gate is the one with which `packetmesh register` arrives; its search counts in our time only.
     """
     source, target = read_cloud(problem.source), read_cloud(problem.target)
     moved = source.transformed(problem.T_moved)
@@ -130,20 +129,22 @@ def solve(problem: Problem) -> list[dict[str, Any]]:
     started = time.perf_counter()
     try:
         pair = prepared_pair(moved, target, RegistrationConfig(seed=0), units_known=True)
-        config = with_gate(pair, RegistrationConfig(seed=0))
-        result = register(pair.source, pair.target, config, pair.T_init)
+        place = find_place(pair, RegistrationConfig(seed=0), None)
+        ours = settled_answer(DEFAULT_METHOD, place)
     except PacketMeshError as error:
         return [known | {"method": OURS, "error": None, "elapsed_s": None, "reason": str(error)}]
-    elapsed_s = time.perf_counter() - started
-    answers = [(OURS, result.T_target_source, elapsed_s, result.stop_reason)]
+    elapsed_s, gate_m = time.perf_counter() - started, place.config.gate_m
+    answers = (
+        [] if ours.T_target_source is None else [(OURS, ours.T_target_source, elapsed_s, ours.stop_reason)]
+    )
     for name in (name for name in PEERS if name in available_peers()):
-        peer = run_peer(name, pair.source, pair.target, config.gate_m, pair.T_init)
+        peer = run_peer(name, pair.source, pair.target, gate_m, pair.T_init)
         answers.append((name, peer.T_target_source, peer.elapsed_s, peer.stop_reason))
     return [
         known
         | {
             "method": name,
-            "gate_m": config.gate_m,
+            "gate_m": gate_m,
             "error": scaled_displacement(T @ problem.T_moved, source.points_m),
             "elapsed_s": seconds,
             "reason": reason,

@@ -38,14 +38,15 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "bench_surface": ("packetmesh", "bench", "--only", "surface"),
     "bench_registration": ("packetmesh", "bench", "--only", "registration"),
     "bench_problems": ("packetmesh", "bench", "--problems", "runs/problems"),
+    "bench_places": ("packetmesh", "bench", "--only", "places"),
     "bench_depth": ("packetmesh", "bench", "--only", "depth"),
     "bench_network": ("packetmesh", "bench", "--only", "network"),
     "real_frames": ("python", "-m", "lab.benchmarks.real_frames"),
     "calibration_verdicts": ("python", "-m", "lab.verdicts", "--seed", "2026", "--sessions", "400"),
     "ns3_saturation": ("python", "tests/benchmarks/ns3_saturation.py"),
 }
-"""Command of each record; ``bench_problems`` needs lists in runs/problems, written there by ``python -m
-lab.benchmarks.problem_lists runs/problems --lidar DATA``, and the last one needs ns-3."""
+"""Command of each record; ``bench_problems`` and ``bench_places`` need lists in runs/problems, written there
+by ``python -m lab.benchmarks.problem_lists runs/problems --lidar DATA``, and the last one needs ns-3."""
 RECONSTRUCT = "reconstruct"
 RECORDS = (RECONSTRUCT, *COMMANDS)
 PROGRAMS = {"packetmesh": (sys.executable, "-m", "app.cli"), "python": (sys.executable,)}

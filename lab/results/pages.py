@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from lab.benchmarks.filling import FLAT, OURS
 from lab.claims.claim import VERDICTS, is_beyond
 from lab.claims.registry import CLAIMS
-from lab.results import completion, tables, verdicts
+from lab.results import completion, places, tables, verdicts
 from lab.results.markdown import Row, listed
 from lab.results.record import ROOT, Record, Records, read_records
 from packetmesh.files import atomic_path
@@ -20,6 +20,9 @@ WORTH = ROOT / "assets" / "depth" / "worth.md"
 """The text on filling in the Depth screen."""
 BEGIN, END = "<!-- results: written by `make results` -->", "<!-- end of results -->"
 """Marks around the results in a page."""
+
+PLACES = "bench_places"
+"""Record with pictures, which are written next to the page."""
 
 SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "reconstruct": ("What comes out", tables.reconstructions),
@@ -35,6 +38,7 @@ SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "registration_claims": ("Registration: the thesis's claims", tables.registration_claims),
     "bench_registration": ("Registration: speed", tables.registration_speed),
     "bench_problems": ("Registration: problems in the form of a public benchmark", tables.problems),
+    PLACES: ("Registration: views placed without a start", places.places),
     "surface_claims": ("Ball pivoting: the thesis's claims", tables.claims),
     "bench_surface": ("Ball pivoting: speed", tables.rolling_speed),
     "network_claims": ("The camera network: the thesis's claims", tables.claims),
@@ -62,6 +66,10 @@ def write_pages() -> None:
         DEPTH_README: marked(DEPTH_README.read_text("utf-8"), worth(records)),
         WORTH: f"{worth(records)}\n",
     }
+    if PLACES in records:
+        pages |= {
+            RESULTS.parent / name: text for name, text in places.pictures(records[PLACES].numbers).items()
+        }
     for path, content in pages.items():
         with atomic_path(path) as temporary:
             temporary.write_text(content, "utf-8")

@@ -29,15 +29,31 @@ def answer_metrics(answers: Iterable[Answer], with_truth: bool) -> dict[str, dic
     if with_truth:
         names.append("point_error_m")
     return {
-        answer.method: {name: getattr(answer, name) for name in names} | _draws(answer) for answer in answers
+        answer.method: {name: getattr(answer, name) for name in names} | _draws(answer) | _verdict(answer)
+        for answer in answers
+    }
+
+
+def _verdict(answer: Answer) -> dict[str, Any]:
+    """Return the verdict on the pose with the evidence, if it was judged."""
+    if answer.verdict is None or answer.evidence is None:
+        return {}
+    evidence = answer.evidence
+    return {
+        "verdict": answer.verdict.word,
+        "verdict_reasons": list(answer.verdict.reasons),
+        "start": answer.way,
+        "overlap_share": evidence.overlap_share,
+        "on_surface_share": evidence.on_share,
+        "seen_through_share": evidence.through_share,
+        "height_over_noise": evidence.height_ratio,
+        "stiffness": evidence.stiffness,
     }
 
 
 def _draws(answer: Answer) -> dict[str, Any]:
-    """Return how well the random draws of points agree, if there were several."""
-    if answer.draws == 1:
-        return {}
-    return {"draws": answer.draws, "spread_m": answer.spread_m, "draws_agree": answer.agreed}
+    """Return how far apart the random draws of points end, if there were several."""
+    return {} if answer.draws == 1 else {"draws": answer.draws, "spread_m": answer.spread_m}
 
 
 def chosen_answer(answers: Sequence[Answer]) -> Answer:

@@ -75,7 +75,7 @@ def iterate_import(
     Args:
         path: the recording's folder, or a folder with only this recording.
         out: the rig's folder, new or empty.
-        frames: number of nodes, 1 to 6; there are fewer nodes if fewer frames overlap.
+        frames: number of nodes, 1 to ``MAX_NODES``; there are fewer nodes if fewer frames overlap.
         depth_scale: depth units per metre; by default that of the kind of recording.
         intrinsics: intrinsics file of the colour camera; by default the recording's, or those of its kind.
 

@@ -151,8 +151,8 @@ def load_rig(directory: AnyPath, calibration: AnyPath | None = None, depth_scale
         depth_scale: depth units per metre of every node, as for ``load_frame``.
 
     Raises:
-        InputError: the folder is missing, has no node or more than six, a node's file cannot be used, or the
-            calibration is for another rig.
+        InputError: the folder is missing, has no node or more than ``MAX_NODES``, a node's file cannot be
+            used, or the calibration is for another rig.
 
     >>> import packetmesh as pm
     >>> pm.save_rig("office", pm.load_demo("office"))

@@ -16,7 +16,9 @@ from pipeline.kernels.geometry import apply
 from pipeline.kernels.point_sets import distinct_rows, middle_extent_m
 from pipeline.pairs.units import check_units
 from pipeline.registration import average_hausdorff_m, point_error_m, register_timed
-from pipeline.registration.global_start import default_voxel_m, global_start
+from pipeline.registration.finding.evidence import Evidence
+from pipeline.registration.finding.search import Way
+from pipeline.registration.finding.verdict import Verdict
 from pipeline.registration.methods import METHODS
 from pipeline.registration.neighbourhood import pca_normals
 from pipeline.registration.observability import open_motions
@@ -38,8 +40,6 @@ _MOST_EXTENTS = 1e4
 EVALUATED_POINTS = 20_000
 """Both clouds are thinned to about this many points before their distance is measured."""
 SHAPE_POINTS = 3000
-AGREEMENT_M = 0.005
-"""Draws of the points agree if their answers differ by less than this point error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,11 +67,12 @@ class Answer:
     """Number of draws of the points that were registered; this is the answer of one of them."""
     spread_m: float = float("nan")
     """Largest point error between this and another draw's answer; infinite if one failed, NaN of one draw."""
-
-    @property
-    def agreed(self) -> bool:
-        """Whether all draws of the points lead to the same pose."""
-        return self.spread_m <= AGREEMENT_M
+    verdict: Verdict | None = None
+    """Whether to believe the pose; None of answers that were not judged."""
+    evidence: Evidence | None = None
+    """What the clouds say of the pose."""
+    way: Way | None = None
+    """Where the start pose came from."""
 
     @property
     def failed(self) -> bool:
@@ -115,8 +116,8 @@ def config_for(
     """Return the settings of a comparison.
 
     A scale needs the point metric and pairs in both directions: with one direction, source points come nearer
-    to their nearest partners by shrinking. Without ``gate_m`` the default is set, until ``with_gate`` chooses
-    one from the data.
+    to their nearest partners by shrinking. Without ``gate_m`` the default is set, until a search finds one
+    that suits the data.
 
     Raises:
         InputError: the settings contradict each other.
@@ -183,7 +184,7 @@ def prepared_pair(
     T_true: FloatArray | None = None,
     units_known: bool = False,
 ) -> Pair:
-    """Check and thin two clouds and determine the start pose.
+    """Check and thin two clouds.
 
     Args:
         source: the cloud that moves.
@@ -196,15 +197,13 @@ def prepared_pair(
 
     Raises:
         InputError: points cannot be used, or the clouds have different units.
-        ReconstructionError: the target's shape leaves a motion open, or no global start was found.
+        ReconstructionError: the target's shape leaves a motion open.
     """
     check_units(source, target, units_known, config.with_scale)
     source, target = (
         prepared_cloud(cloud, name, voxel_m) for cloud, name in ((source, "source"), (target, "target"))
     )
     _check_shape(target, config.seed)
-    if config.start == "global":
-        T_init = global_start(source, target, voxel_m or default_voxel_m(target), config.seed)
     return Pair(source, target, np.eye(4) if T_init is None else T_init, T_true)
 
 

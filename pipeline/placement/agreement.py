@@ -54,12 +54,12 @@ def agreement(
     seen. So a pose that puts one place onto another is detected even if nearest points fit.
 
     Args:
-        cloud: measured points in any frame; at most ``ASKED_POINTS``, evenly selected, are compared.
+        cloud: measured points in any frame, of which those of ``asked`` are compared.
         T_camera_cloud: (4, 4) from that frame to the other camera's.
         intrinsics: the other camera.
         depth: the other camera's measured depth.
     """
-    asked_m = cloud.points_m[:: max(1, -(-len(cloud) // ASKED_POINTS))]
+    asked_m = asked(cloud).points_m
     points_m = apply(T_camera_cloud, asked_m)
     points_m = points_m[points_m[:, 2] > 1e-6]
     pixels = np.rint(project(intrinsics, points_m))
@@ -68,3 +68,8 @@ def agreement(
     ratio = points_m[inside, 2] / depth.z_m[v, u]
     shared = ratio[ratio <= BEHIND]  # excludes NaN, where nothing was measured
     return Agreement(len(asked_m), len(shared), int(np.count_nonzero(np.abs(shared - 1.0) <= WITHIN)))
+
+
+def asked(cloud: PointCloud) -> PointCloud:
+    """Return at most ``ASKED_POINTS`` points of a cloud, evenly selected, without other columns."""
+    return PointCloud(cloud.points_m[:: max(1, -(-len(cloud) // ASKED_POINTS))])

@@ -2,48 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.sparse import coo_matrix
+from scipy.sparse.linalg import splu
 
-from pipeline.kernels.geometry import apply, inverse
-from pipeline.kernels.open3d_runtime import o3d
+from pipeline.kernels.geometry import rigid, rotation_exp
+from pipeline.placement.edges import PoseEdge, adjoint, small_motion
+from pipeline.placement.loops import LOOP_LIMIT, Groups, Loops, best_loops
 from pipeline.registration.metrics import point_error_m
-from pipeline.registration.neighbourhood import median_spacing_m
-from pipeline.types import FloatArray, PointCloud
+from pipeline.types import FloatArray, IntArray
 
-LOOP_TOLERANCE_M = 0.05
-"""Largest error of a loop of correct registrations: a few times the 2 cm of a single one (SPEC 4.7)."""
-INFORMATION_GATE_M = 0.05
-"""Largest distance of pairs, at the registered pose, that count as evidence for it."""
-FIT_GATE_M = 0.3
-"""Points farther than this from the other cloud are outside the overlap."""
-GRAPH_POINTS = 4000
-"""Most points of a node that the graph uses."""
-
-
-@dataclass(frozen=True, slots=True)
-class PoseEdge:
-    """A registration as evidence for the relative pose of two nodes."""
-
-    source: int
-    target: int
-    T_target_source: FloatArray
-    """(4, 4) registered pose."""
-    information: FloatArray
-    """(6, 6) sum of J^T J over the close pairs; rotations first, as in Open3D."""
-    misfit_m: float
-    """Median distance of the source's points from the target in their overlap; of contradicting edges, that
-    with the largest is rejected first."""
-    agrees: bool = True
-    """False for an edge that other evidence contradicts: it determines no pose and checks no loop."""
-
-    @property
-    def pairs(self) -> float:
-        """Number of close pairs in the information."""
-        return float(self.information[5, 5])
+MAX_STEPS = 50
+STILL = 1e-9
+"""The optimisation stops when no node turns or moves more than this, rad and m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,92 +27,10 @@ class PoseGraph:
     T_reference_node: tuple[FloatArray, ...]
     """(4, 4) pose of every node in the reference's frame; NaN for nodes that no used edge reaches."""
     loop_error_m: tuple[float, ...]
-    """Point error between each edge and the path between its nodes, along edges that nothing else
-    contradicts, that agrees with it best; NaN without a path."""
+    """Point error between each edge and the other way between its nodes: along the spanning tree or, for an
+    edge of the tree, around the loop that closes best; NaN without a loop."""
     used: tuple[bool, ...]
     """False for edges that were rejected because they contradict the loops."""
-
-
-def graph_points(cloud: PointCloud) -> FloatArray:
-    """Draw at most ``GRAPH_POINTS`` (N, 3) points of a node."""
-    if len(cloud) <= GRAPH_POINTS:
-        return cloud.points_m
-    return cloud.points_m[np.random.default_rng(0).choice(len(cloud), GRAPH_POINTS, replace=False)]
-
-
-def pose_edge(
-    source: int,
-    target: int,
-    points_m: Sequence[FloatArray],
-    T_target_source: FloatArray,
-    agrees: bool = True,
-) -> PoseEdge:
-    """Compute the evidence for a registered pose from the nodes' points.
-
-    The information follows Choi, Zhou, Koltun 2015, eq. 10: the Gauss-Newton matrix of the distances of
-    matched points.
-    """
-    moved_m = apply(T_target_source, points_m[source])
-    distances_m, nearest = cKDTree(points_m[target]).query(moved_m, workers=-1)
-    gate_m = max(INFORMATION_GATE_M, median_spacing_m(points_m[target]))
-    close = points_m[target][nearest[distances_m <= gate_m]]
-    overlap_m = distances_m[distances_m <= FIT_GATE_M]
-    return PoseEdge(
-        source,
-        target,
-        np.asarray(T_target_source, dtype=np.float64),
-        _information(close),
-        float(np.median(overlap_m)) if len(overlap_m) else float("inf"),
-        agrees,
-    )
-
-
-def _information(points_m: FloatArray) -> FloatArray:
-    """Return the (6, 6) sum over points of J^T J, J = [-[p]x, I]."""
-    x, y, z = points_m.T
-    zero = np.zeros_like(x)
-    skew = np.stack([zero, z, -y, -z, zero, x, y, -x, zero], axis=1).reshape(-1, 3, 3)
-    jacobian = np.concatenate([skew, np.broadcast_to(np.eye(3), skew.shape)], axis=2)
-    return np.einsum("nki,nkj->ij", jacobian, jacobian)
-
-
-def groups_of(nodes: int, links: Iterable[tuple[int, int]]) -> list[set[int]]:
-    """Return the connected groups of nodes, ordered by their first nodes."""
-    groups = [{node} for node in range(nodes)]
-    for link in links:
-        one, other = (next(group for group in groups if node in group) for node in link)
-        if one is not other:
-            one |= other
-            groups.remove(other)
-    return sorted(groups, key=min)
-
-
-def strongest_alike(
-    points_m: Sequence[FloatArray], edges: Sequence[PoseEdge], strengths: Sequence[float]
-) -> list[PoseEdge]:
-    """Mark edges as not agreeing if they contradict the path along stronger edges.
-
-    Poses found from anywhere can be wrong in the same way, such as a view mistaken for that of the opposite
-    corner: two such edges form a consistent loop. So stronger evidence wins.
-
-    Args:
-        points_m: as for ``solve_pose_graph``.
-        edges: the registrations.
-        strengths: strength of each edge's evidence.
-    """
-    judged = list(edges)
-    kept: list[PoseEdge] = []
-    for place in sorted(range(len(edges)), key=lambda place: -strengths[place]):
-        edge = edges[place]
-        if not edge.agrees:
-            continue
-        T_target_source = chained(len(points_m), kept, edge.target)[edge.source]
-        error_m = point_error_m(T_target_source, edge.T_target_source, points_m[edge.source])
-        if error_m > LOOP_TOLERANCE_M:
-            judged[place] = replace(edge, agrees=False)
-        else:  # without another path the error is NaN, which is no contradiction
-            kept.append(edge)
-    return judged
 
 
 def solve_pose_graph(
@@ -146,98 +38,147 @@ def solve_pose_graph(
 ) -> PoseGraph:
     """Compute the poses that agree best with the edges, after rejecting edges that contradict the loops.
 
+    Edges that contradict the tree of the strongest evidence are rejected first; then, one by one, the edge
+    that is farthest from the least-squares poses while it is outside its error, if another way remains.
+
     Args:
         points_m: (N, 3) points of every node, in its own frame, at which errors are measured.
         edges: the registrations, at most one per pair of nodes.
         reference: node whose pose is the identity.
     """
-    used = _consistent(points_m, edges)
-    kept = [edge for edge, keep in zip(edges, used, strict=True) if keep]
-    poses = _optimised(chained(len(points_m), kept, reference), kept, reference)
-    agreeing = [edge for edge in edges if edge.agrees]
-    loop_error_m = tuple(_loop_error_m(points_m, edge, agreeing) for edge in edges)
-    return PoseGraph(tuple(poses), loop_error_m, tuple(used))
-
-
-def chained(nodes: int, edges: Sequence[PoseEdge], reference: int = 0) -> list[FloatArray]:
-    """Return T_reference_node along the tree of edges with the most pairs; NaN for unreachable nodes."""
-    poses: list[FloatArray | None] = [None] * nodes
-    poses[reference] = np.eye(4)
+    nodes = len(points_m)
+    loops = best_loops(nodes, edges)
+    used = [edge.agrees and agrees for edge, agrees in zip(edges, loops.agreeing(len(edges)), strict=True)]
+    T_root_node = loops.T_root_node
     while True:
-        bridges = [edge for edge in edges if (poses[edge.source] is None) != (poses[edge.target] is None)]
-        if not bridges:
-            return [np.full((4, 4), np.nan) if pose is None else pose for pose in poses]
-        edge = max(bridges, key=lambda bridge: bridge.pairs)
-        known = poses[edge.target]
-        if known is not None:
-            poses[edge.source] = known @ edge.T_target_source
-        elif (other := poses[edge.source]) is not None:
-            poses[edge.target] = other @ inverse(edge.T_target_source)
-
-
-def _consistent(points_m: Sequence[FloatArray], edges: Sequence[PoseEdge]) -> list[bool]:
-    """Reject the worst-fitting edge that no loop confirms until all loops close; returns which edges stay."""
-    used = [edge.agrees for edge in edges]
-    while True:
-        left = [edge for edge, keep in zip(edges, used, strict=True) if keep]
-        suspects = [
-            place
-            for place, edge in enumerate(edges)
-            if used[place] and _loop_error_m(points_m, edge, left) > LOOP_TOLERANCE_M
-        ]
-        if not suspects:
-            return used
-        used[max(suspects, key=lambda place: edges[place].misfit_m)] = False
-
-
-def _loop_error_m(points_m: Sequence[FloatArray], edge: PoseEdge, edges: Sequence[PoseEdge]) -> float:
-    """Return the point error between an edge and the path that agrees with it best; NaN without a path."""
-    errors = [
-        point_error_m(T, edge.T_target_source, points_m[edge.source])
-        for T in _ways(edge.source, edge.target, [other for other in edges if other is not edge])
-    ]
-    return min(errors, default=float("nan"))
-
-
-def _ways(start: int, end: int, edges: Sequence[PoseEdge]) -> Iterator[FloatArray]:
-    """Yield T_end_start along every path without a repeated node."""
-    if start == end:
-        yield np.eye(4)
-        return
-    for edge in edges:
-        if start not in (edge.source, edge.target):
-            continue
-        ahead = edge.target if edge.source == start else edge.source
-        step = edge.T_target_source if edge.source == start else inverse(edge.T_target_source)
-        rest = [other for other in edges if start not in (other.source, other.target)]
-        for T in _ways(ahead, end, rest):
-            yield T @ step
-
-
-def _optimised(start: Sequence[FloatArray], edges: Sequence[PoseEdge], reference: int) -> list[FloatArray]:
-    """Run Open3D's Levenberg-Marquardt on the nodes that have a start pose, with the reference fixed."""
-    reached = [node for node, pose in enumerate(start) if np.isfinite(pose).all()]
-    if len(edges) < len(reached):
-        return list(start)  # the edges form a tree, so nothing has to be reconciled
-    place = {node: index for index, node in enumerate(reached)}
-    o3d_registration = o3d.pipelines.registration
-    graph = o3d_registration.PoseGraph()
-    for node in reached:
-        graph.nodes.append(o3d_registration.PoseGraphNode(start[node]))
-    for edge in edges:
-        if edge.source in place and edge.target in place:
-            graph.edges.append(
-                o3d_registration.PoseGraphEdge(
-                    place[edge.source], place[edge.target], edge.T_target_source, edge.information, False
-                )
-            )
-    o3d_registration.global_optimization(
-        graph,
-        o3d_registration.GlobalOptimizationLevenbergMarquardt(),
-        o3d_registration.GlobalOptimizationConvergenceCriteria(),
-        o3d_registration.GlobalOptimizationOption(INFORMATION_GATE_M, 0.25, 1.0, place[reference]),
+        kept = [place for place, use in enumerate(used) if use]
+        T_root_node, distance = optimised(T_root_node, [edges[place] for place in kept])
+        worst = _worst_in_a_loop(nodes, edges, kept, distance)
+        if worst is None:
+            break
+        used[worst] = False
+    groups = Groups(nodes, [(edges[place].source, edges[place].target) for place in kept])
+    T_reference_root = np.linalg.inv(T_root_node[reference])
+    reached = [groups.of(node) == groups.of(reference) for node in range(nodes)]
+    return PoseGraph(
+        tuple(
+            T_reference_root @ T if there else np.full((4, 4), np.nan)
+            for T, there in zip(T_root_node, reached, strict=True)
+        ),
+        _loop_errors_m(points_m, edges, loops),
+        tuple(used),
     )
-    poses = list(start)
-    for node in reached:
-        poses[node] = np.array(graph.nodes[place[node]].pose)
-    return poses
+
+
+def _worst_in_a_loop(
+    nodes: int, edges: Sequence[PoseEdge], kept: Sequence[int], distance: FloatArray
+) -> int | None:
+    """Return the edge that is farthest from the poses and outside its error, if it is not the only way."""
+    for row in np.argsort(-distance):
+        if distance[row] <= LOOP_LIMIT:
+            return None
+        others = [(edges[k].source, edges[k].target) for k in kept if k != kept[row]]
+        groups, edge = Groups(nodes, others), edges[kept[row]]
+        if groups.of(edge.source) == groups.of(edge.target):
+            return kept[row]
+    return None
+
+
+def _loop_errors_m(
+    points_m: Sequence[FloatArray], edges: Sequence[PoseEdge], loops: Loops
+) -> tuple[float, ...]:
+    """Return ``PoseGraph.loop_error_m``."""
+    errors_m = [float("nan")] * len(edges)
+    T = loops.T_root_node
+    confirming = np.array([edges[place].agrees for place in loops.closing], bool)
+    distance = np.where(confirming, loops.distance, np.inf)
+    rows = {place: row for row, place in enumerate(loops.closing)}
+    for place in (*loops.tree, *loops.closing):
+        edge = edges[place]
+        if place in rows:
+            T_target_source = np.linalg.inv(T[edge.target]) @ T[edge.source]
+        else:
+            through = np.flatnonzero(loops.passes[:, place] & confirming)
+            if not len(through):
+                continue
+            T_target_source = _around(edges, loops, place, int(through[np.argmin(distance[through])]))
+        errors_m[place] = point_error_m(T_target_source, edge.T_target_source, points_m[edge.source])
+    return tuple(errors_m)
+
+
+def _around(edges: Sequence[PoseEdge], loops: Loops, place: int, row: int) -> FloatArray:
+    """Return T_target_source of a tree's edge by the way around one of its loops."""
+    edge, closing = edges[place], edges[loops.closing[row]]
+    T, others = loops.T_root_node, [(edges[k].source, edges[k].target) for k in loops.tree if k != place]
+    groups = Groups(len(T), others)
+    with_source = groups.of(closing.source) == groups.of(edge.source)
+    motion = loops.motion[row] if with_source else np.linalg.inv(loops.motion[row])
+    return np.linalg.inv(T[edge.target]) @ motion @ T[edge.source]
+
+
+def optimised(start: FloatArray, edges: Sequence[PoseEdge]) -> tuple[FloatArray, FloatArray]:
+    """Minimise the sum of the edges' squared Mahalanobis distances over the poses (Gauss-Newton).
+
+    The first node of each connected group keeps its pose. The distance of an edge X between poses A of its
+    source and B of its target is that of X^-1 B^-1 A from the identity (Choi, Zhou, Koltun 2015, eq. 3).
+
+    Args:
+        start: (N, 4, 4) start poses in one frame per group; those along a spanning tree are near enough.
+        edges: the registrations.
+
+    Returns:
+        (N, 4, 4) poses, and (E,) squared Mahalanobis distances of the edges, with the slack of loops.
+    """
+    T = np.array(start)
+    if not edges:
+        return T, np.empty(0)
+    sources, targets = (np.array([getattr(edge, end) for edge in edges]) for end in ("source", "target"))
+    T_source_target = np.linalg.inv([edge.T_target_source for edge in edges])
+    information = np.array([edge.information for edge in edges])
+    groups = Groups(len(T), zip(sources.tolist(), targets.tolist(), strict=True))
+    free = np.array([node for node in range(len(T)) if groups.of(node) != node], int)
+    for _ in range(MAX_STEPS):
+        step = _step(T, T_source_target, information, sources, targets, free)
+        for node, motion in zip(free, step, strict=True):
+            T[node] = T[node] @ rigid(rotation_exp(motion[:3]), motion[3:])
+        if np.abs(step).max() <= STILL:
+            break
+    error = small_motion(T_source_target @ np.linalg.inv(T[targets]) @ T[sources])
+    covariance = np.array([edge.loop_covariance for edge in edges])
+    return T, np.einsum("ei,ei->e", error, np.linalg.solve(covariance, error[..., None])[..., 0])
+
+
+def _step(
+    T: FloatArray,
+    T_source_target: FloatArray,
+    information: FloatArray,
+    sources: IntArray,
+    targets: IntArray,
+    free: IntArray,
+) -> FloatArray:
+    """Return the (F, 6) motions of the free nodes, each in its own frame, of one Gauss-Newton step."""
+    T_target_source = np.linalg.inv(T[targets]) @ T[sources]
+    error = small_motion(T_source_target @ T_target_source)
+    by_target = -adjoint(np.linalg.inv(T_target_source))  # the source's own motion enters as it is
+    place = np.full(len(T), -1)
+    place[free] = np.arange(len(free))
+    ends = (sources, np.broadcast_to(np.eye(6), by_target.shape)), (targets, by_target)
+    gradient = np.zeros((len(free), 6))
+    blocks, rows, columns = [], [], []
+    for one, J_one in ends:
+        weighed = np.swapaxes(J_one, 1, 2) @ information
+        at_one = place[one] >= 0
+        np.add.at(gradient, place[one][at_one], np.einsum("eij,ej->ei", weighed, error)[at_one])
+        for other, J_other in ends:
+            both = at_one & (place[other] >= 0)
+            blocks.append((weighed @ J_other)[both])
+            rows.append(place[one][both])
+            columns.append(place[other][both])
+    block, row, column = (np.concatenate(parts) for parts in (blocks, rows, columns))
+    axis = np.arange(6)
+    row = np.broadcast_to(6 * row[:, None, None] + axis[:, None], block.shape)
+    column = np.broadcast_to(6 * column[:, None, None] + axis, block.shape)
+    size = 6 * len(free)
+    normal = coo_matrix((block.ravel(), (row.ravel(), column.ravel())), shape=(size, size)).tocsc()
+    solved: FloatArray = splu(normal).solve(-gradient.ravel())
+    return solved.reshape(-1, 6)

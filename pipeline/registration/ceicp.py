@@ -7,6 +7,7 @@ unit of length and become negative in metres; here p is a probability over the k
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -26,6 +27,10 @@ COARSE_POINTS = 2000
 """Number of points that CEICP-A matches at first, while its kernel is wide."""
 SIGMA_MIN_OF_GATE = 1e-3
 """Least ratio of CEICP-A's smallest scale to the gate, for targets whose points coincide."""
+FACING_SPREAD = 0.5
+"""Scale s of a pair's normals in CEICP-A's p, exp(-(1 - |n . n'|) / s^2): 29 degrees (SPEC 4.11)."""
+LEAST_COSINE = 0.5
+"""Pairs whose normals differ by more than 60 degrees do not count in CEICP-A."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +59,13 @@ class CeicpN(PairWeighting):
 
 @dataclass(frozen=True, slots=True)
 class CeicpA(PairWeighting):
-    """CEICP-A: scale and gate shrink by the same factor at each iteration."""
+    """CEICP-A: scale and gate shrink by the same factor at each iteration.
 
+    With the plane metric p is the probability of a pair's distance and of its normals: where two clouds
+    overlap in part, the rim of one finds partners on the other's walls that stand across (SPEC 4.11).
+    """
+
+    facing: ClassVar[bool] = True
     sigma_m: float
     sigma_0_m: float
     sigma_min_m: float
@@ -77,9 +87,14 @@ class CeicpA(PairWeighting):
         return cls(sigma_0_m, sigma_0_m, sigma_min_m, config.sigma_decay, source_share, target_share)
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """Weigh the pairs within three sigma."""
-        rows = np.flatnonzero(matching.distances_m <= self.gate_m)
-        return PairWeights(rows, *entropy_weights(matching.distances_m[rows], self.sigma_m))
+        """Weigh the pairs within three sigma, and within 60 degrees if they have normals."""
+        near, cosines = matching.distances_m <= self.gate_m, matching.cosines
+        if cosines is None:
+            rows = np.flatnonzero(near)
+            return PairWeights(rows, *entropy_weights(matching.distances_m[rows], self.sigma_m))
+        rows = np.flatnonzero(near & (cosines >= LEAST_COSINE))
+        turned = (1.0 - cosines[rows]) / FACING_SPREAD**2
+        return PairWeights(rows, *entropy_weights(matching.distances_m[rows], self.sigma_m, turned))
 
     @property
     def gate_m(self) -> float:
@@ -154,8 +169,15 @@ def _smallest_sigma_m(target: PointCloud, gate_m: float) -> float:
     return max(spacing_m, noise_m, SIGMA_MIN_OF_GATE * gate_m)
 
 
-def entropy_weights(distances_m: FloatArray, sigma_m: float) -> tuple[FloatArray, float, float]:
+def entropy_weights(
+    distances_m: FloatArray, sigma_m: float, more: FloatArray | None = None
+) -> tuple[FloatArray, float, float]:
     """Compute normalised weights -p log p of a Gaussian p over pairs (SPEC 4.4).
+
+    Args:
+        distances_m: (M,) distances of the pairs.
+        sigma_m: scale of the distances.
+        more: (M,) exponents of a further factor exp(-more) of p.
 
     Returns:
         (M,) weights summing to one, the scale, and the entropy -sum p log p in nats.
@@ -164,6 +186,8 @@ def entropy_weights(distances_m: FloatArray, sigma_m: float) -> tuple[FloatArray
         return np.empty(0), sigma_m, float("nan")
     exponents = distances_m * distances_m
     exponents *= 0.5 / max(sigma_m**2, np.finfo(float).tiny)
+    if more is not None:
+        exponents += more
     kernel = np.exp(-exponents)
     total = float(kernel.sum())
     exponents += np.log(total)  # now -log p

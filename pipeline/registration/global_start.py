@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -39,20 +40,33 @@ def default_voxel_m(target: PointCloud) -> float:
 def global_start(source: PointCloud, target: PointCloud, voxel_m: float, seed: int = 0) -> FloatArray:
     """Find the (4, 4) T_target_source to about two voxels by FPFH features (Rusu et al. 2009).
 
-    RANSAC and fast global registration (Zhou, Park, Koltun 2016), both from Open3D, each propose a pose;
-    the pose with more matched points is taken. Estimated normals are oriented towards the origin, so
-    clouds without normals should be in their cameras' frames.
+    Args:
+        source, target, voxel_m: as for ``global_starts``.
+        seed: random seed.
+
+    Raises:
+        ReconstructionError: the pose does not match enough points.
+    """
+    return next(global_starts(source, target, voxel_m, (seed,)))
+
+
+def global_starts(
+    source: PointCloud, target: PointCloud, voxel_m: float, seeds: Sequence[int]
+) -> Iterator[FloatArray]:
+    """Find a (4, 4) T_target_source for each seed of Open3D's RANSAC; its answers at low overlap differ.
+
+    Estimated normals are oriented towards the origin, so clouds without normals should be in their cameras'
+    frames. Open3D's fast global registration finds no pose that RANSAC misses.
 
     Args:
         source: the cloud that moves.
         target: the cloud that stays.
         voxel_m: voxel edge to which both clouds are first thinned.
-        seed: random seed of RANSAC.
+        seeds: random seeds.
 
     Raises:
-        ReconstructionError: neither pose matches enough points.
+        ReconstructionError: no pose matches enough points.
     """
-    reach_m = PAIR_REACH * voxel_m
     (moving, moving_features), (fixed, fixed_features) = (
         _with_features(cloud, voxel_m) for cloud in (source, target)
     )
@@ -60,17 +74,18 @@ def global_start(source: PointCloud, target: PointCloud, voxel_m: float, seed: i
         raise ReconstructionError(
             f"Too few points remain at {voxel_m:.3g} m to find a start pose; give one, or a smaller voxel."
         )
-    o3d.utility.random.seed(seed)
-    found = [
-        solve(moving, fixed, moving_features, fixed_features, reach_m) for solve in (_by_ransac, _fast_global)
-    ]
-    best = max(found, key=lambda result: (result.fitness, -result.inlier_rmse))
-    if best.fitness < SMALLEST_SHARE:
+    most = 0.0
+    for seed in seeds:
+        o3d.utility.random.seed(seed)
+        found = _by_ransac(moving, fixed, moving_features, fixed_features, PAIR_REACH * voxel_m)
+        most = max(most, found.fitness)
+        if found.fitness >= SMALLEST_SHARE:
+            yield np.array(found.transformation)
+    if most < SMALLEST_SHARE:
         raise ReconstructionError(
-            f"No start pose brings more than {best.fitness:.0%} of the source points to the target: "
+            f"No start pose brings more than {most:.0%} of the source points to the target: "
             "the clouds hardly overlap or have no features; give a start pose."
         )
-    return np.array(best.transformation)
 
 
 def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[Any, Any]:
@@ -107,12 +122,3 @@ def _by_ransac(source: Any, target: Any, source_features: Any, target_features: 
         ],
         o3d_registration.RANSACConvergenceCriteria(RANSAC_ITERATIONS, RANSAC_CONFIDENCE),
     )
-
-
-def _fast_global(source: Any, target: Any, source_features: Any, target_features: Any, reach_m: float) -> Any:
-    o3d_registration = o3d.pipelines.registration
-    option = o3d_registration.FastGlobalRegistrationOption(maximum_correspondence_distance=reach_m)
-    result = o3d_registration.registration_fgr_based_on_feature_matching(
-        source, target, source_features, target_features, option
-    )
-    return o3d_registration.evaluate_registration(source, target, reach_m, result.transformation)

@@ -139,8 +139,9 @@ def _iterations(
     source: Sample, target: Sample, config: RegistrationConfig, T: FloatArray, start: MethodStart
 ) -> Generator[RegistrationStep, None, str]:
     method = start(config, source.cloud, target.cloud)
-    matcher = Matcher(source.cloud, target.cloud, method.direction or config.direction, method.features)
-    residual = residual_for(config, target.cloud, matcher, method.unweighted_centroids)
+    direction, with_normals = method.direction or config.direction, method.facing and config.metric == "plane"
+    matcher = Matcher(source.cloud, target.cloud, direction, method.features, with_normals)
+    residual = residual_for(config, matcher, method.unweighted_centroids)
     stop = StopRule(TRANSLATION_TOLERANCE_OF_GATE * config.gate_m)
     acceleration = Acceleration(apply(T, source.points_m)) if method.accelerated else None
     center_m = source.points_m.mean(axis=0, keepdims=True)

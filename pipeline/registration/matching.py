@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ from pipeline.kernels.kdtree import (
     tree_of,
     working_space,
 )
+from pipeline.registration.neighbourhood import Normals
 from pipeline.registration.sample import random_keys
 from pipeline.types import ByteArray, FloatArray, IntArray, PointCloud
 
@@ -37,6 +38,10 @@ class Matching:
     """(M, 3) target points."""
     distances_m: FloatArray
     """(M,) distances of the pairs."""
+    normals: FloatArray | None = None
+    """(M, 3) unit mean of both points' normals in the target frame; None if they are not asked for."""
+    cosines: FloatArray | None = None
+    """(M,) cosine of the angle between both points' normals, without its sign; None like ``normals``."""
 
     def select(self, rows: IntArray) -> Matching:
         """Return the pairs at ``rows``, which must be ascending."""
@@ -48,6 +53,8 @@ class Matching:
             self.moved_m[rows],
             self.target_m[rows],
             self.distances_m[rows],
+            None if self.normals is None else self.normals[rows],
+            None if self.cosines is None else self.cosines[rows],
         )
 
 
@@ -64,6 +71,7 @@ class Matcher:
         target: PointCloud,
         direction: Direction,
         features: Callable[[PointCloud], FloatArray | None] = lambda cloud: None,
+        with_normals: bool = False,
     ) -> None:
         """Prepare the matching of two clouds.
 
@@ -72,15 +80,14 @@ class Matcher:
             target: the cloud that stays.
             direction: the cloud whose points are matched to their nearest neighbours in the other.
             features: returns (N, k) further coordinates of a cloud's points after x, y, z, metres, or None.
+            with_normals: whether matchings have the pairs' normals.
         """
         self._source = _Cloud(source.points_m, features(source))
         self._target = _Cloud(target.points_m, features(target))
         self._direction = direction
-
-    @property
-    def target_tree(self) -> KdTree:
-        """Search tree of all points of the target."""
-        return self._target.subset(1.0).tree
+        self._source_normals = _normals_of(source, self._source) if with_normals else None
+        self.target_normals = _normals_of(target, self._target)
+        """Normals of all points of the target: its own, or from its points."""
 
     def match(
         self,
@@ -108,11 +115,20 @@ class Matcher:
             back_m = _moved(np.linalg.inv(T_target_source), target.points_m)
             scale = float(np.cbrt(np.linalg.det(T_target_source[:3, :3])))
             found.append(source.nearest(target, back_m, neighbours, gate_m / scale)[::-1])
-        if len(found) == 1:
-            return Matching(*_pairs(*found[0], moved_m, target.points_m, source.rows, target.rows))
-        both = np.unique(np.concatenate([np.stack(pairs, axis=1) for pairs in found]), axis=0)
-        near, partners = np.ascontiguousarray(both.T)
-        return Matching(*_pairs(near, partners, moved_m, target.points_m, source.rows, target.rows))
+        near, partners = found[0]
+        if len(found) == 2:
+            both = np.unique(np.concatenate([np.stack(pairs, axis=1) for pairs in found]), axis=0)
+            near, partners = np.ascontiguousarray(both.T)
+        pairs = Matching(*_pairs(near, partners, moved_m, target.points_m, source.rows, target.rows))
+        return pairs if self._source_normals is None else self._facing(pairs, T_target_source)
+
+    def _facing(self, pairs: Matching, T_target_source: FloatArray) -> Matching:
+        """Return the pairs with their normals."""
+        assert self._source_normals is not None
+        rows = pairs.source_rows, pairs.target_rows
+        moving, fixed = self._source_normals.at(rows[0]), self.target_normals.at(rows[1])
+        normals, cosines = _mean_normals(T_target_source, moving, fixed, *rows)
+        return replace(pairs, normals=normals, cosines=cosines)
 
 
 class _Subset:
@@ -306,6 +322,30 @@ def _pairs(
     return rows[0], rows[1], points[0], points[1], distances
 
 
+@compiled
+def _mean_normals(
+    T: FloatArray, moving: FloatArray, fixed: FloatArray, source_rows: IntArray, target_rows: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return pairs' (M, 3) mean normals in the target frame, and the (M,) cosines between the two.
+
+    The source's normal is flipped where the two point to opposite sides, and turned by the pose, whose scale
+    does not count.
+    """
+    normals, cosines, turned = np.empty((len(source_rows), 3)), np.empty(len(source_rows)), np.empty(3)
+    scale = np.sqrt(T[0, 0] * T[0, 0] + T[1, 0] * T[1, 0] + T[2, 0] * T[2, 0])
+    for m in range(len(source_rows)):
+        of_source, of_target, cosine = moving[source_rows[m]], fixed[target_rows[m]], 0.0
+        for k in range(3):
+            turned[k] = (T[k, 0] * of_source[0] + T[k, 1] * of_source[1] + T[k, 2] * of_source[2]) / scale
+            cosine += turned[k] * of_target[k]
+        sign = 1.0 if cosine >= 0.0 else -1.0
+        cosines[m] = sign * cosine
+        length = np.sqrt(2.0 + 2.0 * cosines[m])
+        for k in range(3):
+            normals[m, k] = (of_target[k] + sign * turned[k]) / length
+    return normals, cosines
+
+
 class _Cloud:
     """A cloud and those of its subsets that have been searched."""
 
@@ -324,6 +364,10 @@ class _Cloud:
     @cached_property
     def _order(self) -> IntArray:
         return np.argsort(random_keys(self.points_m, 0))
+
+
+def _normals_of(cloud: PointCloud, searched: _Cloud) -> Normals:
+    return Normals(cloud.points_m, cloud.normals, lambda: searched.subset(1.0).tree)
 
 
 def _stacked(points_m: FloatArray, features: FloatArray | None) -> FloatArray:

@@ -17,10 +17,7 @@ def open_motions(points_m: FloatArray, normals: FloatArray, open_share: float = 
     The 6 x 6 Gauss-Newton matrix of the point-to-plane distances is split: slides are the weak directions of
     its translation block, turns those of the rotation block after elimination of the best translation.
     """
-    arms = points_m - points_m.mean(axis=0)
-    arms = arms / max(float(np.sqrt(np.mean(np.sum(arms**2, axis=1)))), np.finfo(float).tiny)
-    jacobian = np.concatenate([np.cross(arms, normals), normals], axis=1)
-    hessian = jacobian.T @ jacobian / len(points_m)
+    hessian = _normal_matrix(points_m, normals)
     floor = open_share * float(np.linalg.eigvalsh(hessian)[-1])
     slide_values, slides = np.linalg.eigh(hessian[3:, 3:])
     held = slide_values > floor
@@ -28,6 +25,25 @@ def open_motions(points_m: FloatArray, normals: FloatArray, open_share: float = 
     turn_values, turns = np.linalg.eigh(hessian[:3, :3] - hessian[:3, 3:] @ inverse @ hessian[3:, :3])
     parts = [_slides(slides, held), _turns(turns, turn_values > floor)]
     return " and ".join(part for part in parts if part)
+
+
+def stiffness(points_m: FloatArray, normals: FloatArray) -> float:
+    """Return how well (N, 3) points with (N, 3) unit normals hold the motion that they hold least.
+
+    It is the least eigenvalue of the matrix in ``open_motions`` over the largest, 0 if a motion is open.
+    """
+    if len(points_m) < 6:
+        return 0.0
+    values = np.linalg.eigvalsh(_normal_matrix(points_m, normals))
+    return max(0.0, float(values[0] / values[-1]))
+
+
+def _normal_matrix(points_m: FloatArray, normals: FloatArray) -> FloatArray:
+    """Return the (6, 6) Gauss-Newton matrix about the centre, with lengths in units of the points' spread."""
+    arms = points_m - points_m.mean(axis=0)
+    arms = arms / max(float(np.sqrt(np.mean(np.sum(arms**2, axis=1)))), np.finfo(float).tiny)
+    jacobian = np.concatenate([np.cross(arms, normals), normals], axis=1)
+    return jacobian.T @ jacobian / len(points_m)
 
 
 def _slides(axes: FloatArray, held: np.ndarray) -> str:

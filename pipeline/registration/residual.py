@@ -16,7 +16,7 @@ from pipeline.kernels.kdtree import compiled, squared_distance
 from pipeline.registration.matching import Matcher, Matching
 from pipeline.registration.neighbourhood import Normals
 from pipeline.registration.observability import open_motions
-from pipeline.types import FloatArray, IntArray, PointCloud
+from pipeline.types import FloatArray, IntArray
 
 _SMALLEST_SINGULAR_RATIO = 1e-9
 _DAMPING = 1e-9
@@ -49,30 +49,39 @@ class PointResidual:
 
 @dataclass(frozen=True, slots=True)
 class PlaneResidual:
-    """Point-to-plane residual: distance of the source point from the plane through the target point."""
+    """Point-to-plane residual: distance of the source point from the plane through the target point.
 
-    normals: Normals
+    The plane's normal is the mean of both points' normals where the pairs have it (the symmetric objective of
+    Rusinkiewicz 2019), else the target's.
+    """
+
+    target_normals: Normals
     """Normals of the thinned target."""
 
     def solve(self, pairs: Matching, weights: FloatArray) -> FloatArray:
         """Return the (4, 4) motion to apply after the current pose: one Gauss-Newton step."""
-        rows = pairs.target_rows
-        return solve_plane(pairs.moved_m, pairs.target_m, self.normals.at(rows), weights, rows)
+        normals, rows = self._planes(pairs)
+        return solve_plane(pairs.moved_m, pairs.target_m, normals, weights, rows)
 
     def mean_squared_m2(self, pairs: Matching, weights: FloatArray, motion: FloatArray) -> float:
         """Return the weighted mean squared distance along the normals after a motion."""
-        rows = pairs.target_rows
-        normals = self.normals.at(rows)
+        normals, rows = self._planes(pairs)
         return float(_mean_squared_height(pairs.moved_m, pairs.target_m, normals, rows, weights, motion))
+
+    def _planes(self, pairs: Matching) -> tuple[FloatArray, IntArray]:
+        """Return (N, 3) normals, and each pair's row among them."""
+        if pairs.normals is not None:
+            return pairs.normals, np.arange(len(pairs.normals))
+        return self.target_normals.at(pairs.target_rows), pairs.target_rows
 
 
 def residual_for(
-    config: RegistrationConfig, target: PointCloud, matcher: Matcher, unweighted_centroids: bool = False
+    config: RegistrationConfig, matcher: Matcher, unweighted_centroids: bool = False
 ) -> PointResidual | PlaneResidual:
     """Create the configured residual; a target without normals gets them from its points."""
     if config.metric == "point":
         return PointResidual(config.with_scale, unweighted_centroids)
-    return PlaneResidual(Normals(target.points_m, target.normals, lambda: matcher.target_tree))
+    return PlaneResidual(matcher.target_normals)
 
 
 def weighted_procrustes(

@@ -45,6 +45,8 @@ class PairWeighting(ABC):
     """Direction that the method requires; None for the configured one."""
     accelerated: ClassVar[bool] = False
     """Whether Anderson acceleration extrapolates the poses."""
+    facing: ClassVar[bool] = False
+    """Whether it weighs pairs by their normals too, which matchings then have with the plane metric."""
 
     @classmethod
     def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> PairWeighting:

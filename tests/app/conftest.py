@@ -3,14 +3,6 @@
 import pytest
 import viser
 
-from app.compute.store import Store
-
-
-@pytest.fixture(scope="session")
-def store(tmp_path_factory):
-    """A store that all tests share, so that what one has computed is there for the others."""
-    return Store(str(tmp_path_factory.mktemp("store")))
-
 
 @pytest.fixture(scope="module")
 def server():

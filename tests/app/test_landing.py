@@ -57,7 +57,8 @@ def test_it_is_in_the_page_of_the_bare_address_only(port):
 def test_the_page_has_its_title_and_the_apps_own_files_from_the_first_byte(port):
     page = get(port, "/?scene")[1]
     assert page.count("<title>PacketMesh</title>") == page.count("<title>") == 1
-    script, plotly = re.findall('<script defer src="([^"]+)">', page)
+    (script,) = re.findall('<script defer src="([^"]+)">', page)
+    (plotly,) = re.findall('<meta name="packetmesh-plotly" content="([^"]+)">', page)
     (style,) = re.findall('<link rel="stylesheet" href="([^"]+)">', page)
     assert not any(
         one.startswith("/") for one in (script, plotly, style)
@@ -72,7 +73,7 @@ def test_the_page_has_its_title_and_the_apps_own_files_from_the_first_byte(port)
 
 def test_browsers_keep_the_files_by_their_content_and_ask_for_the_page_again(port):
     page = get(port, "/")[1]
-    files = re.findall('(?:src|href)="((?:packetmesh|plotly)-[^"]+)"', page)
+    files = re.findall('(?:src|href|content)="((?:packetmesh|plotly)-[^"]+)"', page)
     assert len(files) == 3
     for path in (f"/{name}" for name in files):
         packed, content = fetch(port, path)

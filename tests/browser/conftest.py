@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Error
 
-from tests.browser.hands import PATIENCE_MS
+from tests.browser.hands import PATIENCE_MS, afresh, dismiss_notifications
 
+HERE = Path(__file__).parent
 ARGUMENTS = [
     "--no-sandbox",
     "--disable-quic",
@@ -44,6 +45,19 @@ for (const name of ["drawElements", "drawArrays", "drawElementsInstanced", "draw
 """
 """Pages draw nothing into their 3-D picture before ``window.draws`` is true: without a graphics card that
 takes most of the time, and few tests look at the picture."""
+CONNECTION = """
+window.Worker = class extends Worker {
+  constructor(...given) {
+    super(...given);
+    window.connection = this;
+  }
+};
+"""
+"""Pages keep the worker that holds their connection to the server, the only one that viser starts."""
+SIZE_PX = {"width": 900, "height": 640}
+"""Of the tab, small so that drawing in software is quick."""
+TOGETHER = {"test_landing": "test_calibrate"}
+"""Files that need the cameras which those of another file have calibrated: they follow on the same worker."""
 
 
 def chromium_path() -> str | None:
@@ -55,11 +69,11 @@ def chromium_path() -> str | None:
 
 @pytest.hookimpl(tryfirst=True)  # pytest-xdist looks at the groups, and where a path is named it came first
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark every test here, and keep those of a file on one worker: they share a browser and a server."""
+    """Mark every test here, and keep those of a file on one worker: they share a page."""
     for item in items:
-        if Path(__file__).parent in item.path.parents:
+        if item.path.parent == HERE:
             item.add_marker(pytest.mark.browser)
-            item.add_marker(pytest.mark.xdist_group(item.path.stem))
+            item.add_marker(pytest.mark.xdist_group(TOGETHER.get(item.path.stem, item.path.stem)))
 
 
 @pytest.hookimpl(wrapper=True)
@@ -85,9 +99,9 @@ def chromium():
     return path
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def browser(chromium):
-    """Chromium, closed at the end: what drives it keeps an event loop that other tests must not meet."""
+    """Chromium, closed before other tests: what drives it keeps an event loop that they must not meet."""
     from playwright.sync_api import expect, sync_playwright
 
     expect.set_options(timeout=PATIENCE_MS)
@@ -98,6 +112,7 @@ def browser(chromium):
         def undrawn(**options):
             context = new_context(**options)
             context.add_init_script(UNDRAWN)
+            context.add_init_script(CONNECTION)
             return context
 
         browser.new_context = undrawn
@@ -115,15 +130,24 @@ def app(chromium):
     app.stop()
 
 
-@pytest.fixture(scope="module")
-def tab(browser, app):
-    """A tab with the app, small so that drawing in software is quick."""
-    context = browser.new_context(viewport={"width": 900, "height": 640}, accept_downloads=True)
+@pytest.fixture(scope="package")
+def loaded(browser, app):
+    """A tab that loads the app once: a page takes as long to load as a short test."""
+    context = browser.new_context(viewport=SIZE_PX, accept_downloads=True)
     page = context.new_page()
     page.set_default_timeout(PATIENCE_MS)
     page.goto(f"{app.url}?fixedDpr=1")
+    page.get_by_text("Up to date").wait_for()
     yield page
     context.close()
+
+
+@pytest.fixture(scope="module")
+def tab(loaded):
+    """The tab with a new session."""
+    loaded.set_viewport_size(SIZE_PX)
+    afresh(loaded)
+    return loaded
 
 
 @pytest.fixture
@@ -137,8 +161,11 @@ def page(tab):
     return tab
 
 
-def dismiss_notifications(page) -> None:
-    """Close viser's notice about software rendering and anything else in the corner."""
-    close = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(one => one.click())"
-    page.evaluate(close)  # one that goes by itself meanwhile is no longer there to be clicked
-    page.wait_for_timeout(400)
+@pytest.fixture(scope="module")
+def few():
+    """Deliveries of few moments, so that they are soon there, in sessions that begin after this."""
+    from app.screens.network import setup
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(setup, "MOMENTS", 4)
+        yield

@@ -131,8 +131,33 @@ def arrow(page):
     return box["x"] + float(np.median(x)), box["y"] + float(np.median(y))
 
 
-def afresh(page):
-    """Open the app as a new browser does: nothing of before in the address, no folder left open."""
-    page.evaluate("sessionStorage.clear()")
-    page.goto(f"{page.url.partition('?')[0]}?fixedDpr=1")
+NEW_SESSION = """query => {
+  sessionStorage.clear();
+  history.replaceState(null, "", `${location.pathname}?${query}`);
+  const {beginAddress} = packetmesh.calls;
+  window.begun = new Promise(done => {
+    packetmesh.calls.beginAddress = (...given) => {
+      packetmesh.calls.beginAddress = beginAddress;
+      beginAddress(...given);
+      done();
+    };
+  });
+  connection.onmessage({data: {type: "closed", closeReason: ""}}); // what viser hears when the server is gone
+  return window.begun;
+}"""
+
+
+def afresh(page, query="fixedDpr=1"):
+    """Give the page a new session, as a new browser has it: nothing of before in the address, no folder left
+    open. The page connects again as after a restart of the server, which takes a third of loading it.
+    """
+    page.evaluate(NEW_SESSION, query)
     page.get_by_text("Up to date").wait_for()
+    dismiss_notifications(page)
+
+
+def dismiss_notifications(page):
+    """Close viser's notice about software rendering and anything else in the corner."""
+    close = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(one => one.click())"
+    page.evaluate(close)  # one that goes by itself meanwhile is no longer there to be clicked
+    page.wait_for_timeout(400)

@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 from tests.browser.hands import PATIENCE_MS, go
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def page(browser, app):
     context = browser.new_context(viewport={"width": 1280, "height": 720})
     page = context.new_page()

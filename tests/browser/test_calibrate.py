@@ -3,22 +3,44 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from itertools import pairwise
 
 import pytest
 from playwright.sync_api import expect
 
+from app.screens.calibrate import panel
 from app.screens.calibrate.labels import AROUND, HALVES
-from tests.browser.conftest import dismiss_notifications
-from tests.browser.hands import PATIENCE_MS, canvas, changed_from, go, pick, press, slider, unfold
+from app.screens.calibrate.noise_view import TRIALS, NoiseRequest
+from tests.browser.hands import (
+    PATIENCE_MS,
+    canvas,
+    changed_from,
+    dismiss_notifications,
+    go,
+    pick,
+    press,
+    slider,
+    unfold,
+)
 
-"""For the cameras and their depth on a busy machine."""
 BARS = ".packetmesh-views [data-packetmesh-pick]"
 DOCK = ".packetmesh-dock-row"
+FEW = 24
+"""Trials of the experiment with noise, whose number is nothing to the page."""
 
 
 @pytest.fixture(scope="module")
-def calibrated(browser, app):
+def few_trials():
+    """Few trials, so that they are soon there."""
+    assert TRIALS == 200  # the thesis's
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(panel, "NoiseRequest", partial(NoiseRequest, trials=FEW))
+        yield
+
+
+@pytest.fixture(scope="module")
+def calibrated(browser, app, few_trials):
     """The step with the scene whose cameras need calibration, opened as the screen proposes."""
     context = browser.new_context(viewport={"width": 900, "height": 640})
     page = context.new_page()
@@ -74,7 +96,7 @@ def test_the_noise_slider_replays_the_experiment(calibrated):
     handle = slider(calibrated, "Noise (px)")
     handle.focus()
     handle.press("ArrowRight")
-    calibrated.locator(f"{DOCK} b").get_by_text(re.compile(r"\d+ of 200 trials")).wait_for()
+    calibrated.locator(f"{DOCK} b").get_by_text(re.compile(rf"\d+ of {FEW} trials")).wait_for()
     handle.press("ArrowRight")
     calibrated.get_by_text("All trials").wait_for()
     unfold(calibrated, "What if the points were noisier?")
@@ -82,14 +104,14 @@ def test_the_noise_slider_replays_the_experiment(calibrated):
 
 def test_the_dock_shows_every_trial_with_labels_and_units_until_the_screen_is_left(calibrated):
     dock = calibrated.locator(DOCK)
-    expect(dock.locator("b").first).to_have_text(re.compile("0.60 px of noise.*200 of 200 trials"))
+    expect(dock.locator("b").first).to_have_text(re.compile(f"0.60 px of noise.*{FEW} of {FEW} trials"))
     plots = dock.locator(".plot")
     expect(plots).to_have_count(3)
     for index, (x, y) in enumerate((("fx (px)", "fy (px)"), ("cx (px)", "cy (px)"), ("k1 (", "k2 ("))):
         plot = plots.nth(index)
         expect(plot.locator(".xtitle")).to_contain_text(x)
         expect(plot.locator(".ytitle")).to_contain_text(y)
-        assert plot.locator(".scatterlayer .point").count() == 200 + 2
+        assert plot.locator(".scatterlayer .point").count() == FEW + 2
     box, window = dock.bounding_box(), calibrated.viewport_size
     assert (box["x"], box["width"]) == (0, window["width"])
     assert box["y"] + box["height"] == window["height"]

@@ -8,16 +8,22 @@ from playwright.sync_api import expect
 from tests.browser.hands import PATIENCE_MS
 
 
-@pytest.fixture
-def landing(browser, app):
-    """A new browser at the bare address, as soon as anything is there."""
+@pytest.fixture(scope="module")
+def page(browser):
     context = browser.new_context(viewport={"width": 1280, "height": 720})
     page = context.new_page()
     page.set_default_timeout(PATIENCE_MS)
-    page.goto(app.url, wait_until="commit")
-    page.get_by_role("dialog", name="Welcome").wait_for()
     yield page
     context.close()
+
+
+@pytest.fixture
+def landing(page, app):
+    """The bare address, which keeps nothing of before, as soon as anything is there."""
+    page.goto("about:blank")
+    page.goto(app.url, wait_until="commit")
+    page.get_by_role("dialog", name="Welcome").wait_for()
+    return page
 
 
 def on_top(page):

@@ -1,60 +1,84 @@
 """A lecture in three browsers: a teacher's, a student's, and that of one who comes late."""
 
+import contextlib
 import re
+from types import SimpleNamespace
 
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.conftest import dismiss_notifications
-from tests.browser.hands import ALIKE, PATIENCE_MS, TEXTS, canvas, differing, go, press, unfold
+from tests.browser.hands import (
+    ALIKE,
+    PATIENCE_MS,
+    TEXTS,
+    canvas,
+    differing,
+    dismiss_notifications,
+    go,
+    press,
+    unfold,
+)
 
 STEERS = "You see what the teacher sees"
 
 
 @pytest.fixture(scope="module")
-def lecture(browser):
+def lecture(app):
+    """A server of its own, with the computing processes of the other one, which goes on with them."""
     from app.server import build_server
 
-    app = build_server("box-on-table", port=0, lecture=True)
-    yield app
-    app.stop()
+    lecture = build_server("box-on-table", port=0, lecture=True, pool=app.pool)
+    yield lecture
+    lecture.pool = SimpleNamespace(close=lambda: None)
+    lecture.stop()
+
+
+@contextlib.contextmanager
+def opened(browser, url):
+    """A browser of its own at an address, until it leaves."""
+    context = browser.new_context(viewport={"width": 900, "height": 640})
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE_MS)
+    page.goto(url)
+    page.get_by_text("Up to date").wait_for()
+    if page.get_by_role("dialog", name="Welcome").count():
+        page.keyboard.press("Escape")
+    dismiss_notifications(page)
+    yield page
+    context.close()
+
+
+@pytest.fixture(scope="module")
+def desk(lecture, browser):
+    with opened(browser, lecture.teacher_url) as page:
+        assert lecture.entrance.teacher.text not in page.url
+        yield page
 
 
 @pytest.fixture
-def come(browser):
-    """Opens a browser of its own at an address; all are closed at the end."""
-    contexts = []
+def teacher(desk):
+    desk.get_by_text("The class may steer").wait_for()
+    go(desk, "Scene")
+    return desk
 
-    def come(url):
-        contexts.append(browser.new_context(viewport={"width": 900, "height": 640}))
-        page = contexts[-1].new_page()
-        page.set_default_timeout(PATIENCE_MS)
-        page.goto(url)
-        page.get_by_text("Up to date").wait_for()
-        if page.get_by_role("dialog", name="Welcome").count():
-            page.keyboard.press("Escape")
-        dismiss_notifications(page)
-        return page
 
-    yield come
-    for context in contexts:
-        context.close()
+@pytest.fixture(scope="module")
+def first(lecture, desk, browser):
+    with opened(browser, lecture.url) as page:
+        yield page
 
 
 @pytest.fixture
-def teacher(lecture, come):
-    page = come(lecture.teacher_url)
-    assert lecture.entrance.teacher.text not in page.url
-    page.get_by_text("The class may steer").wait_for()
-    go(page, "Scene")
-    return page
+def student(teacher, first):
+    first.get_by_text(STEERS).wait_for()
+    return first
 
 
 @pytest.fixture
-def student(lecture, teacher, come):
-    page = come(lecture.url)
-    page.get_by_text(STEERS).wait_for()
-    return page
+def second(student, lecture, browser):
+    """One who comes when the others are there, and leaves."""
+    with opened(browser, lecture.url) as page:
+        yield page
 
 
 def chip(page):
@@ -85,12 +109,12 @@ def alike(one, other):
     return False
 
 
-def test_who_comes_late_sees_the_room_as_the_teacher_has_turned_it(teacher, student, lecture, come):
+def test_who_comes_late_sees_the_room_as_the_teacher_has_turned_it(teacher, student, lecture, browser):
     drag(teacher)
-    late = come(lecture.url)
-    assert alike(teacher, late)
-    assert alike(teacher, student)
-    expect(teacher.get_by_text("2 in the class, 2 of them follow your view")).to_be_visible()
+    with opened(browser, lecture.url) as late:
+        assert alike(teacher, late)
+        assert alike(teacher, student)
+        expect(teacher.get_by_text("2 in the class, 2 of them follow your view")).to_be_visible()
 
 
 def test_a_student_changes_nothing_and_is_told_who_steers(teacher, student):
@@ -116,20 +140,19 @@ def test_a_hand_turns_the_own_view_and_one_click_brings_the_class_back(teacher, 
     assert alike(teacher, student)
 
 
-def test_votes_are_counted_by_keys_and_by_buttons_and_stay_with_the_answer(teacher, student, lecture, come):
-    other = come(lecture.url)
+def test_votes_are_counted_by_keys_and_by_buttons_and_stay_with_the_answer(teacher, student, second):
     go(teacher, "Depth")
     unfold(teacher, "Lesson: Can a picture measure?")
     press(teacher, "Next")
-    for page in (student, other):
+    for page in (student, second):
         expect(page.locator(".choice")).to_have_count(3)
     student.keyboard.press("3")
     student.keyboard.press("2")
-    other.locator(".choice").nth(1).click()
-    for page in (student, other):
+    second.locator(".choice").nth(1).click()
+    for page in (student, second):
         expect(page.locator(".choice[aria-pressed=true]")).to_contain_text("one side of the camera")
     bar = "████████████ 2"
-    for page in (teacher, student, other):
+    for page in (teacher, student, second):
         expect(page.locator(".packetmesh-lesson-card")).to_contain_text(bar)
     teacher.keyboard.press("s")
     expect(student.locator(".choice")).to_have_count(0)

@@ -8,13 +8,12 @@ import re
 import pytest
 from playwright.sync_api import TimeoutError, expect
 
-from tests.browser.conftest import dismiss_notifications
-from tests.browser.hands import PATIENCE_MS, go, press, unfold
+from tests.browser.hands import PATIENCE_MS, afresh, go, press, unfold
 
 LESSONS = {
     "How good is my calibration?": ("Calibrate", 7),
     "Can a picture measure?": ("Depth", 7),
-    "ICP against CEICP": ("Fuse", 10),
+    "ICP against CEICP": ("Fuse", 13),
     "Which ball radius?": ("Surface", 10),
     "How images cross a sensor network": ("Network", 10),
     "What one lost packet costs": ("Network", 8),
@@ -25,16 +24,12 @@ WAITS, FIRST, RIGHT = "Take a guess", "Guess before you go on", "Right."
 
 
 @pytest.fixture
-def page(browser, app):
+def page(few, tab):
     """A session of its own: a lesson goes on where somebody left it."""
-    context = browser.new_context(viewport={"width": 900, "height": 640})
-    page = context.new_page()
-    page.set_default_timeout(PATIENCE_MS)
-    page.goto(f"{app.url}?fixedDpr=1")
-    page.get_by_text("Up to date").wait_for()
-    dismiss_notifications(page)
-    yield page
-    context.close()
+    size = tab.viewport_size
+    afresh(tab)
+    yield tab
+    tab.set_viewport_size(size)
 
 
 def seen(page, text):
@@ -82,7 +77,7 @@ def test_five_stops_are_led_through_by_keys_alone(page, lesson):
 
 def test_the_dock_has_the_keys_after_a_click_on_it_until_escape(page):
     go(page, "Fuse")
-    begin(page, "ICP against CEICP", 10)
+    begin(page, "ICP against CEICP", 13)
     page.locator(".packetmesh-dock-time").click()
     seen(page, "The keys control the dock now").wait_for()
     seen(page, "Up to date").wait_for()
@@ -102,7 +97,7 @@ def test_the_dock_has_the_keys_after_a_click_on_it_until_escape(page):
 def test_a_lesson_is_read_and_answered_without_scrolling_and_covers_nothing(page, size):
     page.set_viewport_size({"width": size[0], "height": size[1]})
     go(page, "Fuse")
-    begin(page, "ICP against CEICP", 10)
+    begin(page, "ICP against CEICP", 13)
     card, picture = page.locator(".packetmesh-lesson-card"), page.locator("canvas[data-engine]")
     for name in ("Skip", "Back", "Next"):
         expect(card.get_by_role("button", name=name, exact=True)).to_be_in_viewport(ratio=1)

@@ -8,22 +8,23 @@ from itertools import pairwise
 import pytest
 from playwright.sync_api import expect
 
-from app.screens.network import setup
 from pipeline.delivery.sending import DeliverySpec, received_at, send
 from pipeline.sources import Demo
 from pipeline.spec import Spec
-from tests.browser.conftest import dismiss_notifications
-from tests.browser.hands import ALIKE, PATIENCE_MS, arrow, canvas, changed_from, differing, go, pick, press
+from tests.browser.hands import (
+    ALIKE,
+    PATIENCE_MS,
+    arrow,
+    canvas,
+    changed_from,
+    differing,
+    dismiss_notifications,
+    go,
+    pick,
+    press,
+)
 
 ALL = re.compile(r"^\d cameras sent [\d.]+ MB in [\d,]+ packets; simulated in [\d.]+ s\.$")
-
-
-@pytest.fixture(scope="module")
-def few():
-    """Few moments, so that they are soon there."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(setup, "MOMENTS", 4)
-        yield
 
 
 @pytest.fixture(scope="module")

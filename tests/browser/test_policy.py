@@ -5,7 +5,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
-from tests.browser.hands import PATIENCE_MS, STEPS, go
+from tests.browser.hands import PATIENCE_MS, STEPS, afresh, go
 
 WATCH = """
 window.forbidden = [];
@@ -30,8 +30,9 @@ HOSTILE = """
 SEND = "fetch('https://example.org/').then(() => 'sent', () => 'not sent')"
 
 
-@pytest.fixture
-def page(browser, app):
+@pytest.fixture(scope="module")
+def watched(browser, app):
+    """A tab that notes what is forbidden, from before any script runs."""
     context = browser.new_context(viewport={"width": 900, "height": 640})
     page = context.new_page()
     page.set_default_timeout(PATIENCE_MS)
@@ -41,7 +42,17 @@ def page(browser, app):
     context.close()
 
 
-def test_every_screen_works_under_the_policy_and_nothing_is_sent_elsewhere(page):
+@pytest.fixture
+def page(watched):
+    """The same with a session of its own, and nothing noted."""
+    afresh(watched)
+    watched.evaluate("window.forbidden = []")
+    return watched
+
+
+def test_every_screen_works_under_the_policy_and_nothing_is_sent_elsewhere(watched):
+    """From the first byte of the page on."""
+    page = watched
     page.get_by_text("Each camera node delivers").wait_for()
     for step in STEPS[1:]:
         go(page, step)

@@ -119,7 +119,7 @@ def test_a_hole_is_chosen_from_the_list_and_explained(surface):
 
 
 @pytest.mark.timeout(900)
-def test_no_answer_is_lost_beside_a_fast_hand(browser, app, monkeypatch):
+def test_no_answer_is_lost_beside_a_fast_hand(tab, monkeypatch):
     monkeypatch.setattr(acknowledgement, "TIMEOUT_S", 600.0)
     asked, ask = [], acknowledgement.DrawAcknowledgement.ask
     monkeypatch.setattr(
@@ -127,25 +127,21 @@ def test_no_answer_is_lost_beside_a_fast_hand(browser, app, monkeypatch):
         "ask",
         lambda self, *of, **how: (asked.append(self), ask(self, *of, **how)),
     )
-    context = browser.new_context(viewport={"width": 900, "height": 640})
-    page = context.new_page()
-    page.goto(f"{app.url}?fixedDpr=1")
-    go(page, "Surface")
-    page.get_by_text("Up to date").wait_for(timeout=PATIENCE_MS)
-    handle = slider(page, "Radius (mm)").bounding_box()
+    afresh(tab)
+    go(tab, "Surface")
+    tab.get_by_text("Up to date").wait_for()
+    handle = slider(tab, "Radius (mm)").bounding_box()
     x, y = handle["x"] + handle["width"] / 2, handle["y"] + handle["height"] / 2
-    page.mouse.move(x, y)
-    page.mouse.down()
+    tab.mouse.move(x, y)
+    tab.mouse.down()
     begun_s = time.monotonic()
     for step in itertools.count():
-        page.mouse.move(x + 40.0 * np.sin(0.06 * step), y)
+        tab.mouse.move(x + 40.0 * np.sin(0.06 * step), y)
         if (step >= 100 and len(asked) > 10) or time.monotonic() - begun_s > DRAG_S:
             break
-    page.mouse.up()
-    answered = all_answered(page, asked)
-    context.close()
+    tab.mouse.up()
     assert len(asked) > 10
-    assert answered
+    assert all_answered(tab, asked)
 
 
 def all_answered(page, asked):

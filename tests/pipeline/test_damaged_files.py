@@ -14,6 +14,7 @@ from tests.pipeline.importing.recordings import orbit, write_tum
 from tests.pipeline.strangers.room import room_cloud
 from tests.pipeline.test_one_room import CLOUDS
 
+pytestmark = pytest.mark.xdist_group("one room")
 LINES = {".xyz", ".obj", ".csv", ".txt", ".asc"}
 """Formats in which the first lines of a file are a file."""
 COUNTED = [kind for kind in CLOUDS if kind.suffix not in LINES]

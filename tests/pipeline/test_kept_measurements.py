@@ -9,12 +9,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from packetmesh.progress import drain
 from pipeline.config import PRESETS, AcquisitionConfig
-from pipeline.io.demos import DEMO_SCENES, load_demo
+from pipeline.io.demos import DEMO_SCENES
 from pipeline.kernels.rays import Camera, hit_depths
-from pipeline.reconstruct import Reconstruction, reconstruct
+from pipeline.reconstruct import Reconstruction, iterate_reconstruction, reconstruct
+from pipeline.sources import Demo, LoadedRig
+from pipeline.spec import Spec
+from pipeline.stages import run
 from pipeline.surface.ray_parts import View, ray_parts
 from pipeline.types import PointSource, Rig
+
+
+def frames_of(scene, store):
+    return drain(run(Spec(Demo(scene)), store, stages=("rig",)))["rig"].value.frames
 
 
 def reconstructed(rig: Rig) -> Reconstruction:
@@ -28,27 +36,27 @@ def assert_nothing_measured_is_spoilt(kept) -> None:
 
 
 @pytest.mark.parametrize("scene", DEMO_SCENES)
-def test_fusion_keeps_what_a_rig_has_measured(scene):
-    assert_nothing_measured_is_spoilt(reconstructed(load_demo(scene)).kept)
+def test_fusion_keeps_what_a_rig_has_measured(scene, store):
+    assert_nothing_measured_is_spoilt(drain(iterate_reconstruction(Spec(Demo(scene)), store)).kept)
 
 
 @pytest.mark.parametrize("scene", DEMO_SCENES)
-def test_fusion_keeps_what_each_node_alone_has_measured(scene):
-    for frame in load_demo(scene).frames:
+def test_fusion_keeps_what_each_node_alone_has_measured(scene, store):
+    for frame in frames_of(scene, store):
         assert_nothing_measured_is_spoilt(reconstructed(Rig(frame.name, (frame,))).kept)
 
 
 @pytest.fixture(scope="module")
-def pair() -> tuple[Rig, Reconstruction]:
-    rig = Rig("pair", load_demo("box-on-table").frames[:1])
+def pair(store) -> tuple[Rig, Reconstruction]:
+    rig = Rig("pair", frames_of("box-on-table", store)[:1])
     return rig, reconstructed(rig)
 
 
-def test_no_inferred_point_lies_in_a_measured_pixel():
+def test_no_inferred_point_lies_in_a_measured_pixel(pair):
     """Not even where the outlier filter has dropped the measurement."""
-    rig = Rig("pair", load_demo("box-on-table").frames[:1])
-    harsh = replace(PRESETS["packetmesh"], acquisition=AcquisitionConfig("thesis"))
-    (node,), (frame,) = reconstruct(rig, harsh).nodes, rig.frames
+    rig, harsh = pair[0], replace(PRESETS["packetmesh"], acquisition=AcquisitionConfig("thesis"))
+    done = drain(run(Spec(LoadedRig(rig), config=harsh), stages=("nodes",)))
+    (node,), (frame,) = done["nodes"].value, rig.frames
     assert len(node.filtered.outliers) > 1000
     u, v = node.fused.select(node.fused.source == PointSource.INFERRED).pixels.T
     assert len(u) > 1000

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import PacketMeshError
-from packetmesh.progress import Progress
+from packetmesh.progress import Progress, drain
 from pipeline.config import PRESETS, AcquisitionConfig, SurfaceConfig
 from pipeline.io.demos import load_demo
 from pipeline.kernels import geometry
 from pipeline.reconstruct import iterate_reconstruction, reconstruct
 from pipeline.registration import point_error_m
-from pipeline.sources import LoadedRig
+from pipeline.sources import Demo, LoadedRig
 from pipeline.spec import Spec
+from pipeline.stages import run
 from pipeline.types import DepthMap, PointSource, Rig
 
 pytestmark = pytest.mark.xdist_group("reconstruct")  # one worker makes the shared reconstruction once
@@ -25,8 +26,13 @@ def rig():
 
 
 @pytest.fixture(scope="module")
-def ours(rig):
-    return reconstruct(rig, PRESETS["packetmesh"])
+def ours(store):
+    return drain(iterate_reconstruction(Spec(Demo("living-room")), store))
+
+
+def stage(name, rig, config=PRESETS["packetmesh"]):
+    """The result of one stage, without those after it."""
+    return drain(run(Spec(LoadedRig(rig), config=config), stages=(name,)))[name].value
 
 
 def test_fusion_fills_holes_and_keeps_what_the_sensor_measured(ours):
@@ -48,8 +54,8 @@ def test_registration_corrects_the_poses_that_the_nodes_believe_in(rig, ours):
 def test_moving_the_whole_rig_moves_the_answer(rig, ours):
     motion = geometry.rigid(geometry.rotation_exp([0.1, -0.4, 0.8]), [1.0, -2.0, 0.5])
     moved_frames = tuple(replace(f, T_world_camera=motion @ f.T_world_camera) for f in rig.frames)
-    moved = reconstruct(replace(rig, frames=moved_frames, truth=None), PRESETS["packetmesh"])
-    for pose, moved_pose in zip(ours.placement.T_world_camera, moved.placement.T_world_camera, strict=True):
+    moved = stage("placement", replace(rig, frames=moved_frames, truth=None))
+    for pose, moved_pose in zip(ours.placement.T_world_camera, moved.T_world_camera, strict=True):
         np.testing.assert_allclose(moved_pose, motion @ pose, atol=1e-9)
 
 
@@ -61,7 +67,7 @@ def test_the_same_input_gives_the_same_bits(rig):
 
 
 def test_the_thesis_preset_joins_both_clouds_whole(rig):
-    node = reconstruct(Rig("pair", rig.frames[:1]), PRESETS["thesis"]).nodes[0]
+    (node,) = stage("nodes", Rig("pair", rig.frames[:1]), PRESETS["thesis"])
     assert len(node.fused) == len(node.sensor) + len(node.inferred)
     assert node.inferred_registration is not None
 
@@ -81,12 +87,12 @@ def test_progress_rises_and_an_abandoned_run_stops(rig):
 def test_a_node_that_overlaps_nothing_keeps_its_believed_pose_and_says_so(rig):
     away = geometry.rigid(np.eye(3), [500.0, 0.0, 0.0])
     frames = (rig.frames[0], replace(rig.frames[1], T_world_camera=away))
-    result = reconstruct(Rig("apart", frames), PRESETS["packetmesh"])
-    assert not result.placement.registrations[0].result.converged
-    np.testing.assert_allclose(result.placement.T_world_camera[1], away, atol=1e-9)
-    assert all(verdict.placed for verdict in result.placement.verdicts)
-    assert all("by its given pose alone" in sentence for sentence in result.placement.sentences)
-    assert len(result.placement.sentences) == 2
+    placement = stage("placement", Rig("apart", frames))
+    assert not placement.registrations[0].result.converged
+    np.testing.assert_allclose(placement.T_world_camera[1], away, atol=1e-9)
+    assert all(verdict.placed for verdict in placement.verdicts)
+    assert all("by its given pose alone" in sentence for sentence in placement.sentences)
+    assert len(placement.sentences) == 2
 
 
 def test_depth_without_a_value_is_one_sentence(rig):
@@ -97,9 +103,9 @@ def test_depth_without_a_value_is_one_sentence(rig):
     assert "\n" not in str(error.value)
 
 
-def test_a_ball_that_falls_through_leaves_an_empty_surface_and_all_rays_miss(rig):
+def test_a_ball_that_falls_through_leaves_an_empty_surface_and_all_rays_miss(store):
     config = replace(PRESETS["packetmesh"], surface=SurfaceConfig("manual", (1e-5,)))
-    result = reconstruct(rig, config)
+    result = drain(iterate_reconstruction(Spec(Demo("living-room"), config=config), store))
     for surface in (result.before, result.after):
         assert len(surface.triangles) == 0
         assert surface.quality.no_hit_ray_share == 1.0
@@ -111,6 +117,6 @@ def test_a_harsher_filter_keeps_fewer_points(rig):
     def kept(t: float) -> int:
         acquisition = AcquisitionConfig(outlier_mode="thesis", outlier_t=t)
         config = replace(PRESETS["packetmesh"], acquisition=acquisition)
-        return len(reconstruct(Rig("pair", rig.frames[:1]), config).nodes[0].sensor)
+        return len(stage("nodes", Rig("pair", rig.frames[:1]), config)[0].sensor)
 
     assert kept(0.5) < kept(3.0)

@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 
 from app.dock.plots import Sheet
 from app.drawing.colors import BRAND, DELIVERED, INFERRED, LOSS, NEUTRAL, css
+from app.drawing.plots import styled_figure
 from app.screens.calibrate.noise_view import CLOSE, INSIDE_95, NoiseView
 from app.screens.calibrate.numbers import MEANING, UNITS
 from app.web.markup import Markup
@@ -90,9 +91,7 @@ def errors_html(view: NoiseView, cell: Cell | None) -> Markup:
 
 def scatter_figure(view: NoiseView, x: str, y: str, cell: Cell | None) -> go.Figure:
     """Plot the trials, the truth as a cross, and the ellipse that should hold 95 % of them."""
-    figure = go.Figure()
-    figure.update_layout(
-        template="plotly_white",
+    figure = styled_figure(
         margin={"l": 78, "r": 14, "t": 8, "b": 52},
         xaxis=_axis(view, x, cell),
         yaxis=_axis(view, y, cell),

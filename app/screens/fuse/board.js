@@ -60,11 +60,12 @@
       const value = make("b", "", number);
       const unit = make("span", "", number);
       const note = make("div", "note", head);
+      const verdict = make("div", "verdict", head);
       const answer = make("div", "answer", head, {hidden: true});
       make("p", "", answer, {textContent: about});
       make("p", "source", answer, {textContent: source});
       ask.addEventListener("click", () => { answer.hidden = !answer.hidden; });
-      const made = {head, value, unit, note, seen: new Uint8Array()};
+      const made = {head, value, unit, note, verdict, seen: new Uint8Array()};
       if (this.lens) {
         const lens = make("div", "lens", lane);
         const caption = make("div", "caption", lens);
@@ -106,6 +107,7 @@
         lane.value.textContent = said.number;
         lane.unit.textContent = said.unit;
         lane.note.textContent = said.note;
+        lane.verdict.textContent = said.verdict;
         lane.head.dataset.state = said.state;
         lane.seen = bytes(said.lens);
         if (lane.glass) this.drawLens(lane);

@@ -106,7 +106,7 @@ def scale(reference: Reference) -> dict[str, Any]:
 def score(lane: RaceLane, row: int) -> dict[str, str]:
     """Return the error of a lane at one of its steps, and whether it has arrived."""
     step, ended = lane.steps[row], row == len(lane.steps) - 1
-    number, unit = distance_text(step)
+    distance, unit = distance_text(step)
     state, note = "running", f"iteration {row} of {lane.iterations}"
     if ended and step.point_error_m is not None:
         arrived = step.point_error_m < SUCCESS_M
@@ -115,7 +115,8 @@ def score(lane: RaceLane, row: int) -> dict[str, str]:
     elif ended:
         note = f"stopped · {lane.iterations} iterations"
     of = "off" if step.point_error_m is not None else "to the nearest point"
-    return {"number": number, "unit": f"{unit} {of}", "note": note, "state": state}
+    verdict = f"RMSE {_cm(step.rmse_m)} · {lane.verdict_text}" if ended else ""
+    return {"number": distance, "unit": f"{unit} {of}", "note": note, "state": state, "verdict": verdict}
 
 
 def distance_text(step: RaceStep) -> tuple[str, str]:
@@ -124,3 +125,7 @@ def distance_text(step: RaceStep) -> tuple[str, str]:
     if step.off_m != step.off_m:
         return UNKNOWN, ""
     return number(step.off_m, OFF_DIGITS, scale=100.0), "cm"
+
+
+def _cm(distance_m: float) -> str:
+    return number(distance_m, OFF_DIGITS, "cm", 100.0)

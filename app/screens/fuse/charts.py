@@ -142,7 +142,8 @@ def _caption(lane: RaceLane, shown: PairHistogram) -> Markup:
         parts.append(
             Markup("<b style='color:{}'>┅ kernel f</b>, σ = {:.1f} cm").format(KERNEL, 100 * shown.sigma_m)
         )
-        parts.append(Markup("<b style='color:{}'>━ weight w = −p log p</b>").format(WEIGHT))
+        normals = ", p also with the normals" if lane.rival == ("ceicp-a", "plane") else ""
+        parts.append(Markup("<b style='color:{}'>━ weight w = −p log p</b>{}").format(WEIGHT, normals))
     else:
         parts.append(Markup("<b style='color:{}'>━ weight w</b> (no kernel f)").format(WEIGHT))
     text = Markup(" · ").join(parts)

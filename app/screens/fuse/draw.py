@@ -20,12 +20,13 @@ from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.types import ByteArray, FloatArray
 
 FAINT, STRONG = np.array([235.0, 235.0, 235.0]), np.array([20.0, 20.0, 20.0])
-POINT_M = 0.011
+POINT_M, ROOM_POINT_M = 0.011, 0.022
+"""Size of a drawn point, in a scene and in a made room, which is larger and has fewer points."""
 PALETTE = ramp(np.arange(256.0), 255.0, DISTANCE_STOPS)
 """RGB of every shade of a distance."""
 FOV_RAD = np.radians(25.0)
 """Field of view of a race: small, so that all lanes are seen from the same side."""
-HEAD, HEAD_PX = 0.2, 78.0
+HEAD, HEAD_PX = 0.225, 88.0
 """Space for names and numbers: share of the picture's height, and at least so many px (``board.css``)."""
 FOOT, WHOLE_FOOT = 0.58, 0.95
 """Lower edge of the clouds over the picture's height, from the top: with and without magnified corner."""
@@ -35,6 +36,10 @@ ASPECT, HEIGHT_PX = 1.5, 600.0
 """Aspect and height of the picture while no browser is connected."""
 MARGIN = 0.04
 """Free margin on each side, over a lane's width and the picture's height."""
+ROOM_STAGE = Stage(
+    np.array([0.0, -2.0, 3.6]), np.zeros(3), np.array([1.0, 0.0, 0.0]), 8.0, np.array([0.0, 0.0, 2.0])
+)
+"""Viewpoint for a made room: from above and from the side along which x runs to the right."""
 FITTED = 2_000
 """Number of cloud points that must fit into the picture."""
 
@@ -46,6 +51,7 @@ class RaceDrawing:
         clear(scene, below)
         self._scene, self._below, self._view = scene, below, view
         self._extent = _extent_of(view, stage)
+        point_m = ROOM_POINT_M if stage is ROOM_STAGE else POINT_M
         self._foot = WHOLE_FOOT if view.lens is None else FOOT
         self._lanes: list[viser.FrameHandle] = []
         self._sources: list[viser.PointCloudHandle] = []
@@ -53,10 +59,10 @@ class RaceDrawing:
         for index, lane in enumerate(view.lanes):
             name, first = f"{below}/lane{index}", lane.steps[0]
             self._lanes.append(scene.add_frame(name, show_axes=False))
-            add_cloud(scene, f"{name}/target", view.target, np.eye(4), NEUTRAL, POINT_M)
+            add_cloud(scene, f"{name}/target", view.target, np.eye(4), NEUTRAL, point_m)
             moving = replace(view.source, colors=PALETTE[first.shades])
             self._sources.append(
-                add_cloud(scene, f"{name}/source", moving, first.T_target_source, size_m=POINT_M)
+                add_cloud(scene, f"{name}/source", moving, first.T_target_source, size_m=point_m)
             )
             if view.lens is not None:
                 self._add_ring(f"{name}/ring", view.lens)

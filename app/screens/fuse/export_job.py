@@ -12,13 +12,14 @@ from app.drawing.colors import MOST_DISTANCE_M
 from app.reports.hand_out import viewpoint_of
 from app.reports.race import RaceRun, RaceShow, race_page
 from app.reports.race_animation import race_animation
-from app.screens.fuse.labels import OFF_FROM
+from app.screens.fuse.labels import MODES, OFF_FROM
 from app.screens.fuse.methods import color_of
-from app.screens.fuse.numbers import verdict
+from app.screens.fuse.numbers import winner
 from app.screens.fuse.race_job import race_job
 from app.screens.fuse.view import SUCCESS_M, Race, RaceLane, RaceView
 from packetmesh.progress import Progress
 from pipeline.kernels.geometry import apply
+from pipeline.types import Rig
 
 
 def page_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, bytes]:
@@ -37,11 +38,17 @@ def animation_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, N
 def _show(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, RaceShow]:
     (rig,) = yield from store.stages(spec, "rig")
     view = yield from race_job(store, spec, race)
+    return race_show(view, _title(rig, race))
+
+
+def _title(rig: Rig, race: Race) -> str:
     names = [frame.name for frame in rig.frames]
-    who = f"{names[race.source]} onto {names[race.target]}"
+    if race.mode == "nodes":
+        return f"{rig.name}: {names[race.source]} onto {names[race.target]}"
     if race.mode == "inferred":
-        who = f"the inferred cloud of {names[race.source]} onto what its sensor measured"
-    return race_show(view, f"{rig.name}: {who}")
+        return f"{rig.name}: the inferred cloud of {names[race.source]} onto what its sensor measured"
+    room = next(name for name, mode in MODES.items() if mode == race.mode)
+    return f"{room}: one scan onto the other"
 
 
 def race_show(view: RaceView, title: str) -> RaceShow:
@@ -55,7 +62,7 @@ def race_show(view: RaceView, title: str) -> RaceShow:
     what = f"Distance {OFF_FROM[view.reference]}"
     return RaceShow(
         title=title,
-        sentence=verdict(view.reference, view.lanes).replace("**", "").unescape(),
+        sentence=winner(view.reference, view.lanes).replace("**", "").unescape(),
         source_m=view.source.points_m,
         target_m=target_m,
         view=viewpoint_of([T], seen_m[inside], cameras_in_sight=False),

@@ -9,7 +9,13 @@ from app.web.markup import Markdown
 from app.window.controls import Choice
 from pipeline.config import Direction, Method, Metric
 
-MODES: dict[str, RaceMode] = {"node on node": "nodes", "inferred on sensor": "inferred"}
+MODES: dict[str, RaceMode] = {
+    "node on node": "nodes",
+    "inferred on sensor": "inferred",
+    "corridor": "corridor",
+    "square room": "square",
+    "mirrored room": "mirrored",
+}
 DIRECTIONS: dict[str, Direction] = {
     "from source to target": "q2p",
     "from target to source": "p2q",

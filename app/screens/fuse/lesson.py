@@ -38,6 +38,9 @@ def _races(key: str, read: Callable[[str], Any]) -> Setting[RaceLook]:
     return lambda look, text: replace(look, race=replace(look.race, **{key: read(text)}))
 
 
+_VECTOR = " ".join([rf"(-?{NUMBER[1:-1]})"] * 3)
+
+
 def _methods(text: str) -> tuple[Rival, ...]:
     names = {name.lower().replace(",", ""): rival for name, rival in RIVALS.items()}
     rivals = tuple(choice(names)(part.strip().lower()) for part in text.split(","))
@@ -51,8 +54,14 @@ def _start(text: str) -> Start:
     found = re.fullmatch(rf"{NUMBER} deg {NUMBER} cm", text)
     if found is not None:
         return Start.towards(float(found[1]), float(found[2]), seed=0)
+    vectors = re.fullmatch(rf"turn {_VECTOR} deg shift {_VECTOR} cm", text)
+    if vectors is not None:
+        values = [float(value) for value in vectors.groups()]
+        return Start((values[0], values[1], values[2]), (values[3], values[4], values[5]))
     if text not in names:
-        raise ValueError(f"try one of {', '.join(names)} or for example '10 deg 20 cm'")
+        raise ValueError(
+            f"try one of {', '.join(names)} or for example '10 deg 20 cm' or 'turn 0 90 0 deg shift 5 0 0 cm'"
+        )
     return Start.towards(*names[text], seed=0)
 
 
@@ -81,7 +90,7 @@ SETTINGS: dict[str, Setting[RaceLook]] = {
 """The settings of a stop, by their names in the file."""
 
 
-PER_LANE = ("end", "iterations", "time")
+PER_LANE = ("end", "iterations", "time", "rmse", "verdict")
 NUMBERS = (
     *(f"{name}_{lane}" for name in PER_LANE for lane in range(1, MOST_LANES + 1)),
     *("begin", "turn", "shift", "holes", "bias", "noise", "more", "others"),
@@ -98,6 +107,8 @@ def numbers(scene: str, race: Race, view: RaceView) -> Numbers:
         values[f"end_{place}"] = number(lane.steps[-1].off_m, 2, "cm", 100.0)
         values[f"iterations_{place}"] = str(lane.iterations)
         values[f"time_{place}"] = number(lane.elapsed_s, 0, "ms", 1000.0)
+        values[f"rmse_{place}"] = number(lane.steps[-1].rmse_m, 1, "cm", 100.0)
+        values[f"verdict_{place}"] = lane.verdict_text
     values |= {
         "begin": number(view.lanes[0].steps[0].off_m, 1, "cm", 100.0),
         "turn": f"{np.linalg.norm(race.start.turn_deg):.0f}°",

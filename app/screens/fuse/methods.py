@@ -86,9 +86,9 @@ METHODS: dict[str, About] = {
     ),
     "ceicp-a": About(
         (0, 158, 100),
-        "Pairs weigh −p log p, with p falling with their distance. The scale shrinks at every iteration, so "
-        "far pairs soon cease to count.",
-        f"{_THESIS}, made free of units; the shrinking scale is ours (SPEC 4.4)",
+        "Pairs weigh −p log p, with p falling with their distance and, with the plane metric, with the angle "
+        "between their normals. The scale shrinks at every iteration, so far pairs soon cease to count.",
+        f"{_THESIS}, made free of units; the shrinking scale and the normals are ours (SPEC 4.4, 4.11)",
     ),
     "ceicp-r": About(
         (128, 138, 40),

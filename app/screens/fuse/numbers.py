@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from app.drawing.colors import css
 from app.screens.fuse.labels import MARKS, OFF_FROM
 from app.screens.fuse.methods import color_of
 from app.screens.fuse.view import OFF_DIGITS, SUCCESS_M, FuseView, RaceLane, Reference, RegistrationRow
@@ -20,7 +21,7 @@ _OFF: dict[Reference, tuple[str, str]] = {
 }
 
 
-def verdict(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markdown:
+def winner(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markdown:
     """Return a sentence on which method ends nearest to the reference position."""
     if reference == "cloud":
         return Markdown(
@@ -61,7 +62,10 @@ def _loss(ranking: list[tuple[float, str]]) -> str:
 
 
 def race_table(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markup:
-    """Return a table with a column for each lane; every row's name has an explanation."""
+    """Return a table with a column for each lane, and the reasons of the verdicts that are not sure.
+
+    Every row's name has an explanation.
+    """
 
     def row(name: str, hint: str, value: Callable[[RaceLane], str]) -> Row:
         return (name, hint, *(value(lane) for lane in lanes))
@@ -98,6 +102,12 @@ def race_table(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markup:
             lambda x: number(x.steps[-1].rmse_m, 2, "cm", 100),
         ),
         row(
+            "Verdict",
+            "Whether to believe the end pose, judged by the clouds alone: sure, doubtful, or none if "
+            "nothing speaks for it.",
+            lambda x: x.verdict,
+        ),
+        row(
             "Eff. pairs",
             "Effective pairs of the last matching, (Σw)² / Σw²: this number of equal weights would have "
             "the same effect.",
@@ -109,7 +119,21 @@ def race_table(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markup:
             lambda x: number(x.elapsed_s, 0, "ms", 1000),
         ),
     ]
-    return table(rows, MARKS[: len(lanes)], [color_of(lane.rival) for lane in lanes])
+    return table(rows, MARKS[: len(lanes)], [color_of(lane.rival) for lane in lanes]) + _doubts(lanes)
+
+
+def _doubts(lanes: tuple[RaceLane, ...]) -> Markup:
+    """Return a line for each lane whose end pose is not sure, with the reasons; empty if all are."""
+    lines = [
+        Markup("<b style='color: {}'>{}</b> {}.").format(css(color_of(lane.rival)), mark, lane.verdict_text)
+        for mark, lane in zip(MARKS, lanes, strict=False)
+        if lane.reasons
+    ]
+    if not lines:
+        return Markup("")
+    return Markup("<div style='padding: 0 0.8em 0.8em; font-size: 13px'>{}</div>").format(
+        Markup("<br>").join(lines)
+    )
 
 
 def _stop_word(reason: str) -> str:

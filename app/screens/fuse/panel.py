@@ -19,7 +19,7 @@ from app.lesson.player import LessonFolder
 from app.screens.fuse.board import Board
 from app.screens.fuse.capture import CaptureFolder
 from app.screens.fuse.charts import RaceCharts
-from app.screens.fuse.draw import NodesDrawing, RaceDrawing, RaceFraming, gizmo_pose
+from app.screens.fuse.draw import ROOM_STAGE, NodesDrawing, RaceDrawing, RaceFraming, gizmo_pose
 from app.screens.fuse.export import race_offers
 from app.screens.fuse.labels import (
     ADVANCED,
@@ -34,7 +34,7 @@ from app.screens.fuse.labels import (
     TEXT,
 )
 from app.screens.fuse.lesson import NUMBERS, SETTINGS, SHIPPED, RaceLook, numbers
-from app.screens.fuse.numbers import places_table, race_table, verdict
+from app.screens.fuse.numbers import places_table, race_table, winner
 from app.screens.fuse.place import moment_of, moment_text, race_of, race_text
 from app.screens.fuse.player import END, RacePlayer
 from app.screens.fuse.setup import RaceSetup
@@ -87,7 +87,7 @@ class FusePanel(Panel):
         self._setup.add_preset()
         self._player = RacePlayer(self.ui, self._moved, self._clocked)
         self._board = Board(self.ui)
-        self._verdict = gui.add_markdown(Markdown(""))
+        self._winner = gui.add_markdown(Markdown(""))
         self._table = gui.add_html(Markup(""))
         self._charts = RaceCharts(self.ui)
         self._build_folders()
@@ -157,7 +157,7 @@ class FusePanel(Panel):
 
     def _choose_nodes(self, names: list[str]) -> None:
         single = len(names) == 1
-        options = tuple(name for name, mode in RACES.items() if mode == "inferred" or not single)
+        options = tuple(name for name, mode in RACES.items() if mode != "nodes" or not single)
         with self.ui.atomic():
             self._single.visible = single
             if self._shown.options != (*options, RESULT, BEFORE):
@@ -181,7 +181,7 @@ class FusePanel(Panel):
     def _take_stop(self, stop: RaceLook) -> None:
         """Set the controls for a stop of the lesson, and race."""
         single = RACE_NAMES["nodes"] not in self._shown.options
-        race = replace(stop.race, mode="inferred") if single else stop.race
+        race = replace(stop.race, mode="inferred") if single and stop.race.mode == "nodes" else stop.race
         with self.ui.atomic():
             self._shown.value = RACE_NAMES[race.mode]
             self._setup.write(race)
@@ -267,7 +267,7 @@ class FusePanel(Panel):
         with self.ui.atomic():
             clear(self.scene, "/fuse/race")
             self._board.load(None)
-            self._verdict.content = Markdown("")
+            self._winner.content = Markdown("")
             self._table.content = self._rows.content = Markup("")
             self._capture.forget()
 
@@ -289,7 +289,7 @@ class FusePanel(Panel):
             self._seen = ()
             self._place_gizmo()
             self._board.load(view)
-            self._verdict.content, self._table.content = RUNNING, Markup("")
+            self._winner.content, self._table.content = RUNNING, Markup("")
             self._player.load(view.lanes, view.reference)
             self._player.seek_at(self._seek_at)
             self._seek_at = 0.0
@@ -315,7 +315,7 @@ class FusePanel(Panel):
             self._board.mark(self._seen)
             self._charts.mark(float(clock.shown(np.array(now_ns))), self._seen)
             if now_ns >= clock.end_ns and self._view is not None:
-                self._verdict.content = verdict(self._view.reference, self._view.lanes)
+                self._winner.content = winner(self._view.reference, self._view.lanes)
                 self._table.content = race_table(self._view.reference, self._view.lanes)
 
     # The gizmo.
@@ -361,6 +361,9 @@ class FusePanel(Panel):
     # The 3-D view.
 
     def _stage(self) -> Stage:
+        """Return the viewpoint for the race that has arrived: its room, or the scene."""
+        if self._arrived is not None and self._arrived[1].mode not in ("nodes", "inferred"):
+            return ROOM_STAGE
         return stage_of(self.session.results.view("scene").nodes)
 
     def look(self) -> bool:

@@ -12,9 +12,11 @@ from scipy.spatial import cKDTree
 from app.compute.records import sample
 from app.compute.state import Spec
 from app.compute.store import Store
+from app.screens.fuse.belief import Belief
 from app.screens.fuse.job import true_pose
 from app.screens.fuse.lens import Distances, Lens, lens_of, shades_of
 from app.screens.fuse.methods import label_of
+from app.screens.fuse.rooms import ROOMS
 from app.screens.fuse.view import (
     PairHistogram,
     Race,
@@ -55,12 +57,13 @@ class Contest:
     T_aligned: FloatArray
     """T_target_source: the reference pose, or the nodes' believed one if it is unknown."""
     T_home: FloatArray | None
-    """The reference pose; None if it is unknown."""
+    """The reference pose, of a mirrored source a reflection; None if it is unknown."""
     reference: Reference
     center_m: FloatArray
     """(3,) centre of the aligned source before it was degraded, target frame."""
     error_points_m: FloatArray
     """(N, 3) points before degradation whose distance from their reference positions is the error."""
+    T_world_target: FloatArray
 
     def start_pose(self, start: Start) -> FloatArray:
         """Return T_target_source of a start: the aligned pose with the start's error."""
@@ -84,20 +87,21 @@ def race_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, 
             yield Progress(f"race: {label_of(rival)}", 0.9 * index / len(race.rivals))
             runs.append(_run(contest, race, rival, spec.config.node_registration))
         edges_m = _edges_m([run.records for run in runs])
-        staying = race.source if race.mode == "inferred" else race.target
         source = sample(contest.source.points_m, contest.source.colors, LANE_POINTS)
         distances = Distances(source.points_m, contest.T_home, cKDTree(contest.target.points_m))
         yield Progress("race: a corner to magnify", 0.9)
         lens = lens_of(contest.source.points_m, contest.target.points_m, contest.T_aligned, distances)
+        yield Progress("race: whether to believe the answers", 0.95)
+        belief = Belief(contest.source, contest.target, spec.config.node_registration)
         return RaceView(
             source=source,
             target=sample(contest.target.points_m, contest.target.colors, LANE_POINTS),
-            T_world_target=rig.frames[staying].T_world_camera,
+            T_world_target=contest.T_world_target,
             center_m=contest.center_m,
             edges_m=edges_m,
             lens=None if lens is None else lens.view,
             reference=contest.reference,
-            lanes=tuple(_lane(contest, run, Watch(edges_m, distances, lens)) for run in runs),
+            lanes=tuple(_lane(contest, run, Watch(edges_m, distances, lens), belief) for run in runs),
         )
 
     return (yield from store.remember(("race", *race_key(spec), race), run))
@@ -114,6 +118,8 @@ def contest_of(rig: Rig, nodes: Sequence[NodeClouds], race: Race) -> Contest:
     Raises:
         InputError: the scene has no such node, or source and target are the same node.
     """
+    if race.mode in ROOMS:
+        return _contest_in_room(race)
     last = max(race.source, race.target)
     if last >= len(nodes):
         raise InputError(
@@ -130,8 +136,28 @@ def contest_of(rig: Rig, nodes: Sequence[NodeClouds], race: Race) -> Contest:
         source, target = moving.sensor, nodes[race.target].sensor
         T_home = true_pose(rig, race.source, race.target)
         reference = "cloud" if T_home is None else "truth"
+    staying = race.source if race.mode == "inferred" else race.target
     poses = [frame.T_world_camera for frame in rig.frames]
     T_aligned = geometry.inverse(poses[race.target]) @ poses[race.source] if T_home is None else T_home
+    return _contest(race, source, target, T_aligned, T_home, reference, poses[staying])
+
+
+def _contest_in_room(race: Race) -> Contest:
+    scans = ROOMS[race.mode]()
+    return _contest(
+        race, scans.source, scans.target, scans.T_aligned, scans.T_home, "truth", scans.T_room_target
+    )
+
+
+def _contest(
+    race: Race,
+    source: PointCloud,
+    target: PointCloud,
+    T_aligned: FloatArray,
+    T_home: FloatArray | None,
+    reference: Reference,
+    T_world_target: FloatArray,
+) -> Contest:
     how = Degradation(
         noise_m=race.noise_m,
         outlier_share=race.outlier_share,
@@ -147,6 +173,7 @@ def contest_of(rig: Rig, nodes: Sequence[NodeClouds], race: Race) -> Contest:
         reference=reference,
         center_m=geometry.apply(T_aligned, source.points_m.mean(axis=0, keepdims=True))[0],
         error_points_m=_every(source.points_m, ERROR_POINTS),
+        T_world_target=T_world_target,
     )
 
 
@@ -206,13 +233,14 @@ def _edges_m(runs: Sequence[Sequence[RegistrationStep]]) -> FloatArray:
     return np.linspace(0.0, min(max([0.1, *reaches_m]), MOST_BINNED_M), BINS + 1)
 
 
-def _lane(contest: Contest, run: _Run, watch: Watch) -> RaceLane:
+def _lane(contest: Contest, run: _Run, watch: Watch, belief: Belief) -> RaceLane:
     steps, T, time_s = [], run.T_start, 0.0
     for record, done_s in zip(run.records, run.seconds, strict=True):
         steps.append(_race_step(record, T, time_s, contest, watch))
         T, time_s = record.T_target_source, float(done_s)
     steps.append(_end_step(steps[-1] if steps else None, T, time_s, contest, watch))
     moved_m = geometry.apply(T, _every(contest.source.points_m, HAUSDORFF_POINTS))
+    verdict = belief.verdict(T)
     return RaceLane(
         rival=run.rival,
         label=label_of(run.rival),
@@ -223,6 +251,8 @@ def _lane(contest: Contest, run: _Run, watch: Watch) -> RaceLane:
         elapsed_s=time_s,
         average_hausdorff_m=average_hausdorff_m(moved_m, _every(contest.target.points_m, HAUSDORFF_POINTS)),
         effective_pairs=run.records[-1].effective_pairs if run.records else 0.0,
+        verdict=verdict.word,
+        reasons=verdict.reasons,
     )
 
 

@@ -158,9 +158,10 @@ class RaceSetup:
                 handle.value = names[index]
 
     def choose_mode(self, mode: RaceMode) -> None:
-        """Race two nodes, or one node's inferred cloud."""
+        """Race two nodes, one node's inferred cloud, or the scans of a made room, which has no nodes."""
         self._race = replace(self._race, mode=mode)
-        self._target.disabled = mode == "inferred"
+        self._source.disabled = mode not in ("nodes", "inferred")
+        self._target.disabled = mode != "nodes"
 
     def write(self, race: Race) -> None:
         """Show another race, between the nodes that are chosen."""

@@ -11,8 +11,9 @@ from app.compute.records import Sample
 from pipeline.config import Direction, Method, Metric
 from pipeline.types import ByteArray, FloatArray, IntArray
 
-RaceMode = Literal["nodes", "inferred"]
-"""nodes: one node's sensor cloud onto another's; inferred: a node's inferred cloud onto its sensor cloud."""
+RaceMode = Literal["nodes", "inferred", "corridor", "square", "mirrored"]
+"""nodes: one node's sensor cloud onto another's; inferred: a node's inferred cloud onto its sensor cloud;
+otherwise two scans of a made room (``rooms.py``)."""
 
 Reference: TypeAlias = Literal["truth", "pixels", "cloud"]
 """Reference of a race's errors: the points' true positions; the pixels at which they were inferred, which
@@ -161,6 +162,15 @@ class RaceLane:
     """Average Hausdorff distance between the moved source and the target, at the end."""
     effective_pairs: float
     """Effective number of pairs in the last matching."""
+    verdict: Literal["sure", "doubtful", "none"]
+    """Whether to believe the end pose, judged without the truth (SPEC 4.12)."""
+    reasons: tuple[str, ...]
+    """Why it is not sure; empty if it is."""
+
+    @property
+    def verdict_text(self) -> str:
+        """The verdict with its reasons."""
+        return f"{self.verdict}: {'; '.join(self.reasons)}" if self.reasons else self.verdict
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 
 from app.drawing.colors import BRAND, DELIVERED, INFERRED, LOSS, NEUTRAL, SOURCE, TARGET, css
 from app.drawing.marks import add_bars, bar_figure, mark
+from app.drawing.plots import styled_figure
 from app.screens.surface.view import SpacingView, SweepView
 from app.web.markup import Markdown
 from pipeline.surface.findings import SweepPoint
@@ -32,10 +33,8 @@ def sweep_figure(view: SweepView | None, below: str = WORK) -> go.Figure:
         view: the balls; None gives an empty figure.
         below: one of ``BELOW``.
     """
-    figure = go.Figure()
     left, right = ("triangles", "ball, ms") if below == WORK else ("unused, %", "holes, m²")
-    figure.update_layout(
-        template="plotly_white",
+    figure = styled_figure(
         margin={"l": 48, "r": 48, "t": 20, "b": 36},
         xaxis=_radius_axis(view),
         yaxis={"title": _colored_title(("no hit", NO_HIT), ("≤ 1 cm, %", ACCURATE)), "range": [0, 104]},

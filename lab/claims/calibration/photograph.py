@@ -31,7 +31,7 @@ def photograph(board: Board, T_camera_board: FloatArray, camera: CameraIntrinsic
     T = T_camera_board
     plane = np.column_stack([T[:3, 0], T[:3, 1], T[:3, 3]])
     lens = (*camera.matrix.ravel().tolist(), *camera.distortion.tolist())
-    on_board = np.linalg.solve(plane, _rays(lens, camera.width_px, camera.height_px))
+    on_board = np.linalg.inv(plane) @ _rays(lens, camera.width_px, camera.height_px)
     at_px = sheet_px(board, (on_board[:2] / on_board[2]).T)
     shape = (OVER * camera.height_px, OVER * camera.width_px)
     x, y = (column.reshape(shape).astype(np.float32) for column in at_px.T)

@@ -30,8 +30,10 @@ def pair(depth=PAIR / "depth.png"):
 def pair_run(tmp_path_factory):
     """One single-pair run, in its own process as a user would start it."""
     out = tmp_path_factory.mktemp("run")
-    command = [sys.executable, "-m", "app.cli", "reconstruct", "--out", str(out), "--json"]
-    finished = subprocess.run([*command, *pair()], capture_output=True, text=True, timeout=120)
+    command = [sys.executable, "-m", "app.cli", "reconstruct", "--out", str(out), "--json", *pair()]
+    finished = subprocess.run(
+        [*command, "--set", "surface.max_points=8000"], capture_output=True, text=True, timeout=120
+    )
     assert finished.returncode == 0, finished.stderr
     return out, json.loads(finished.stdout), finished.stderr
 

@@ -14,13 +14,14 @@ import numpy as np
 import pytest
 
 from app.cli.runs import RigTask, reconstruct_one
+from packetmesh.settings import with_settings
 from pipeline.config import PipelineConfig
 from pipeline.io.clouds import read_cloud, write_cloud
-from pipeline.io.demos import load_demo
 from pipeline.io.rigs import save_rig
-from pipeline.types import PointCloud, Rig
+from pipeline.types import PointCloud
 from tests.app.commands import check_one_sentence, run
 from tests.paths import ROOT
+from tests.pipeline.delivery.small import small_rig
 
 QUICK = ("--set", "surface.max_points=3000")
 ROOM_BYTES = 10_000
@@ -44,7 +45,7 @@ def disk_with_room(size):
 def rig(tmp_path_factory):
     """One node."""
     folder = tmp_path_factory.mktemp("rig") / "office"
-    save_rig(folder, Rig("office", load_demo("office").frames[:1]))
+    save_rig(folder, replace(small_rig(nodes=1), truth=None))
     return folder
 
 
@@ -135,7 +136,7 @@ DAMAGE = {
 @pytest.fixture(scope="module")
 def task(rig, tmp_path_factory):
     """A rig of many, done once."""
-    settings = PipelineConfig()
+    settings = with_settings(PipelineConfig(), QUICK[1:])
     task = RigTask("office", str(rig), str(tmp_path_factory.mktemp("many")), "packetmesh", settings, None)
     assert reconstruct_one(task).state == "done"
     assert reconstruct_one(task).state == "kept"

@@ -15,6 +15,7 @@ from pipeline.io.demos import load_demo
 from pipeline.io.rigs import is_rig, save_rig
 from pipeline.types import Rig
 from tests.app.commands import check_one_sentence, run
+from tests.pipeline.delivery.small import small_frame, small_rig
 
 QUICK = ("--set", "surface.max_points=3000")
 
@@ -23,7 +24,7 @@ QUICK = ("--set", "surface.max_points=3000")
 def rigs(tmp_path_factory):
     """A rig of one node, a recording of TUM's kind made from another node, and a rig without images."""
     folder = tmp_path_factory.mktemp("rigs")
-    first, second = load_demo("office").frames[:2]
+    first, second = small_rig().frames
     save_rig(folder / "a-rig", Rig("a", (first,)))
     save_rig(folder / "made", Rig("b", (second,)))
     tum = folder / "b-recording"
@@ -36,6 +37,16 @@ def rigs(tmp_path_factory):
     (folder / "c-empty" / "node_00").mkdir(parents=True)
     (folder / "notes.txt").write_text("no rig")
     return folder
+
+
+def run_here(do, tasks, *_, **__):
+    """In place of ``run_batch`` where it is not the processes that matter."""
+    return enumerate(map(do, tasks))
+
+
+@pytest.fixture
+def in_this_process(monkeypatch):
+    monkeypatch.setattr("app.cli.runs.run_batch", run_here)
 
 
 def table(out):
@@ -63,7 +74,7 @@ def test_every_good_one_is_done_and_a_bad_one_gets_a_sentence(capsys, rigs, tmp_
     assert 'href="a-rig/report.html"' in page
 
 
-def test_the_same_again_goes_on_and_other_settings_begin_anew(capsys, rigs, tmp_path):
+def test_the_same_again_goes_on_and_other_settings_begin_anew(capsys, rigs, tmp_path, in_this_process):
     out = tmp_path / "out"
     words = ["reconstruct", "--rigs", rigs, "--out", out, "--depth-scale", "1000"]
     run(capsys, *words, *QUICK)
@@ -88,6 +99,7 @@ def test_a_cluster_of_two_workers_gives_the_same_surfaces(capsys, rigs, tmp_path
         words = ["reconstruct", "--rigs", "rigs", "--depth-scale", "1000", *QUICK, "--json"]
         code, spread, _ = run(capsys, *words, "--out", "spread", "--scheduler", cluster.scheduler_address)
     assert code == 1
+    monkeypatch.setattr("app.cli.runs.run_batch", run_here)
     _, local, _ = run(capsys, *words, "--out", "local")
     rows = json.loads(spread)
     assert [row["state"] for row in rows] == ["done", "done", "failed"]
@@ -96,15 +108,15 @@ def test_a_cluster_of_two_workers_gives_the_same_surfaces(capsys, rigs, tmp_path
 
 
 def test_an_error_of_the_program_and_a_rig_that_failed_are_rows_and_the_table_is_written(
-    capsys, rigs, tmp_path, monkeypatch
+    capsys, rigs, tmp_path, monkeypatch, in_this_process
 ):
     """Two rooms are no rig; an exception that nobody foresaw leaves a log; both are not done twice."""
-    two = (replace(load_demo(scene).frames[0], pose_known=False) for scene in ("office", "living-room"))
+    rooms = (load_demo(scene).frames[0] for scene in ("office", "living-room"))
+    two = (replace(small_frame(frame), pose_known=False) for frame in rooms)
     folder = tmp_path / "rigs"
     shutil.copytree(rigs / "a-rig", folder / "a-rig")
     save_rig(folder / "b-strangers", Rig("b", tuple(two)))
     out = tmp_path / "out"
-    monkeypatch.setattr("app.cli.runs.run_batch", lambda do, tasks, *_, **__: enumerate(map(do, tasks)))
     words = ["reconstruct", "--rigs", folder, "--out", out, *QUICK]
     with monkeypatch.context() as broken:
         broken.setattr("pipeline.stages.acquire", nothing)

@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from app.cli.register import EXIT_CODES
 from pipeline.io.clouds import read_cloud, write_cloud
 from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.kernels.open3d_runtime import o3d
@@ -18,6 +19,7 @@ from tests.pipeline.pairs.rooms import room
 
 T_TRUE = rigid(rotation_exp(np.radians(4.0) * np.array([0.6, -0.48, 0.64])), [0.03, -0.02, 0.03])
 KEYS = {"T_target_source", "iterations", "stop_reason", "rmse_m", "average_hausdorff_m", "elapsed_s"}
+EVIDENCE = {"overlap_share", "on_surface_share", "seen_through_share", "height_over_noise", "stiffness"}
 
 
 def run(capsys, *argv: object) -> tuple[int, str, str]:
@@ -37,13 +39,19 @@ def corner(seed: int, count: int = 1200) -> np.ndarray:
     return points_m + rng.normal(scale=0.001, size=points_m.shape)
 
 
+def painted(points_m: np.ndarray) -> np.ndarray:
+    """Colours that change smoothly with the place."""
+    return np.uint8(127.5 + 127.5 * np.sin(4.0 * points_m))
+
+
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     """The same place twice, 4 degrees and 5 cm apart, and the true pose."""
     folder = tmp_path_factory.mktemp("clouds")
-    colors = np.random.default_rng(3).integers(0, 256, (4000, 3), dtype=np.uint8)
-    write_cloud(folder / "source.ply", PointCloud(apply(inverse(T_TRUE), corner(1)), colors))
-    write_cloud(folder / "target.ply", PointCloud(corner(2), colors))
+    source_m, target_m = corner(1), corner(2)
+    moved_m = apply(inverse(T_TRUE), source_m)
+    write_cloud(folder / "source.ply", PointCloud(moved_m, painted(source_m)))
+    write_cloud(folder / "target.ply", PointCloud(target_m, painted(target_m)))
     np.savetxt(folder / "truth.txt", T_TRUE)
     return folder
 
@@ -56,8 +64,12 @@ def test_a_run_leaves_its_pose_numbers_steps_and_cloud(capsys, tmp_path, files):
     assert metrics == json.loads((tmp_path / "metrics.json").read_text())
     assert set(metrics) == {"ceicp-a"}
     row = metrics["ceicp-a"]
-    assert set(row) == KEYS | {"point_error_m", "draws", "spread_m", "draws_agree"}
-    assert row["draws_agree"]
+    words = {"verdict", "verdict_reasons", "start"}
+    assert set(row) == KEYS | EVIDENCE | words | {"point_error_m", "draws", "spread_m"}
+    assert (row["verdict"], row["verdict_reasons"], row["start"]) == ("sure", [], "given")
+    assert row["spread_m"] < 0.003
+    assert row["on_surface_share"] > 0.95
+    assert row["seen_through_share"] == 0.0
     assert row["point_error_m"] < 0.003
     T = np.loadtxt(tmp_path / "transform.txt")
     np.testing.assert_array_equal(T, row["T_target_source"])
@@ -102,20 +114,33 @@ def test_the_alias_and_other_formats_give_the_same_pose(capsys, tmp_path, files)
     np.testing.assert_array_equal(first, second)
 
 
-def test_clouds_that_have_nothing_in_common_end_elsewhere_with_every_draw_and_it_is_said(capsys, tmp_path):
+def test_clouds_that_have_nothing_in_common_are_not_sure_in_words_json_and_exit_code(capsys, tmp_path):
     rng = np.random.default_rng(0)
     for name in ("one", "other"):
         np.savez(tmp_path / f"{name}.npz", points=rng.uniform(0.0, 1.0, (500, 3)))
     clouds = (tmp_path / "one.npz", tmp_path / "other.npz")
     code, out, err = run(capsys, *clouds, "--json", "--out", tmp_path / "out")
     row = json.loads(out)["ceicp-a"]
+    assert code == EXIT_CODES[row["verdict"]]
+    assert row["verdict"] in ("doubtful", "none")
+    assert row["verdict_reasons"]
+    assert err.splitlines()[-1] == f"The pose is {row['verdict']}: {'; '.join(row['verdict_reasons'])}"
+    assert (tmp_path / "out" / "transform.txt").exists()
+
+
+def test_a_cloud_far_away_is_found_by_its_features_and_the_way_is_said(capsys, tmp_path, files):
+    """Fifty metres from a start pose that was given."""
+    np.savez(tmp_path / "far.npz", points=read_cloud(files / "source.ply").points_m + 50.0)
+    np.savetxt(tmp_path / "init.txt", np.eye(4))
+    command = (tmp_path / "far.npz", files / "target.ply", "--init", tmp_path / "init.txt", "--json")
+    code, out, err = run(capsys, *command, "--out", tmp_path / "out")
     assert code == 0
-    assert not row["draws_agree"]
-    assert row["spread_m"] > 0.005
-    assert (
-        f"10 random draws of the points give poses up to {100 * row['spread_m']:.1f} cm"
-        in err.splitlines()[-1]
-    )
+    row = json.loads(out)["ceicp-a"]
+    assert row["start"] == "surfaces"
+    T_true = T_TRUE @ rigid(np.eye(3), [-50.0, -50.0, -50.0])
+    assert point_error_m(np.array(row["T_target_source"]), T_true, corner(1) + 50.0) < 0.005
+    assert "The answer is 86" in err  # sqrt(3) x 50 m
+    assert "from the start pose of --init" in err
 
 
 def test_a_start_pose_a_voxel_and_a_gate_are_heeded(capsys, tmp_path, files):
@@ -170,7 +195,6 @@ def test_a_million_points_are_no_more_work_than_it_takes(capsys, tmp_path):
 
 SQUARE = np.stack([*np.random.default_rng(0).uniform(0, 1, (2, 900)), np.full(900, 2.0)], axis=1)
 BAD_SOURCES = {
-    "no overlap": (corner(1) + 50.0, "No point of the source lies within"),
     "three points": (corner(1)[:3], "3 distinct points; registration needs at least 6"),
     "one point often": (np.ones((500, 3)), "1 distinct points"),
     "all NaN": (np.full((500, 3), np.nan), "no point with finite"),
@@ -278,8 +302,9 @@ def test_a_mirrored_source_is_named(capsys, tmp_path):
     np.savez(tmp_path / "left.npz", points=room(1, 1500) * [-1.0, 1.0, 1.0])
     np.savez(tmp_path / "right.npz", points=room(2, 1500))
     code, _, err = run(capsys, tmp_path / "left.npz", tmp_path / "right.npz", "--out", tmp_path / "out")
-    assert code == 0
-    assert "because one is mirrored: with x negated the source fits to" in err
+    assert code == EXIT_CODES["doubtful"]
+    assert "The pose is doubtful: " in err
+    assert "one cloud is mirrored, since with x negated the source fits" in err
 
 
 def test_columns_may_be_given_once_or_for_each_cloud(capsys, tmp_path, files):

@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 from types import SimpleNamespace
+from typing import get_args
 
 import pytest
 from markdown_it import MarkdownIt
@@ -16,7 +17,7 @@ from app.screens.depth import lesson as depth
 from app.screens.fuse import lesson as fuse
 from app.screens.fuse.labels import STARTS
 from app.screens.fuse.lesson import SETTINGS, SHIPPED, RaceLook
-from app.screens.fuse.view import Race, Start
+from app.screens.fuse.view import Race, RaceMode, Start
 from app.screens.network import lesson as network
 from app.screens.surface import lesson as surface
 from app.window.tables import UNKNOWN
@@ -51,7 +52,7 @@ def test_the_stops_of_the_lesson_that_ships_have_different_titles_and_text():
     shipped = read_lesson(SHIPPED, SETTINGS, RaceLook(), fuse.NUMBERS)
     assert len({stop.title for stop in shipped.stops}) == len(shipped.stops) > 1
     assert all("set:" not in stop.text and len(stop.text) > 100 for stop in shipped.stops)
-    assert {stop.look.race.mode for stop in shipped.stops} == {"nodes", "inferred"}
+    assert {stop.look.race.mode for stop in shipped.stops} == {*get_args(RaceMode)}
     assert any(stop.look.in_ms for stop in shipped.stops)
 
 

@@ -57,16 +57,16 @@ def test_what_is_written_is_read_and_the_clouds_lie_on_each_other(folder):
     np.testing.assert_allclose(problems[1].T_moved[:3, 3], [30.0, 0.0, 0.0])
 
 
-def test_a_small_motion_is_undone_a_far_one_is_not_and_every_problem_has_its_row(folder, tmp_path, capsys):
+def test_a_small_motion_and_a_far_one_are_undone_and_every_problem_has_its_row(folder, tmp_path, capsys):
     bench(tmp_path / "out", problems=folder, json=True)
     printed = json.loads(capsys.readouterr().out)
     with (tmp_path / "out" / "problems.csv").open() as file:
         rows = list(csv.DictReader(file))
     errors = {(row["id"], row["method"]): row["error"] for row in rows}
     assert float(errors["corner_00_000", OURS]) < 0.005
-    assert errors["corner_00_001", OURS] == "" or float(errors["corner_00_001", OURS]) > 1.0
+    assert float(errors["corner_00_001", OURS]) < 0.005  # by features of the surfaces
     ours = next(group for group in printed["summary"] if group["method"] == OURS)
-    assert (ours["problems"], ours["solved_share"]) == (2, 0.5)
+    assert (ours["problems"], ours["solved_share"]) == (2, 1.0)
     assert len(printed["problems"]) == len(rows)
 
 

@@ -14,22 +14,25 @@ from lab.verdicts.session import LENSES, draw_session
 from lab.verdicts.truth import true_error_m, truly_good
 from pipeline.calibration.lens import Optics
 
-SESSIONS = [draw_session(7, number) for number in range(40)]
+
+@pytest.fixture(scope="module")
+def sessions():
+    return [draw_session(7, number) for number in range(40)]
 
 
-def test_all_kinds_of_sessions_are_drawn_and_equal_numbers_give_equal_ones():
-    assert {one.optics.lens for one in SESSIONS} == {one.chosen for one in SESSIONS} == set(LENSES)
-    assert {one.kind for one in SESSIONS} == {"good", "few", "similar"}
-    assert 0 < sum(one.bend_m > 0.0 for one in SESSIONS) < 30
-    assert 0 < sum(one.blurred > 0 for one in SESSIONS) < 30
-    assert min(one.noise_px for one in SESSIONS) < 0.2 < 0.6 < max(one.noise_px for one in SESSIONS)
+def test_all_kinds_of_sessions_are_drawn_and_equal_numbers_give_equal_ones(sessions):
+    assert {one.optics.lens for one in sessions} == {one.chosen for one in sessions} == set(LENSES)
+    assert {one.kind for one in sessions} == {"good", "few", "similar"}
+    assert 0 < sum(one.bend_m > 0.0 for one in sessions) < 30
+    assert 0 < sum(one.blurred > 0 for one in sessions) < 30
+    assert min(one.noise_px for one in sessions) < 0.2 < 0.6 < max(one.noise_px for one in sessions)
     again = draw_session(7, 3)
-    for view, other in zip(SESSIONS[3].views, again.views, strict=True):
+    for view, other in zip(sessions[3].views, again.views, strict=True):
         np.testing.assert_array_equal(view.points_px, other.points_px)
 
 
-def test_points_are_the_true_cameras_with_noise_of_the_given_size():
-    for one in SESSIONS:
+def test_points_are_the_true_cameras_with_noise_of_the_given_size(sessions):
+    for one in sessions:
         seen_px = one.optics.project(one.boards_m)
         off_px = np.concatenate(
             [view.points_px for view in sorted(one.views, key=lambda view: int(view.name.split()[1]))]
@@ -39,23 +42,23 @@ def test_points_are_the_true_cameras_with_noise_of_the_given_size():
         assert ((seen_px >= 0.0) & (seen_px <= np.array(one.size_px) - 1.0)).all()
 
 
-def test_a_right_lens_model_can_hold_the_true_lens():
-    right = {(one.optics.lens, one.chosen) for one in SESSIONS if one.right_lens}
+def test_a_right_lens_model_can_hold_the_true_lens(sessions):
+    right = {(one.optics.lens, one.chosen) for one in sessions if one.right_lens}
     assert ("thesis", "fisheye") not in right
     assert replace(
-        SESSIONS[0], optics=replace(SESSIONS[0].optics, lens="thesis"), chosen="rational"
+        sessions[0], optics=replace(sessions[0].optics, lens="thesis"), chosen="rational"
     ).right_lens
     assert not replace(
-        SESSIONS[0], optics=replace(SESSIONS[0].optics, lens="brown"), chosen="thesis"
+        sessions[0], optics=replace(sessions[0].optics, lens="brown"), chosen="thesis"
     ).right_lens
 
 
-def test_the_true_camera_has_no_error_and_a_longer_one_has_its_share():
+def test_the_true_camera_has_no_error_and_a_longer_one_has_its_share(sessions):
     """1 % more focal length, with boards at about the range: at half the radius r, 1 % of its distance r."""
-    for one in SESSIONS[:6]:
+    for one in sessions[:6]:
         assert true_error_m(one, one.optics).max() < 1e-6
         assert truly_good(one, one.optics)
-    one = next(one for one in SESSIONS if one.optics.lens == "thesis" and one.kind == "similar")
+    one = next(one for one in sessions if one.optics.lens == "thesis" and one.kind == "similar")
     matrix = one.optics.matrix.copy()
     matrix[:2, 2] += 0.01 * matrix[0, 0]
     turned_m = true_error_m(one, Optics("thesis", matrix, one.optics.distortion))

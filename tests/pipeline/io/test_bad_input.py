@@ -14,7 +14,7 @@ from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.meshes import read_mesh, write_mesh
 from pipeline.io.poses import read_pose
 from pipeline.io.rigs import load_rig, save_rig
-from pipeline.types import CameraIntrinsics, DepthMap, PointCloud, RgbdFrame, Rig, Surface
+from pipeline.types import MAX_NODES, CameraIntrinsics, DepthMap, PointCloud, RgbdFrame, Rig, Surface
 
 CAMERA = {"width": 16, "height": 12, "fx": 14.0, "fy": 14.0, "cx": 7.5, "cy": 5.5}
 
@@ -281,9 +281,9 @@ def test_a_rig_without_folder_or_nodes_or_with_too_many(rig_folder):
     (rig_folder / "empty").mkdir()
     with pytest.raises(InputError, match="holds no node; try empty/node_00/"):
         load_rig(rig_folder / "empty")
-    for index in range(2, 7):
+    for index in range(2, MAX_NODES + 1):
         (rig_folder / f"node_{index:02d}").mkdir()
-    with pytest.raises(InputError, match="holds 7 nodes"):
+    with pytest.raises(InputError, match="holds 201 nodes; try to move some away, so that at most 200"):
         load_rig(rig_folder)
 
 

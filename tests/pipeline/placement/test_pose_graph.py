@@ -1,5 +1,7 @@
 """Loops betray a wrong registration, and all right ones together beat the chain."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,13 +9,17 @@ from lab.worlds import box_room
 from pipeline.config import RegistrationConfig
 from pipeline.kernels.geometry import inverse, rigid, rotation_exp
 from pipeline.kernels.open3d_runtime import o3d
-from pipeline.placement.pose_graph import chained, graph_points, pose_edge, solve_pose_graph
+from pipeline.placement.edges import PoseEdge, registration_information
+from pipeline.placement.loops import loops_of, spanning_forest
+from pipeline.placement.pose_graph import optimised, solve_pose_graph
 from pipeline.registration import point_error_m, register
+from pipeline.registration.neighbourhood import pca_normals
 from tests.pipeline.registration.rooms import seen_by
 
 NODES = 6
 APART = 2
 """Nodes up to this far apart on the arc share enough of their views (50 degrees)."""
+STRONG, WEAK = 20.0, 5.0
 
 
 def small_motion(rng: np.random.Generator, angle_rad: float, length_m: float) -> np.ndarray:
@@ -27,7 +33,8 @@ def ring():
     scene = box_room(6, nodes=NODES)
     clouds = seen_by(scene, noise_m=0.002)
     truth = [inverse(scene.cameras[0]) @ camera for camera in scene.cameras]
-    points_m = [graph_points(cloud) for cloud in clouds]
+    points_m = [cloud.points_m[::40] for cloud in clouds]
+    normals = [pca_normals(cloud.points_m) for cloud in clouds]
     rng = np.random.default_rng(4)
     edges = []
     for source in range(NODES):
@@ -35,7 +42,10 @@ def ring():
             T_true = inverse(truth[target]) @ truth[source]
             T_init = small_motion(rng, np.radians(3.0), 0.06) @ T_true
             result = register(clouds[source], clouds[target], RegistrationConfig(), T_init)
-            edges.append(pose_edge(source, target, points_m, result.T_target_source))
+            information = registration_information(
+                result, clouds[source].points_m, normals[source], normals[target]
+            )
+            edges.append(PoseEdge(source, target, result.T_target_source, information, STRONG))
     return points_m, truth, edges
 
 
@@ -44,8 +54,16 @@ def worst_error_m(ring, poses) -> float:
     return max(point_error_m(*pair, points) for *pair, points in zip(poses, truth, points_m, strict=True))
 
 
-def moved(points_m, edge, motion):
-    return pose_edge(edge.source, edge.target, points_m, motion @ edge.T_target_source)
+def moved(edge, motion, strength=STRONG):
+    return replace(edge, T_target_source=motion @ edge.T_target_source, strength=strength)
+
+
+def chain_of(edges):
+    return [edge for edge in edges if edge.source - edge.target == 1]
+
+
+def along(edges):
+    return loops_of(NODES, edges, spanning_forest(NODES, edges, range(len(edges)))).T_root_node
 
 
 def test_a_ring_of_six_closes(ring):
@@ -60,7 +78,7 @@ def test_a_ring_of_six_closes(ring):
 def test_a_broken_edge_is_rejected_and_the_poses_stay_right(ring, broken):
     points_m, _, edges = ring
     damage = small_motion(np.random.default_rng(broken), np.radians(8.0), 0.25)
-    edges = [moved(points_m, edge, damage) if k == broken else edge for k, edge in enumerate(edges)]
+    edges = [moved(edge, damage, WEAK) if k == broken else edge for k, edge in enumerate(edges)]
     graph = solve_pose_graph(points_m, edges)
     assert graph.used == tuple(k != broken for k in range(len(edges)))
     assert graph.loop_error_m[broken] > 0.1
@@ -72,19 +90,18 @@ def test_the_graph_beats_the_chain_on_noisy_edges(ring):
     ratios = []
     for seed in range(10):
         rng = np.random.default_rng(seed)
-        noisy = [moved(points_m, edge, small_motion(rng, np.radians(0.3), 0.01)) for edge in edges]
-        chain = [edge for edge in noisy if edge.source - edge.target == 1]
+        noisy = [moved(edge, small_motion(rng, np.radians(0.3), 0.01)) for edge in edges]
         graph = solve_pose_graph(points_m, noisy)
         assert all(graph.used)
         ratios.append(
-            worst_error_m(ring, graph.T_reference_node) / worst_error_m(ring, chained(NODES, chain))
+            worst_error_m(ring, graph.T_reference_node) / worst_error_m(ring, along(chain_of(noisy)))
         )
     assert np.median(ratios) < 0.8
 
 
 def test_a_tree_is_its_chain_and_has_no_loops(ring):
     points_m, _, edges = ring
-    chain = [edge for edge in edges if edge.source - edge.target == 1]
+    chain = chain_of(edges)
     graph = solve_pose_graph(points_m, chain)
     assert np.isnan(graph.loop_error_m).all()
     pose = np.eye(4)
@@ -107,14 +124,27 @@ def test_the_order_of_the_edges_does_not_matter(ring):
     np.testing.assert_allclose(forward.loop_error_m, backward.loop_error_m[::-1])
 
 
-def test_the_information_is_open3ds(ring):
-    points_m, _, edges = ring
-    for edge in edges:
-        source, target = (
-            o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points_m[node]))
-            for node in (edge.source, edge.target)
+def test_the_poses_are_open3ds(ring):
+    """The same minimum by another program, which has other parameters of a turn."""
+    _, _, edges = ring
+    rng = np.random.default_rng(3)
+    noisy = [moved(edge, small_motion(rng, np.radians(0.3), 0.01)) for edge in edges]
+    start = along(noisy)
+    theirs = o3d.pipelines.registration
+    graph = theirs.PoseGraph()
+    for pose in start:
+        graph.nodes.append(theirs.PoseGraphNode(pose))
+    for edge in noisy:
+        graph.edges.append(
+            theirs.PoseGraphEdge(edge.source, edge.target, edge.T_target_source, edge.information, False)
         )
-        theirs = o3d.pipelines.registration.get_information_matrix_from_point_clouds(
-            source, target, 0.05, edge.T_target_source
-        )
-        np.testing.assert_allclose(edge.information, theirs, rtol=1e-6, atol=1e-3)
+    theirs.global_optimization(
+        graph,
+        theirs.GlobalOptimizationLevenbergMarquardt(),
+        theirs.GlobalOptimizationConvergenceCriteria(),
+        theirs.GlobalOptimizationOption(0.05, 0.25, 1.0, 0),
+    )
+    ours, _ = optimised(start, noisy)
+    for pose, node in zip(ours, graph.nodes, strict=True):
+        np.testing.assert_allclose(pose, node.pose, atol=2e-4)
+    assert np.abs(ours - start).max() > 2e-3

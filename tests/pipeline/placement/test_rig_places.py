@@ -119,7 +119,7 @@ def test_the_camera_of_another_room_is_left_out_even_if_it_comes_first(room):
 
 def test_what_a_node_with_a_wrong_pose_measured_is_not_piled_onto_the_rest(room):
     first, second, third = room.frames
-    aside = rigid(rotation_exp(np.radians([0.0, 30.0, 0.0])), np.zeros(3))
+    aside = rigid(rotation_exp(np.radians([0.0, 30.0, 0.0])), np.array([0.8, 0.0, 0.0]))
     wrong = replace(third, name="wrong", T_world_camera=third.T_world_camera @ aside)
     result = reconstruct(Rig("rig", (first, second, wrong)))
     metrics = metrics_of(result)

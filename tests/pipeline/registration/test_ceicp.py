@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -5,6 +7,7 @@ from hypothesis import strategies as st
 
 from pipeline.config import RegistrationConfig
 from pipeline.registration.ceicp import CeicpA, CeicpN, entropy_weights
+from pipeline.registration.matching import Matching
 from pipeline.types import PointCloud
 from tests.pipeline.registration.pairs import pairs_at
 
@@ -85,3 +88,39 @@ def test_a_noisy_sensor_lifts_the_floor():
     assert CeicpA.starting(config, PointCloud(grid), PointCloud(grid)).sigma_min_m == pytest.approx(0.006)
     noisy = PointCloud(grid, sigma_m=np.full(len(grid), 0.02))
     assert CeicpA.starting(config, noisy, noisy).sigma_min_m == pytest.approx(0.02)
+
+
+def facing(distances_m, cosines) -> Matching:
+    """Pairs at given distances whose normals have given cosines."""
+    cosines = np.asarray(cosines, dtype=float)
+    return replace(
+        pairs_at(distances_m), cosines=cosines, normals=np.tile([0.0, 0.0, 1.0], (len(cosines), 1))
+    )
+
+
+def test_weights_of_a_are_those_of_the_joint_probability_of_distance_and_normals():
+    """P is exp(-d^2 / 2 sigma^2 - (1 - |n . n'|) / s^2) over its sum, s = 0.5, of pairs within 60 degrees."""
+    distances_m, sigma_m = np.array([0.0, 0.01, 0.02, 0.05, 0.01]), 0.03
+    cosines = np.array([1.0, 0.9, 0.6, 0.99, 0.49])
+    kept = CeicpA(sigma_m, sigma_m, sigma_m, 0.85).weigh(facing(distances_m, cosines))
+    assert kept.rows.tolist() == [0, 1, 2, 3]
+    g = np.exp(-(distances_m[:4] ** 2) / (2 * sigma_m**2) - (1.0 - cosines[:4]) / 0.25)
+    p = g / g.sum()
+    w = -p * np.log(p)
+    np.testing.assert_allclose(kept.weights, w / w.sum(), atol=1e-15)
+    assert kept.entropy_nat == pytest.approx(w.sum())
+
+
+def test_pairs_across_normals_do_not_count_however_near():
+    """Of 20 pairs every second one stands across by 61 degrees, the others by 59."""
+    cosines = np.cos(np.radians(np.tile([59.0, 61.0], 10)))
+    kept = CeicpA(0.1, 0.1, 0.1, 0.85).weigh(facing(np.zeros(20), cosines))
+    assert kept.rows.tolist() == list(range(0, 20, 2))
+    np.testing.assert_allclose(kept.weights, 0.1)
+
+
+def test_normals_that_agree_alike_leave_the_weights_of_the_distances():
+    distances_m = np.random.default_rng(1).uniform(0.0, 0.1, 50)
+    method = CeicpA(0.05, 0.05, 0.05, 0.85)
+    with_normals = method.weigh(facing(distances_m, np.full(50, 0.8)))
+    np.testing.assert_allclose(with_normals.weights, method.weigh(pairs_at(distances_m)).weights, atol=1e-14)

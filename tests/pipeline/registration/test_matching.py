@@ -109,3 +109,60 @@ def test_of_several_neighbours_the_nearest_come_first_in_each_block():
     _, nearest = cKDTree(target.points_m).query(source.points_m, k=4)
     np.testing.assert_array_equal(matching.source_rows, np.repeat(np.arange(COUNT), 4))
     np.testing.assert_array_equal(matching.target_rows.reshape(COUNT, 4), nearest)
+
+
+def _with_normals(normals) -> PointCloud:
+    """Points far apart, each with its own normal."""
+    normals = np.asarray(normals, dtype=float)
+    places = 10.0 * np.eye(3)[: len(normals)]
+    return PointCloud(places, normals=normals / np.linalg.norm(normals, axis=1, keepdims=True))
+
+
+def test_the_normal_of_a_pair_is_the_mean_of_both_in_the_targets_frame():
+    """Turned by 90 degrees about z, x becomes y, halfway to which (1, 1, 0) is at 67.5 degrees."""
+    T = rigid(rotation_exp(np.array([0.0, 0.0, np.pi / 2])), np.zeros(3))
+    source = _with_normals([[1, 0, 0], [0, 0, -1], [0, -1, 0]])
+    normals = _with_normals([[1, 1, 0], [0, 0, 1], [3, 0, 4]]).normals
+    target = PointCloud(apply(T, source.points_m), normals=normals)
+    pairs = Matcher(source, target, "q2p", with_normals=True).match(T)
+    np.testing.assert_allclose(pairs.cosines, [np.sqrt(0.5), 1.0, 0.6], atol=1e-12)
+    halfway = np.radians(67.5)
+    expected = np.array([[np.cos(halfway), np.sin(halfway), 0.0], [0.0, 0.0, 1.0], [1.6, 0.0, 0.8]])
+    expected[2] /= np.sqrt(3.2)
+    np.testing.assert_allclose(pairs.normals, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("scale", [0.2, 1.0, 7.0])
+def test_the_scale_of_a_pose_changes_no_normal(scale):
+    rng = np.random.default_rng(4)
+    source, turn = _clouds(rng)[0], rotation_exp(np.array([0.3, -0.2, 0.5]))
+    target = PointCloud(apply(rigid(turn, np.ones(3)), source.points_m))
+    normals = _with_unit(rng.normal(size=(COUNT, 3)))
+    source = PointCloud(source.points_m / scale, normals=normals)
+    target = PointCloud(target.points_m, normals=normals @ turn.T)
+    pairs = Matcher(source, target, "q2p", with_normals=True).match(rigid(scale * turn, np.ones(3)))
+    np.testing.assert_allclose(pairs.cosines, 1.0, atol=1e-12)
+    np.testing.assert_allclose(pairs.normals, target.normals[pairs.target_rows], atol=1e-12)
+
+
+def test_matching_back_is_matching_the_swapped_clouds():
+    """Pairs, cosines and normals, up to the frame, of p2q at T and of q2p at its inverse."""
+    source, target = (
+        PointCloud(cloud.points_m, normals=_with_unit(rng.normal(size=(COUNT, 3))))
+        for rng in [np.random.default_rng(5)]
+        for cloud in _clouds(rng)
+    )
+    T = rigid(rotation_exp(np.array([0.1, 0.2, -0.1])), [0.05, 0.0, -0.02])
+    back = Matcher(source, target, "p2q", with_normals=True).match(T)
+    swapped = Matcher(target, source, "q2p", with_normals=True).match(np.linalg.inv(T))
+    np.testing.assert_array_equal(back.source_rows, swapped.target_rows)
+    np.testing.assert_array_equal(back.target_rows, swapped.source_rows)
+    np.testing.assert_allclose(back.distances_m, swapped.distances_m, atol=1e-12)
+    np.testing.assert_allclose(back.cosines, swapped.cosines, atol=1e-12)
+    turned = swapped.normals @ T[:3, :3].T
+    sides = np.sign(np.einsum("mi,mi->m", turned, back.normals))
+    np.testing.assert_allclose(sides[:, None] * turned, back.normals, atol=1e-9)
+
+
+def _with_unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)

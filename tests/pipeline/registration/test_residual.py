@@ -6,7 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.kernels.geometry import apply, rigid, rotation_exp
-from pipeline.registration.residual import DegenerateError, solve_plane, weighted_procrustes
+from pipeline.registration.matching import Matching
+from pipeline.registration.neighbourhood import Normals
+from pipeline.registration.residual import DegenerateError, PlaneResidual, solve_plane, weighted_procrustes
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -124,3 +126,20 @@ def test_surfaces_that_let_the_source_slide_are_refused(surface):
         points = np.zeros_like(points)
     with pytest.raises(DegenerateError):
         solve_plane(points, points, normals, np.ones(200))
+
+
+@pytest.mark.parametrize("height_m", [0.1, -0.3])
+def test_the_plane_of_a_pair_is_across_its_own_normal(height_m):
+    """Target points with wrong normals and pairs with right ones: the source is lifted along the latter."""
+    rng = np.random.default_rng(8)
+    points_m, normals = _patches(rng)
+    shift_m = np.array([0.02, -0.03, height_m / 10])
+    rows = np.arange(len(points_m))
+    pairs = Matching(rows, rows, points_m, points_m + shift_m, np.full(len(rows), 1.0), normals)
+    residual = PlaneResidual(Normals(points_m, np.roll(normals, 1, axis=0)))
+    weights = np.full(len(rows), 1.0 / len(rows))
+    motion = residual.solve(pairs, weights)
+    np.testing.assert_allclose(motion, rigid(np.eye(3), shift_m), atol=1e-6)
+    heights_m = normals @ shift_m
+    assert residual.mean_squared_m2(pairs, weights, np.eye(4)) == pytest.approx(np.mean(heights_m**2))
+    assert residual.mean_squared_m2(pairs, weights, motion) < 1e-10

@@ -7,6 +7,8 @@ import json
 import re
 import shlex
 import zipfile
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,9 +16,11 @@ import viser
 
 from app.compute.state import Spec
 from app.compute.store import Store
+from app.screens.calibrate import panel
 from app.screens.calibrate.labels import AROUND, COVERAGE, DEPTH, HALVES, NEXT, UNCERTAINTY
 from app.screens.calibrate.lesson import left_out
 from app.screens.calibrate.noise import OTHER, READY
+from app.screens.calibrate.noise_view import NoiseRequest
 from app.screens.calibrate.panel import CalibratePanel
 from app.screens.calibrate.use import BEFORE, USE
 from packetmesh.errors import InputError
@@ -76,10 +80,16 @@ def zipped(folder, names):
     return content.getvalue()
 
 
+@pytest.fixture(scope="module")
+def uploads(tmp_path_factory):
+    """Where every screen keeps all photographs, so that the store knows what the first one found in them."""
+    return tmp_path_factory.mktemp("uploads")
+
+
 @pytest.fixture
-def screen(server, store, rig, boards, tmp_path):
+def screen(server, store, rig, boards, uploads):
     """The screen with all photographs uploaded and looked at."""
-    bench = empty(server, store, rig, tmp_path)
+    bench = empty(server, store, rig, uploads)
     names = [str(path.relative_to(boards)) for path in sorted(boards.rglob("*.*"))]
     bench.gui.upload("Photograph or ZIP …", "boards.zip", zipped(boards, names))
     bench.gui.press("Photographs", "Find the cameras", UPLOADS)
@@ -160,7 +170,7 @@ def test_the_address_says_whose_which_photograph_and_pictures_are_shown(screen):
 
 
 def test_what_an_address_asks_for_is_shown_once_the_cameras_are_there(
-    server, store, rig, boards, tmp_path, monkeypatch
+    server, store, rig, boards, uploads, monkeypatch
 ):
     built = CalibratePanel.build
 
@@ -170,7 +180,7 @@ def test_what_an_address_asks_for_is_shown_once_the_cameras_are_there(
             panel.in_address[key].take(place)
 
     monkeypatch.setattr(CalibratePanel, "build", build)
-    bench = screen.__wrapped__(server, store, rig, boards, tmp_path)
+    bench = screen.__wrapped__(server, store, rig, boards, uploads)
     assert bench.gui.find("Camera").value == "node_01"
     assert bench.panel.in_address["photo"].place() == "2"
 
@@ -234,7 +244,13 @@ def test_noise_is_replayed_and_another_lens_misses_the_truth(screen):
     assert view.inside("cx", "cy").mean() < 0.5
 
 
-def test_without_noise_the_truth_is_found(screen):
+@pytest.fixture
+def few_trials(monkeypatch):
+    """Where many more would show no more."""
+    monkeypatch.setattr(panel, "NoiseRequest", partial(NoiseRequest, trials=20))
+
+
+def test_without_noise_the_truth_is_found(few_trials, screen):
     screen.gui.set("Noise (px)", 0.0)
     view = screen.panel._noise._view
     assert view.rmse("fx") < 1e-2
@@ -250,13 +266,13 @@ def test_use_lays_the_calibration_over_the_rig_and_before_takes_it_away(screen):
     assert used.source == source
     assert "**In use**" in gui.text()
     assert "--calibration" in screen.spec.command()
+    folder = Path(used.folder)
+    assert folder.relative_to(screen.folder).name == "calibration_01"
     for node, true in enumerate(CAMERAS):
-        files = node_files(next(screen.folder.glob("*/calibration_01")) / f"node_{node:02d}")
+        files = node_files(folder / f"node_{node:02d}")
         assert abs(read_intrinsics(files["intrinsics"]).fx_px - true.fx_px) < 2.0
         assert np.abs(read_pose(files["pose"]) - T_WORLD_CAMERA[node]).max() < 0.003
-    correction = read_depth_correction(
-        next(screen.folder.glob("*/calibration_01")) / "node_00/depth_correction.json"
-    )
+    correction = read_depth_correction(folder / "node_00/depth_correction.json")
     assert (
         abs(float(correction.corrected_m(np.array([1.0]), np.array([[160, 120]]))[0]) - 1.0 - OFFSET_M)
         < 0.004
@@ -345,7 +361,7 @@ def test_what_goes_together_is_shown_with_the_parameters(screen):
     assert "fx and fy: " in told
 
 
-def test_the_trials_are_in_the_dock_while_the_screen_is_shown(screen):
+def test_the_trials_are_in_the_dock_while_the_screen_is_shown(few_trials, screen):
     gui = screen.gui
 
     def docked():

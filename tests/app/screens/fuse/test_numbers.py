@@ -10,7 +10,7 @@ from app.screens.fuse.capture import capture_html, capture_sentence, cell_name
 from app.screens.fuse.charts import kernel, weights
 from app.screens.fuse.draw import gizmo_pose, start_of
 from app.screens.fuse.methods import color_of
-from app.screens.fuse.numbers import places_table, race_table, verdict
+from app.screens.fuse.numbers import places_table, race_table, winner
 from app.screens.fuse.view import (
     CAPTURE_SHIFTS_M,
     CAPTURE_TURNS_DEG,
@@ -27,14 +27,14 @@ NOTHING = np.empty((0, 3), np.float32)
 EDGES_M = np.linspace(0.0, 0.3, 31)
 
 
-def lane(label, error_m, reason="converged", sigma_m=float("nan"), kernel=False):
+def lane(label, error_m, reason="converged", sigma_m=float("nan"), kernel=False, word="sure", reasons=()):
     shown = PairHistogram(np.ones(30, int), np.ones(30), sigma_m)
     shades = np.zeros(0, np.uint8)
     lens = np.zeros((0, 3), np.uint8)
     step = RaceStep(
         np.eye(4), NOTHING, NOTHING, np.empty(0), 0.0, 0.01, 5.0, error_m, 0.03, shades, lens, shown
     )
-    return RaceLane(("icp", "point"), label, kernel, (step,), reason, 3, 0.2, 0.01, 500.0)
+    return RaceLane(("icp", "point"), label, kernel, (step,), reason, 3, 0.2, 0.01, 500.0, word, reasons)
 
 
 @pytest.mark.parametrize(
@@ -52,14 +52,14 @@ def lane(label, error_m, reason="converged", sigma_m=float("nan"), kernel=False)
         ({"ICP point": None, "CEICP-A plane": None}, "The truth of this scene is not known."),
     ],
 )
-def test_the_verdict_says_who_wins(errors_m, sentence):
+def test_the_winner_is_named(errors_m, sentence):
     lanes = tuple(lane(label, error_m) for label, error_m in errors_m.items())
-    assert sentence in verdict("cloud" if None in errors_m.values() else "truth", lanes)
+    assert sentence in winner("cloud" if None in errors_m.values() else "truth", lanes)
 
 
 def test_where_nobody_knows_the_truth_nothing_speaks_of_it():
     lanes = (lane("ICP point", 0.03), lane("CEICP-A point", 0.01))
-    said = verdict("pixels", lanes)
+    said = winner("pixels", lanes)
     assert said.startswith(
         "**CEICP-A point** ends 1.00 cm from the measured points of its pixels, **ICP point** 3.00"
     )
@@ -71,12 +71,12 @@ def test_where_nobody_knows_the_truth_nothing_speaks_of_it():
 
 def test_a_ceicp_that_ties_with_the_winner_has_not_lost():
     lanes = (lane("FICP plane", 0.00100), lane("CEICP-A plane", 0.00102), lane("ICP point", 0.1))
-    assert "loses" not in verdict("truth", lanes)
+    assert "loses" not in winner("truth", lanes)
 
 
 def test_one_ceicp_that_loses_to_another_is_no_loss_of_ceicp():
     lanes = (lane("CEICP-A plane", 0.001), lane("ICP point", 0.01), lane("CEICP-N plane", 0.1))
-    assert "loses" not in verdict("truth", lanes)
+    assert "loses" not in winner("truth", lanes)
 
 
 def test_the_table_has_a_column_for_each_lane_and_explains_every_row():
@@ -84,7 +84,7 @@ def test_the_table_has_a_column_for_each_lane_and_explains_every_row():
         "truth", tuple(lane(str(i), 0.01, "No point of the source lies within") for i in range(4))
     )
     assert re.findall("[①②③④]", html) == list("①②③④")
-    assert html.count("data-hint=") == 8
+    assert html.count("data-hint=") == 9
     assert html.count(">lost<") == 4
     for mark in "①②③④":  # in the colour of its method, as everywhere
         assert re.search(rf"color: {css(color_of(lane('0', 0.0).rival))};\">{mark}<", html)

@@ -1,12 +1,12 @@
 """Races and their capture range as the computing process makes them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from app.compute.state import Spec
-from app.compute.store import Store
 from app.drawing.colors import MOST_DISTANCE_M
 from app.screens.fuse.capture_job import capture_job
 from app.screens.fuse.race_job import contest_of, race_job
@@ -66,10 +66,16 @@ def test_the_colours_are_those_of_the_error(view):
             assert np.sqrt(np.mean(shown_m**2)) == pytest.approx(capped_m, rel=0.35, abs=0.0005)
 
 
-def test_without_truth_the_number_is_the_distance_between_the_clouds(tmp_path, rig):
-    save_rig(tmp_path / "rig", replace(rig, truth=None))
-    spec = replace(SPEC, source=RigFolder(str(tmp_path / "rig")))
-    view = end(race_job(Store(str(tmp_path)), spec, replace(SLIGHT, rivals=(("ceicp-a", "plane"),))))
+@pytest.fixture(scope="module")
+def untrue(tmp_path_factory, rig):
+    """The same scene, whose true poses nobody knows."""
+    folder = tmp_path_factory.mktemp("untrue") / "rig"
+    save_rig(folder, replace(rig, truth=None))
+    return replace(SPEC, source=RigFolder(str(folder)))
+
+
+def test_without_truth_the_number_is_the_distance_between_the_clouds(store, untrue):
+    view = end(race_job(store, untrue, replace(SLIGHT, rivals=(("ceicp-a", "plane"),))))
     first, last = view.lanes[0].steps[0], view.lanes[0].steps[-1]
     assert view.reference == "cloud"
     assert first.point_error_m is None
@@ -100,8 +106,18 @@ def test_histograms_count_every_kept_pair_and_only_ceicp_has_the_kernel(view):
 
 
 def test_the_weight_of_a_ceicp_pair_falls_with_its_distance(view):
-    weights = view.lanes[2].steps[0].histogram.weights
+    weights = view.lanes[1].steps[0].histogram.weights
     assert np.all(np.diff(weights[np.isfinite(weights)]) < 0)
+
+
+def test_with_planes_the_weight_of_a_ceicp_a_pair_falls_with_the_angle_of_its_normals_too(view):
+    shown = view.lanes[2].steps[0].histogram
+    distances_m = 0.5 * (view.edges_m[1:] + view.edges_m[:-1])
+    known = np.isfinite(shown.weights)
+    alone = np.exp(-0.5 * (distances_m[known] / shown.sigma_m) ** 2)  # of equal normals, but for log p
+    over = shown.weights[known] / alone
+    assert np.std(over) > 0.05
+    assert np.corrcoef(distances_m[known], shown.weights[known])[0, 1] < -0.9
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -173,13 +189,13 @@ def test_the_capture_range_has_a_cell_for_every_start_and_tells_methods_apart(ca
     assert reached[1] > reached[0]
 
 
-def test_the_capture_range_is_the_same_again_and_from_any_start(capture, tmp_path):
-    again = end(capture_job(Store(str(tmp_path)), SPEC, replace(MAPPED, start=Start())))
+def test_the_capture_range_is_the_same_again_and_from_any_start(capture, store):
+    """Of the same clouds, computed anew."""
+    forgetful = SimpleNamespace(stages=store.stages, remember=lambda key, compute: compute())
+    again = end(capture_job(forgetful, SPEC, replace(MAPPED, start=Start())))
     np.testing.assert_array_equal(again.errors_m, capture.errors_m)
 
 
-def test_without_truth_there_is_no_capture_range(tmp_path, rig):
-    save_rig(tmp_path / "rig", replace(rig, truth=None))
-    spec = replace(SPEC, source=RigFolder(str(tmp_path / "rig")))
+def test_without_truth_there_is_no_capture_range(store, untrue):
     with pytest.raises(InputError, match="true poses of this scene are not known"):
-        end(capture_job(Store(str(tmp_path)), spec, Race()))
+        end(capture_job(store, untrue, Race()))

@@ -15,6 +15,7 @@ from app.compute.state import Spec
 from app.dock.dock import time_text
 from app.drawing.colors import COVERAGE_STOPS, linear
 from app.lesson.files import read_lesson
+from app.screens.network import setup
 from app.screens.network.delivery_draw import EMPTY, FULL
 from app.screens.network.delivery_numbers import legend, moment_table
 from app.screens.network.delivery_view import DeliveryView
@@ -43,7 +44,7 @@ class Screen(Bench):
 
     def __init__(self, scene, store, spec):
         super().__init__(NetworkPanel, ui_of(scene, kind=Impatient), store, steps=("network",), spec=spec)
-        self.gui.find("Moments").value = 4
+        assert self.gui.find("Moments").value == 4
         self.panel.on_show()
 
     @property
@@ -95,10 +96,13 @@ def spec(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def screen(store, spec):
+    """The screen, which asks for few moments wherever it asks of itself: of a lesson's stop, too."""
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    screen = Screen(server.scene, store, spec)
-    yield screen
-    screen.ui.close()
+    with pytest.MonkeyPatch.context() as few:
+        few.setattr(setup, "MOMENTS", 4)
+        screen = Screen(server.scene, store, spec)
+        yield screen
+        screen.ui.close()
     server.stop()
 
 

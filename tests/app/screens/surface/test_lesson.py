@@ -126,15 +126,15 @@ def clouds(rig, nodes, poses, passes):
     return Room(rig, nodes, poses, sensor, merged.fused, merged.r_F_m, merged.sigma_D_m)
 
 
-def room_of(config, passes):
-    done = end(run(Spec(Demo("living-room"), config=config), stages=("rig", "nodes", "placement")))
+def room_of(config, passes, store):
+    done = end(run(Spec(Demo("living-room"), config=config), store, stages=("rig", "nodes", "placement")))
     rig, nodes, placement = (result.value for result in done.values())
     return clouds(rig, nodes, placement.T_world_camera, passes)
 
 
 @pytest.fixture(scope="module")
-def room():
-    return room_of(CONFIG, CONFIG.surface.smoothing_passes)
+def room(store):
+    return room_of(CONFIG, CONFIG.surface.smoothing_passes, store)
 
 
 @pytest.fixture(scope="module")
@@ -190,7 +190,7 @@ def test_one_ball_after_the_other_leaves_fewer_points_than_the_largest_alone(roo
     assert unused(alone, room.fused) > 2.0 * unused(four_balls, room.fused)
 
 
-def test_noise_of_the_points_and_not_of_their_normals_tears_the_surface(room, four_balls):
+def test_noise_of_the_points_and_not_of_their_normals_tears_the_surface(room, four_balls, store):
     look = stop_named("Why holes stay: noise")
     noisy = clouds(room.rig, room.nodes, room.poses, look.smoothing_passes)
     torn = noisy.roll(look, noisy.fused)
@@ -200,7 +200,7 @@ def test_noise_of_the_points_and_not_of_their_normals_tears_the_surface(room, fo
     new_normals = noisy.roll(look, replace(noisy.fused, normals=room.fused.normals))
     assert missed(old_normals) <= missed(four_balls) < missed(torn) <= missed(new_normals)
     raw = replace(CONFIG, acquisition=replace(CONFIG.acquisition, average=False))
-    rough = room_of(raw, look.smoothing_passes)
+    rough = room_of(raw, look.smoothing_passes, store)
     assert missed(rough.roll(look, rough.fused)) > 2.0 * missed(four_balls)
 
 

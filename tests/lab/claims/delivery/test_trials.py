@@ -24,12 +24,12 @@ from pipeline.kernels.geometry import scaled
 from pipeline.reconstruct import reconstruct
 from pipeline.types import DepthMap, Rig
 
-EVERY = 4
+EVERY = 8
 
 
 @pytest.fixture(scope="module")
 def rig():
-    """One node of a demo, of whose pixels every fourth is left in each direction."""
+    """One node of a demo, of whose pixels every eighth is left in each direction."""
     alone = single_node(load_demo("box-on-table"), 0)
     few = slice(None, None, EVERY)
     frame = alone.frames[0]

@@ -1,0 +1,86 @@
+"""Verdicts on the nodes of a rig: which are placed, and warnings about the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+from operator import add
+
+from pipeline.placement.agreement import NOTHING_SHARED, Agreement
+from pipeline.placement.attempt import (
+    LEAST_AGREEMENT,
+    LEAST_OVERLAP,
+    SURE_AGREEMENT,
+    Attempt,
+    less,
+    score,
+)
+from pipeline.placement.outcome import NodeVerdict
+
+
+def verdicts_of(
+    names: Sequence[str],
+    group: Sequence[int],
+    agreements: dict[tuple[int, int], Agreement],
+    tried: Sequence[Attempt],
+) -> list[NodeVerdict]:
+    """Exclude the worst contradicting node until none contradicts; find doubtful nodes in the same way."""
+
+    shared: list[list[tuple[int, Agreement]]] = [[] for _ in names]
+    for (one, other), found in agreements.items():
+        if found.overlap_share >= LEAST_OVERLAP:
+            shared[one].append((other, found))
+            shared[other].append((one, found))
+
+    def beside(others: set[int], node: int) -> Agreement:
+        return reduce(add, (found for other, found in shared[node] if other in others), NOTHING_SHARED)
+
+    def without_worst(kept: set[int], least: float) -> set[int]:
+        while suspects := [index for index in kept if less(beside(kept, index), least)]:
+            kept = kept - {min(suspects, key=lambda index: (beside(kept, index).within_2pct_share, -index))}
+        return kept
+
+    placed = without_worst(set(group), LEAST_AGREEMENT)
+    sure = without_worst(placed, SURE_AGREEMENT)
+    verdicts = []
+    for index, name in enumerate(names):
+        found, sentence = beside(placed, index), ""
+        if index not in group:
+            sentence = _lost(names, index, tried)
+        elif index not in placed:
+            sentence = _contradiction(name, found)
+        elif index not in sure:
+            sentence = (
+                f"{name} fits the others badly: of what they both measured, "
+                f"{found.within_2pct_share:.0%} is within 2 %; check its pose and its calibration"
+            )
+        elif not found.shared and len(placed) > 1:
+            sentence = f"{name} stands by its given pose alone: no other camera measured what it sees"
+        verdicts.append(NodeVerdict(name, index in placed, found, sentence))
+    return verdicts
+
+
+def _contradiction(name: str, found: Agreement) -> str:
+    """Return why a node with a pose is excluded."""
+    return (
+        f"{name} is left out: of what it and the others both measured, only {found.within_2pct_share:.0%} is "
+        "within 2 %; check its pose and that all nodes saw the same scene, or try --set "
+        "node_registration.start=global"
+    )
+
+
+def _lost(names: Sequence[str], index: int, tried: Sequence[Attempt]) -> str:
+    """Return why a node is connected to no other."""
+    mine = [trial for trial in tried if index in (trial.source, trial.target)]
+    best = max(mine, key=lambda trial: (score(trial.agreement), trial.agreement.shared))
+    other = names[best.target if best.source == index else best.source]
+    why = f"beside {other}: {best.result.stop_reason.partition(';')[0].rstrip('.')}"
+    if best.agreement.shared:
+        why = (
+            f"of what it and {other} both measured where it fits best, "
+            f"{best.agreement.within_2pct_share:.0%} is within 2 %"
+        )
+    return (
+        f"{names[index]} is left out: its pose is not known, and it fits nowhere beside the others "
+        f"({why}); try to give its pose, or images that share more of the place"
+    )

@@ -1,0 +1,124 @@
+"""Consensus of pairs of points for one rigid motion, among many wrong pairs, without random samples.
+
+Two right pairs keep the distance of their points; counting, for two pairs, the others that agree with both
+separates right from wrong pairs even where nine of ten are wrong (Chen et al., "SC2-PCR: a second order
+spatial compatibility for efficient and robust point cloud registration", CVPR 2022).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.kernels.geometry import apply, rotation_angle_rad
+from pipeline.registration.colour.matches import Matches
+from pipeline.registration.residual import DegenerateError, weighted_procrustes
+from pipeline.types import BoolArray, FloatArray
+
+WITHIN_SD = 3.0
+"""A pair fits a motion if its distance is at most this many standard deviations, or ``LEAST_M``."""
+LEAST_M = 0.02
+SHORTEST_M = 0.05
+"""Pairs nearer to each other than this say little about a motion, and are not compared."""
+SEEDS = 40
+"""Largest number of pairs from which a motion is computed, those with most agreement first."""
+GROUP = 12
+"""Number of pairs that agree with a seed, from which the first motion is computed."""
+ROUNDS = 4
+"""Times that the motion is computed again from the pairs that fit it."""
+FLAT = 0.2
+"""Points are in one plane if their spread across it is below this share of the smaller one along it."""
+OTHER_RAD, OTHER_M = np.radians(10.0), 0.3
+"""Motions that differ by more are different answers."""
+
+
+class Found(NamedTuple):
+    """A motion, the pairs that fit it, and its strongest rival."""
+
+    T_target_source: FloatArray
+    inliers: BoolArray
+    """(M,)."""
+    votes: float
+    """Votes of the pairs that fit; a pair counts less, the farther it is off."""
+    rival_votes: float
+    """Votes of the best of the clearly different motions; 0 without one."""
+
+
+def consensus(pairs: Matches) -> Found | None:
+    """Find the rigid motion that most pairs fit; None if no three pairs agree."""
+    if len(pairs) < 3:
+        return None
+    limit_m = np.maximum(WITHIN_SD * pairs.sigma_m, LEAST_M)
+    agreement = _agreement(pairs, limit_m)
+    strength = agreement @ pairs.votes.astype(np.float32)
+    found: list[Found] = []
+    explained = np.zeros(len(pairs), bool)
+    for seed in np.argsort(-strength, kind="stable")[:SEEDS]:
+        if explained[seed] or not strength[seed] > 0.0:
+            continue
+        group = np.argsort(-agreement[seed], kind="stable")[:GROUP]
+        group = np.append(group[agreement[seed, group] > 0.0], seed)
+        motion = _refined(pairs, limit_m, group)
+        if motion is not None:
+            found.append(motion)
+            explained |= motion.inliers
+    if not found:
+        return None
+    best = max(found, key=lambda one: one.votes)
+    rivals = [one.votes for one in found if _differ(one.T_target_source, best.T_target_source)]
+    return best._replace(rival_votes=max(rivals, default=0.0))
+
+
+def _agreement(pairs: Matches, limit_m: FloatArray) -> FloatArray:
+    """Return (M, M) votes of the pairs that agree with two pairs that agree with each other; else 0."""
+    apart_source_m, apart_target_m = _distances_m(pairs.source_m), _distances_m(pairs.target_m)
+    tolerance_m = np.hypot(limit_m[:, None], limit_m)
+    same = np.abs(apart_source_m - apart_target_m) < tolerance_m
+    same &= np.minimum(apart_source_m, apart_target_m) > SHORTEST_M
+    agree = same.astype(np.float32)
+    return agree * ((agree * pairs.votes.astype(np.float32)) @ agree)
+
+
+def _distances_m(points_m: FloatArray) -> FloatArray:
+    """Return the (M, M) distances of (M, 3) points."""
+    centred_m = points_m - points_m.mean(axis=0)
+    squared = np.einsum("mi,mi->m", centred_m, centred_m)
+    return np.sqrt(np.maximum(squared[:, None] + squared - 2.0 * centred_m @ centred_m.T, 0.0))
+
+
+def _refined(pairs: Matches, limit_m: FloatArray, rows: np.ndarray) -> Found | None:
+    """Return the motion of some pairs, computed again from all that fit it; None if fewer than 3 do."""
+    try:
+        for _ in range(ROUNDS):
+            if len(rows) < 3:
+                return None
+            weights = pairs.votes[rows] / limit_m[rows] ** 2
+            T = weighted_procrustes(pairs.source_m[rows], pairs.target_m[rows], weights)
+            off = np.linalg.norm(apply(T, pairs.source_m) - pairs.target_m, axis=1) / limit_m
+            rows = np.flatnonzero(off < 1.0)
+    except DegenerateError:
+        return None
+    inliers = off < 1.0
+    if inliers.sum() < 3 or _from_behind(pairs.target_m[inliers], T):
+        return None
+    votes = float(np.sum(pairs.votes[inliers] * (1.0 - off[inliers] ** 2)))
+    return Found(T, inliers, votes, 0.0)
+
+
+def _from_behind(target_m: FloatArray, T_target_source: FloatArray) -> bool:
+    """Return whether the cameras would see opposite sides of one plane with all points, as in a mirror image.
+
+    Args:
+        target_m: (M, 3) points in the target's camera, which is at the origin.
+        T_target_source: (4, 4) pose of the source's camera.
+    """
+    middle_m = target_m.mean(axis=0)
+    _, spread, axes = np.linalg.svd(target_m - middle_m, full_matrices=False)
+    sides = axes[2] @ middle_m, axes[2] @ (middle_m - T_target_source[:3, 3])
+    return bool(spread[2] < FLAT * spread[1] and sides[0] * sides[1] < 0.0)
+
+
+def _differ(T_a: FloatArray, T_b: FloatArray) -> bool:
+    apart_m = float(np.linalg.norm(T_a[:3, 3] - T_b[:3, 3]))
+    return apart_m > OTHER_M or rotation_angle_rad(T_a[:3, :3].T @ T_b[:3, :3]) > OTHER_RAD

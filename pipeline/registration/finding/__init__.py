@@ -1,0 +1,1 @@
+"""The pose of two clouds from anywhere: few quick ways, evidence for each answer, and a verdict."""

@@ -1,0 +1,102 @@
+"""Poses that a few quick registrations from a start lead to, each with its evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from packetmesh.errors import ReconstructionError
+from pipeline.config import Direction, RegistrationConfig
+from pipeline.registration.finding.evidence import Evidence, Judge
+from pipeline.registration.loop import register
+from pipeline.types import FloatArray, PointCloud
+
+QUICK_POINTS = 5000
+"""Points of each cloud in a quick registration."""
+DRAWN_SHARE = 0.8
+"""Most points of the smaller cloud, as a share, so that draws of the points differ."""
+QUICK_DECAY = 0.92
+"""Factor by which its scale shrinks in each iteration: it must not shrink sooner than the pose moves."""
+DIRECTIONS: tuple[Direction, ...] = ("p2q", "q2p")
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A pose that a quick registration led to."""
+
+    T_start: FloatArray
+    """(4, 4) its start."""
+    T_target_source: FloatArray
+    """(4, 4) its end."""
+    gate_m: float
+    direction: Direction
+    evidence: Evidence
+
+
+def candidates(
+    source: PointCloud,
+    target: PointCloud,
+    T_start: FloatArray,
+    gates_m: Sequence[float],
+    judge: Judge,
+    config: RegistrationConfig,
+) -> Iterator[Candidate]:
+    """Register from a start with each gate, the smallest first; yields the better one of both directions.
+
+    Args:
+        source: the cloud that moves.
+        target: the cloud that stays.
+        T_start: (4, 4) start pose T_target_source.
+        gates_m: gates in ascending order; a gate is a promise of how far the start is off.
+        judge: judge of these clouds.
+        config: metric and seed of the registrations.
+    """
+    for gate_m in gates_m:
+        both = []
+        for direction in DIRECTIONS:
+            try:
+                T = quick_registration(source, target, T_start, gate_m, direction, config)
+            except ReconstructionError:
+                continue
+            both.append(Candidate(T_start, T, gate_m, direction, judge(T)))
+        if both:
+            yield max(both, key=lambda candidate: candidate.evidence.score)
+
+
+def quick_registration(
+    source: PointCloud,
+    target: PointCloud,
+    T_start: FloatArray,
+    gate_m: float,
+    direction: Direction,
+    config: RegistrationConfig,
+    seed: int | None = None,
+) -> FloatArray:
+    """Return the (4, 4) pose that CEICP-A reaches from a start with few points.
+
+    Args:
+        source: the cloud that moves.
+        target: the cloud that stays.
+        T_start: (4, 4) start pose T_target_source.
+        gate_m: its gate.
+        direction: its direction.
+        config: its other settings.
+        seed: seed of the draw of points; None for the settings'.
+
+    Raises:
+        ReconstructionError: no pairs are within the gate, or they leave the motion open from the beginning.
+    """
+    quick = replace(
+        config,
+        method="ceicp-a",
+        start="given",
+        gate_m=gate_m,
+        direction="both" if config.with_scale else direction,
+        sigma_decay=QUICK_DECAY,
+        max_points=min(QUICK_POINTS, max(6, int(DRAWN_SHARE * min(len(source), len(target))))),
+        seed=config.seed if seed is None else seed,
+    )
+    result = register(source, target, quick, T_start)
+    if not result.steps:
+        raise ReconstructionError(result.stop_reason)
+    return result.T_target_source

@@ -1,0 +1,127 @@
+"""Evidence for and against a pose of two clouds: points on the other's surface, and points in its free space.
+
+A mean over all points of both clouds rewards overlap: half a room slid onto the other half fits "better" than
+at its place. Here only those points count that the other cloud can judge, and how many they are is a number
+of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.kernels.geometry import apply
+from pipeline.registration.finding.surface import Judgement, Surface
+from pipeline.registration.observability import open_motions, stiffness
+from pipeline.types import FloatArray
+
+CLEARLY, CLEARLY_MORE = 2.0, 0.005
+"""Clearly more speaks against a pose than against another: this multiple, and this share more."""
+POINTS_OF_PATCH = 50.0
+"""Neighbouring points err together: so many count as one observation."""
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What two clouds say of a pose."""
+
+    judged: tuple[int, int]
+    """Numbers of points of the source and of the target that the other cloud can judge."""
+    asked: tuple[int, int]
+    """Numbers of points that were compared."""
+    on: int
+    """Judged points of both that lie on the other's surface, within the noise."""
+    through: int
+    """Judged points of both that lie where the other's camera saw through; 0 without a viewpoint."""
+    height_ratio: float
+    """Root mean square distance of the points on the surface from its tangent planes, over the noise."""
+    stiffness: float
+    """How well the points on the surface hold the motion that they hold least; 0 if it is open."""
+    open_motions: str
+    """Motions that they leave open, in words; empty if none."""
+    color_correlation: float
+    """Correlation of the colours of these points with those of their nearest points in the other cloud, -1 to
+    1; NaN without colours."""
+
+    @property
+    def overlap_share(self) -> float:
+        """Larger one of the two clouds' shares of judged points: 1 if one cloud is a part of the other."""
+        return max(judged / max(1, asked) for judged, asked in zip(self.judged, self.asked, strict=True))
+
+    @property
+    def on_share(self) -> float:
+        """Share of the judged points that lie on the other's surface, within the noise; 0 without any."""
+        return self.on / max(1, sum(self.judged))
+
+    @property
+    def against_share(self) -> float:
+        """Share of the judged points that speak against the pose; 1 without any."""
+        return 1.0 - self.on_share
+
+    def clearly_better(self, other: Evidence) -> bool:
+        """Return whether clearly less speaks against this pose than against another one."""
+        return CLEARLY * self.against_share + CLEARLY_MORE < other.against_share
+
+    @property
+    def score(self) -> float:
+        """Lower bound of the share on the surface, by which poses are ranked: few judged points prove little.
+
+        It is Wilson's, one standard error wide; ``POINTS_OF_PATCH`` points are one observation.
+        """
+        count = max(1.0, sum(self.judged) / POINTS_OF_PATCH)
+        share, square = self.on_share, 1.0 / count
+        width = math.sqrt((share * (1.0 - share) + 0.25 * square) / count)
+        return (share + 0.5 * square - width) / (1.0 + square)
+
+    @property
+    def through_share(self) -> float:
+        """Share of the judged points in the other's free space."""
+        return self.through / max(1, sum(self.judged))
+
+
+@dataclass(frozen=True, slots=True)
+class Judge:
+    """Collects the evidence of two clouds at any pose; the clouds are prepared once."""
+
+    source: Surface
+    target: Surface
+
+    def __call__(self, T_target_source: FloatArray) -> Evidence:
+        """Return the evidence at a (4, 4) pose, rigid or with a scale."""
+        there = self.target.judge(self.source, T_target_source)
+        back = self.source.judge(self.target, np.linalg.inv(T_target_source))
+        heights = np.concatenate([there.heights[there.on], back.heights[back.on]])
+        places_m, normals = self._overlap(there, back, T_target_source)
+        return Evidence(
+            judged=(int(there.judged.sum()), int(back.judged.sum())),
+            asked=(len(there.judged), len(back.judged)),
+            on=len(heights),
+            through=int(there.through.sum() + back.through.sum()),
+            height_ratio=float(np.sqrt(np.mean(heights**2))) if len(heights) else float("inf"),
+            stiffness=stiffness(places_m, normals),
+            open_motions=open_motions(places_m, normals) if len(heights) else "any motion",
+            color_correlation=self._color_correlation(there, back),
+        )
+
+    def _overlap(self, there: Judgement, back: Judgement, T: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return places and unit normals, in the target frame, of the points on the other's surface."""
+        moving, fixed = self.source.asked[there.on], self.target.asked[back.on]
+        turned = self.source.normals[moving] @ T[:3, :3].T
+        turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+        places_m = apply(T, self.source.points_m[moving]), self.target.points_m[fixed]
+        return np.concatenate(places_m), np.concatenate([turned, self.target.normals[fixed]])
+
+    def _color_correlation(self, there: Judgement, back: Judgement) -> float:
+        """Return the correlation of the colours of points on the other's surface and of their nearest."""
+        if self.source.colors is None or self.target.colors is None:
+            return float("nan")
+        moving = [self.source.colors[self.source.asked[there.on]], self.source.colors[back.nearest[back.on]]]
+        fixed = [self.target.colors[there.nearest[there.on]], self.target.colors[self.target.asked[back.on]]]
+        a, b = np.concatenate(moving), np.concatenate(fixed)
+        if not len(a):
+            return float("nan")
+        a, b = a - a.mean(axis=0), b - b.mean(axis=0)
+        size = np.sqrt(np.sum(a**2) * np.sum(b**2))
+        return float(np.sum(a * b) / size) if size > 0.0 else float("nan")

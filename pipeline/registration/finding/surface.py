@@ -1,0 +1,95 @@
+"""A cloud prepared to judge the points of another: its normals, noise, spacing, colours and free space."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.kernels.geometry import apply
+from pipeline.kernels.kdtree import KdTree, tree_of
+from pipeline.registration.finding.viewpoint import RangeImage, range_image
+from pipeline.registration.neighbourhood import Normals
+from pipeline.registration.sample import draw
+from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud
+
+REFERENCE_POINTS, JUDGED_POINTS = 20_000, 4000
+"""Most points of a cloud that stand for its surface, and that are judged by the other cloud."""
+NOISE_NEIGHBOURS, SPACING_NEIGHBOURS = 8, 4
+ON_SPACINGS = 3.0
+"""A point is on a surface if its nearest point there is at most so many spacings away, …"""
+ON_SIGMAS = 3.0
+"""… if its distance to the tangent plane is at most so many standard deviations of both clouds' noise, …"""
+ON_COSINE = 0.7
+"""… and if the normals differ by at most 45 degrees."""
+LEAST_TOLERANCE = 0.1
+"""Least tolerance of the distance to a tangent plane, in spacings: the plane leaves a curved surface."""
+LEAST_SIGMA = 0.02
+"""Least standard deviation of the noise, in spacings: quantised depth can have planes without any."""
+NEAR_SPACINGS, OVER_SPACINGS = 6.0, 1.5
+"""A cloud without a viewpoint judges the points that are at most so many spacings from its nearest point, and
+so many along the surface: a point beyond the rim of what was measured is not judged."""
+
+
+class Judgement(NamedTuple):
+    """What one surface says of (n,) points of another."""
+
+    judged: BoolArray
+    """Points that it can judge: on it, or clearly not."""
+    on: BoolArray
+    """Judged points on the surface, within the noise."""
+    through: BoolArray
+    """Judged points in its free space."""
+    heights: FloatArray
+    """Distances to the tangent planes at the nearest points, over the noise."""
+    nearest: IntArray
+    """Rows of the nearest points."""
+
+
+class Surface:
+    """A sampled cloud with all that is needed to judge another's points."""
+
+    def __init__(self, cloud: PointCloud, seed: int = 0) -> None:
+        """Sample the cloud; normals it lacks, and its noise, are estimated from its points."""
+        sample = draw(cloud, REFERENCE_POINTS, seed, "cloud").cloud
+        self.points_m = sample.points_m
+        self.tree: KdTree = tree_of(self.points_m)
+        self.normals = Normals(self.points_m, sample.normals, lambda: self.tree).at(np.arange(len(sample)))
+        distances_m, rows = self.tree.nearest(self.points_m, min(len(sample), 1 + NOISE_NEIGHBOURS))
+        self.spacing_m: FloatArray = distances_m[:, 1 : 1 + SPACING_NEIGHBOURS].mean(axis=1)
+        arms_m = self.points_m[rows] - self.points_m[:, None]
+        heights_m = np.einsum("nki,ni->nk", arms_m, self.normals)
+        self.sigma_m: FloatArray = np.maximum(heights_m.std(axis=1), LEAST_SIGMA * self.spacing_m)
+        colors = sample.colors
+        self.colors: FloatArray | None = None if colors is None else colors[rows].mean(axis=1)
+        """(N, 3) mean colours of the neighbourhoods, 0 to 255."""
+        count = min(len(sample), JUDGED_POINTS)
+        self.asked: IntArray = np.sort(np.random.default_rng(seed).choice(len(sample), count, replace=False))
+        """(n,) rows of the points that the other cloud judges."""
+        self.view: RangeImage | None = range_image(cloud.points_m)
+        """Free space, if the cloud was seen from its origin."""
+
+    def judge(self, other: Surface, T: FloatArray) -> Judgement:
+        """Judge the asked points of another cloud, moved into this frame by a motion or similarity ``T``."""
+        scale = float(np.cbrt(np.linalg.det(T[:3, :3])))
+        moved_m = apply(T, other.points_m[other.asked])
+        turned = other.normals[other.asked] @ (T[:3, :3].T / scale)
+        far_m, rows = self.tree.nearest(moved_m, 1)
+        distances_m, nearest = far_m[:, 0], rows[:, 0]
+        spacing_m = np.maximum(self.spacing_m[nearest], scale * other.spacing_m[other.asked])
+        arms_m, normals = moved_m - self.points_m[nearest], self.normals[nearest]
+        heights_m = np.abs(np.einsum("ni,ni->n", arms_m, normals))
+        cosines = np.einsum("ni,ni->n", turned, normals)
+        if self.view is None or other.view is None:
+            cosines = np.abs(cosines)  # only towards a viewpoint do normals have a sign
+        sigma_m = np.hypot(self.sigma_m[nearest], scale * other.sigma_m[other.asked])
+        tolerance_m = ON_SIGMAS * sigma_m + LEAST_TOLERANCE * spacing_m
+        near = distances_m <= ON_SPACINGS * spacing_m
+        on = near & (cosines >= ON_COSINE) & (heights_m <= tolerance_m)
+        if self.view is None:
+            beside_m = np.sqrt(np.maximum(distances_m**2 - heights_m**2, 0.0))
+            seen = (distances_m <= NEAR_SPACINGS * spacing_m) & (beside_m <= OVER_SPACINGS * spacing_m)
+            through = np.zeros(len(moved_m), np.bool_)
+        else:
+            seen, through = self.view.compare(moved_m, tolerance_m)
+        return Judgement(on | seen, on, through & ~on, heights_m / sigma_m, nearest)

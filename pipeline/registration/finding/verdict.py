@@ -1,0 +1,83 @@
+"""The verdict on a pose: sure, doubtful or none, and why (SPEC 4.12).
+
+The thresholds were fitted on 219 pairs of views of the validation rooms of ``lab.places``; ``packetmesh bench
+--only places`` judges them on other rooms.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from pipeline.registration.finding.evidence import Evidence
+
+Word = Literal["sure", "doubtful", "none"]
+
+LEAST_OVERLAP = 0.08
+"""Least share of a cloud's points that the other can judge."""
+LEAST_ON = 0.75
+"""Least share of the judged points on the other's surface."""
+MOST_THROUGH = 0.01
+"""Largest share of the judged points in free space: a few are already a sign of a wrong pose."""
+LEAST_STIFFNESS = 0.006
+"""Least stiffness of the points on the surfaces; below it, noise decides along the weakest motion."""
+MOST_HEIGHT = 1.7
+"""Largest ratio of the distances from the surfaces to the noise of the points."""
+LEAST_CORRELATION = 0.85
+"""Least correlation of the colours where the clouds meet: floor on ceiling has about 0."""
+NO_POSE_ON, NO_POSE_OVERLAP = 0.35, 0.02
+"""With smaller shares, nothing speaks for the pose."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Whether to believe a pose."""
+
+    word: Word
+    reasons: tuple[str, ...] = ()
+    """Why it is not sure, a clause each; empty if it is."""
+
+    @property
+    def sure(self) -> bool:
+        """Whether nothing speaks against the pose."""
+        return self.word == "sure"
+
+    @property
+    def text(self) -> str:
+        """The verdict in one line."""
+        return f"{self.word}: {'; '.join(self.reasons)}" if self.reasons else self.word
+
+
+def verdict_on(evidence: Evidence, more: tuple[str, ...] = ()) -> Verdict:
+    """Judge a pose by its evidence.
+
+    Args:
+        evidence: what the clouds say of the pose.
+        more: further reasons for doubt, from other poses that were tried.
+    """
+    if evidence.overlap_share < NO_POSE_OVERLAP or evidence.on_share < NO_POSE_ON:
+        return Verdict("none", (*_reasons(evidence), *more))
+    reasons = (*_reasons(evidence), *more)
+    return Verdict("doubtful" if reasons else "sure", reasons)
+
+
+def _reasons(evidence: Evidence) -> tuple[str, ...]:
+    """Return the tests that the evidence does not pass."""
+    reasons = []
+    if evidence.overlap_share < LEAST_OVERLAP:
+        reasons.append(f"the clouds share only {evidence.overlap_share:.0%} of their points")
+    if evidence.through_share > MOST_THROUGH:
+        reasons.append(
+            f"{evidence.through_share:.1%} of the shared points lie where the other camera saw through"
+        )
+    if evidence.on_share < LEAST_ON:
+        reasons.append(f"only {evidence.on_share:.0%} of the shared points lie on the other cloud's surface")
+    elif evidence.height_ratio > MOST_HEIGHT:
+        reasons.append(f"the surfaces are {evidence.height_ratio:.1f} times the points' noise apart")
+    if evidence.color_correlation < LEAST_CORRELATION:  # NaN without colours
+        reasons.append(f"the colours there do not match (correlation {evidence.color_correlation:.2f})")
+    if evidence.open_motions:
+        reasons.append(f"{evidence.open_motions} changes nothing where the clouds meet")
+    elif evidence.stiffness < LEAST_STIFFNESS:
+        reasons.append("the surfaces where the clouds meet hardly hold the pose in one direction")
+    return tuple(reasons)

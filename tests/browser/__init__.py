@@ -1,0 +1,1 @@
+"""The app in a real Chromium; files that follow one another share it."""

@@ -1,0 +1,205 @@
+"""The search finds a place from near and far, and is not sure where it cannot be."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from packetmesh.errors import ReconstructionError
+from pipeline.config import RegistrationConfig
+from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
+from pipeline.registration import point_error_m
+from pipeline.registration.finding.evidence import Judge
+from pipeline.registration.finding.search import (
+    Start,
+    by_surfaces,
+    compared_points_m,
+    default_gates_m,
+    same,
+    search,
+    turn_deg,
+)
+from pipeline.registration.finding.surface import Surface
+from pipeline.registration.finding.verdict import verdict_on
+from pipeline.types import PointCloud
+from tests.pipeline.registration.finding.places import T_TRUE, pair, room
+
+CONFIG = RegistrationConfig()
+COUNT = 2500
+
+
+def found_from(source: PointCloud, target: PointCloud, T_start=None, seed: int = 0):
+    """The search's answer from the identity or another given start."""
+    start = Start("given", lambda: [np.eye(4) if T_start is None else T_start])
+    judge = Judge(Surface(source), Surface(target))
+    return search(source, target, [start], judge, replace(CONFIG, seed=seed))
+
+
+@pytest.fixture(scope="module")
+def clouds():
+    return pair(0, COUNT)
+
+
+@pytest.fixture(scope="module")
+def answer(clouds):
+    return found_from(*clouds)
+
+
+def error_m(found, source, T_true=T_TRUE) -> float:
+    return point_error_m(found.candidate.T_target_source, T_true, source.points_m)
+
+
+def test_a_near_start_leads_to_a_sure_answer(clouds, answer):
+    assert answer.verdict.text == "sure"
+    assert answer.way == "given"
+    assert error_m(answer, clouds[0]) < 0.01
+    assert answer.spread_m < 0.01
+    assert answer.candidate in answer.tried
+
+
+def test_the_search_is_deterministic(clouds, answer):
+    again = found_from(*clouds)
+    np.testing.assert_array_equal(again.candidate.T_target_source, answer.candidate.T_target_source)
+    assert again.verdict == answer.verdict
+    assert again.spread_m == answer.spread_m
+
+
+def test_source_and_target_swapped_end_in_the_inverse(clouds, answer):
+    back = found_from(*clouds[::-1])
+    assert back.verdict == answer.verdict
+    assert error_m(back, clouds[1], inverse(T_TRUE)) < 0.01
+
+
+def test_the_unit_of_length_does_not_matter(clouds, answer):
+    scaled = found_from(*(PointCloud(100.0 * cloud.points_m) for cloud in clouds))
+    assert scaled.verdict == answer.verdict
+    assert scaled.candidate.gate_m == pytest.approx(100.0 * answer.candidate.gate_m)
+    assert scaled.candidate.evidence.on_share == pytest.approx(answer.candidate.evidence.on_share, abs=1e-3)
+    assert scaled.spread_m == pytest.approx(100.0 * answer.spread_m, rel=1e-3)
+
+
+def test_bare_clouds_may_be_moved_together(clouds, answer):
+    move = rigid(rotation_exp(np.array([0.4, -1.0, 0.3])), [8.0, -3.0, 2.0])
+    moved = [PointCloud(apply(move, cloud.points_m)) for cloud in clouds]
+    found = found_from(*moved)
+    assert found.verdict == answer.verdict
+    assert error_m(found, moved[0], move @ T_TRUE @ inverse(move)) < 0.01
+
+
+def test_from_across_the_room_features_lead_to_the_place(clouds):
+    source, target = clouds
+    far = rigid(rotation_exp(np.array([0.3, 0.2, 1.9])), [9.0, -4.0, 1.0])
+    moved = PointCloud(apply(inverse(far), source.points_m))
+    starts = [Start("given", lambda: [np.eye(4)]), by_surfaces(moved, target)]
+    found = search(moved, target, starts, Judge(Surface(moved), Surface(target)), CONFIG)
+    assert found.way == "surfaces"
+    assert found.verdict.text == "sure"
+    assert error_m(found, moved, T_TRUE @ far) < 0.01
+
+
+@pytest.mark.parametrize("part", ["source", "target"])
+def test_a_part_finds_its_place_in_the_whole(part):
+    source, target = pair(0, 2 * COUNT)
+    if part == "source":
+        source = source.select(np.flatnonzero(apply(T_TRUE, source.points_m)[:, 0] < 3.0))
+    else:
+        target = target.select(np.flatnonzero(target.points_m[:, 0] < 3.0))
+    found = found_from(source, target)
+    assert found.verdict.text == "sure"
+    assert found.candidate.evidence.overlap_share > 0.95
+    assert error_m(found, source) < 0.01
+
+
+def test_a_cloud_stays_on_itself(clouds):
+    found = found_from(clouds[1], clouds[1])
+    assert found.verdict.text == "sure"
+    np.testing.assert_allclose(found.candidate.T_target_source, np.eye(4), atol=1e-6)
+    assert found.candidate.evidence.on_share == 1.0
+    assert found.spread_m < 1e-6
+
+
+def test_two_different_rooms_are_not_called_one():
+    other = room(5, COUNT, (5.2, 2.1, 3.4))[:, [1, 0, 2]] * [1.0, -1.0, 1.0]
+    assert not found_from(PointCloud(other), PointCloud(room(2, COUNT))).verdict.sure
+
+
+@pytest.mark.parametrize("size_m", [(3.0, 3.0, 2.4), (3.0, 3.0, 3.0)])
+def test_an_empty_square_room_fits_after_a_quarter_turn(size_m):
+    def box(seed: int) -> np.ndarray:
+        rng = np.random.default_rng(seed)
+        points = rng.uniform(0.0, 1.0, (COUNT, 3))
+        points[np.arange(COUNT), rng.integers(0, 3, COUNT)] = rng.integers(0, 2, COUNT)
+        return points * size_m + rng.normal(scale=0.003, size=(COUNT, 3))
+
+    found = found_from(PointCloud(apply(inverse(T_TRUE), box(1))), PointCloud(box(2)))
+    assert found.verdict.word == "doubtful"
+    assert "degrees, the source fits as well" in found.verdict.text
+
+
+def surface(name: str, seed: int) -> np.ndarray:
+    """A plane, a corridor along x or a sphere, with noise."""
+    rng = np.random.default_rng(seed)
+    a, b = rng.uniform(0.0, 1.0, (2, COUNT))
+    rays = rng.normal(size=(COUNT, 3))
+    zero, side = np.zeros(COUNT), rng.integers(0, 4, COUNT)
+    points = {
+        "plane": np.stack([2 * a, 2 * b, zero], axis=1),
+        "corridor": np.stack(
+            [
+                3 * a,
+                np.choose(side, [2 * b, 2 * b, zero, 2 + zero]),
+                np.choose(side, [zero, 2 + zero, 2 * b, 2 * b]),
+            ],
+            axis=1,
+        ),
+        "sphere": rays / np.linalg.norm(rays, axis=1, keepdims=True),
+    }[name]
+    return points + rng.normal(scale=0.003, size=(COUNT, 3))
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("plane", "sliding across z and turning about z"),
+        ("corridor", ""),
+        ("sphere", "turning about any axis"),
+    ],
+)
+def test_a_shape_with_an_open_motion_is_never_sure(name, says):
+    """A corridor's rim holds it a little, which the stiffness says."""
+    source, target = (Surface(PointCloud(surface(name, seed))) for seed in (1, 2))
+    verdict = verdict_on(Judge(source, target)(np.eye(4)))
+    assert verdict.word == "doubtful"
+    assert says in verdict.text
+
+
+def test_clouds_far_apart_have_no_start(clouds):
+    with pytest.raises(ReconstructionError, match="No start pose leads to a registration"):
+        found_from(PointCloud(clouds[0].points_m + 500.0), clouds[1])
+
+
+@pytest.mark.parametrize("size", [0.01, 100.0])
+@pytest.mark.parametrize("way", ["given", "surfaces"])
+def test_gates_ascend_and_grow_with_the_place(clouds, way, size):
+    gates_m = default_gates_m(clouds[1], way)
+    assert gates_m == sorted(set(gates_m))
+    scaled = default_gates_m(PointCloud(size * clouds[1].points_m), way)
+    np.testing.assert_allclose(scaled, np.multiply(size, gates_m), rtol=1e-9)
+
+
+def test_strays_do_not_decide_whether_two_poses_are_the_same():
+    """At a kilometre, a thousandth of a degree is 2 cm."""
+    points_m = room(1, 1000)
+    points_m[::10] += 1000.0
+    cloud = PointCloud(points_m)
+    assert len(compared_points_m(cloud)) == 900
+    assert len(compared_points_m(PointCloud(room(1, 1000)))) == 1000
+    little = rigid(rotation_exp(np.array([0.0, 0.0, 1e-3])), np.zeros(3))
+    assert same(np.eye(4), little, cloud, PointCloud(room(2, 1000)))
+    assert not same(np.eye(4), rigid(np.eye(3), [0.1, 0.0, 0.0]), cloud, PointCloud(room(2, 1000)))
+
+
+@pytest.mark.parametrize("scale", [0.3, 1.0, 40.0])
+def test_the_angle_between_poses_does_not_know_their_scale(scale):
+    turned = rigid(scale * rotation_exp(np.array([0.0, 0.5, 0.0])), [1.0, 2.0, 3.0])
+    assert turn_deg(turned, rigid(scale * np.eye(3), np.zeros(3))) == pytest.approx(np.degrees(0.5))

@@ -1,0 +1,47 @@
+"""Each test of a verdict fails alone, with its own words."""
+
+from dataclasses import replace
+
+import pytest
+
+from pipeline.registration.finding.evidence import Evidence
+from pipeline.registration.finding.verdict import verdict_on
+
+GOOD = Evidence((1000, 1000), (2000, 2000), 1950, 0, 1.0, 0.05, "", float("nan"))
+
+
+def test_nothing_against_a_pose_is_sure():
+    verdict = verdict_on(GOOD)
+    assert verdict.sure
+    assert verdict.text == "sure"
+    assert verdict_on(replace(GOOD, color_correlation=0.95)).sure
+
+
+@pytest.mark.parametrize(
+    ("change", "word", "says"),
+    [
+        ({"judged": (100, 100), "on": 195}, "doubtful", "share only 5% of their points"),
+        ({"through": 60}, "doubtful", "3.0% of the shared points lie where the other camera saw through"),
+        ({"on": 1200}, "doubtful", "only 60% of the shared points lie on the other cloud's surface"),
+        ({"height_ratio": 1.8}, "doubtful", "the surfaces are 1.8 times the points' noise apart"),
+        ({"color_correlation": 0.2}, "doubtful", "colours there do not match (correlation 0.20)"),
+        ({"open_motions": "sliding along y"}, "doubtful", "sliding along y changes nothing"),
+        ({"stiffness": 1e-3}, "doubtful", "hardly hold the pose in one direction"),
+        ({"on": 500}, "none", "only 25% of the shared points"),
+        ({"judged": (20, 20), "on": 40}, "none", "share only 1% of their points"),
+        ({"judged": (0, 0), "on": 0}, "none", "share only 0% of their points"),
+    ],
+)
+def test_each_fault_has_its_words(change, word, says):
+    verdict = verdict_on(replace(GOOD, **change))
+    assert verdict.word == word
+    assert not verdict.sure
+    assert verdict.reasons
+    assert says in verdict.text
+    assert verdict.text.startswith(f"{word}: ")
+
+
+def test_other_poses_are_a_reason_too():
+    verdict = verdict_on(GOOD, ("turned by 90 degrees, the source fits as well",))
+    assert verdict.word == "doubtful"
+    assert verdict.text == "doubtful: turned by 90 degrees, the source fits as well"
