@@ -48,7 +48,7 @@ def deliver(
     """Send a rig's images through a network and rebuild the scene from what has arrived at each moment.
 
     Args:
-        rig: one to six camera nodes with colour and depth images, intrinsics and given poses.
+        rig: one to 200 camera nodes with colour and depth images, intrinsics and given poses.
         network: any network that collects images from fixed nodes.
         coding: name in ``pipeline.delivery.CODINGS``, which decides how images become bytes.
         moments: number of moments at which the scene is rebuilt, after equal shares of the bytes that arrive.

@@ -57,7 +57,7 @@ def reconstruct(rig: Rig, config: PipelineConfig = PRESETS["packetmesh"]) -> Rec
     """Run the whole chain on a rig.
 
     Args:
-        rig: one to six camera nodes with colour and depth images, intrinsics and given poses.
+        rig: one to 200 camera nodes with colour and depth images, intrinsics and given poses.
         config: all settings; ``PRESETS["thesis"]`` reconstructs as the thesis does.
 
     Raises:

@@ -27,7 +27,7 @@ def import_rig(
     Args:
         path: The recording's folder, unpacked; or a bag of ROS 1 or 2 (.bag, .db3, .mcap or its folder).
         out: Folder for the rig, new or empty; give it to `packetmesh reconstruct --rig`.
-        frames: Number of frames that become nodes, at most 6; they are far apart but overlap. A bag of
+        frames: Number of frames that become nodes, at most 200; they are far apart but overlap. A bag of
             several cameras gives one node for each camera.
         depth_scale: Depth units per metre; without it, the value of the kind of recording.
         intrinsics: Intrinsics of the colour camera, if the recording has no file of them or another file is

@@ -29,7 +29,7 @@ def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> 
     a rig are down, ``placed`` computes the positions of the others.
 
     Args:
-        rig: one to six nodes; the world's third axis points up.
+        rig: one to 200 nodes; the world's third axis points up.
         sizes_bytes: bytes of each node's encoded images.
         network: a preset, or any other network that collects images from fixed nodes.
 

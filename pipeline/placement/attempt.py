@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
-from pipeline.kernels import geometry
 from pipeline.placement.agreement import NOTHING_SHARED, Agreement
 from pipeline.placement.edges import PoseEdge, registration_information
 from pipeline.placement.samples import NodeSample, both_ways
+from pipeline.placement.views import Views
 from pipeline.registration import register
-from pipeline.registration.anywhere import register_anywhere
+from pipeline.registration.finding.search import Found, Start, same, search
+from pipeline.registration.finding.verdict import Verdict
 from pipeline.registration.neighbourhood import Normals
-from pipeline.types import FloatArray, PointCloud, RegistrationResult
+from pipeline.types import FloatArray, RegistrationResult
 
 LEAST_OVERLAP = 0.05
 """Least share of two nodes' points that the other camera can judge, for their agreement to count."""
 LEAST_AGREEMENT = 0.4
 """A node with a given pose is excluded if a smaller share of its shared measurements is within 2 %."""
 SURE_OVERLAP, SURE_AGREEMENT = 0.15, 0.88
-"""Least overlap and agreement of a pose found without a first guess; a given one with less gets a warning.
-At correct poses, nodes of rendered rigs reach .92 to .98 and those of a real SR300 .92 to .99; 3 degrees and
+"""Least overlap and agreement of an answer of a wider gate; a node with less agreement gets a warning. At
+correct poses, nodes of rendered rigs reach .92 to .98 and those of a real SR300 .92 to .99; 3 degrees and
 6 cm off .09 to .54; in another room up to .72; with one corner mistaken for the opposite .86."""
+FOUND_AGREEMENT = 0.75
+"""A pose that was found is refuted by a smaller agreement: it is more than that of walls on other walls."""
 WIDER_GATES = 2.0, 4.0
 """Multiples of the configured gate, tried if given poses lead to a contradiction with the measurements."""
 LEAST_ODDS, MOST_ODDS = 0.1, 100.0
@@ -44,17 +46,26 @@ class Attempt:
     """Its steps are without their pairs."""
     agreement: Agreement
     edge: PoseEdge | None
-    """Evidence for the pose graph; None if the registration failed or degenerated."""
+    """Evidence for the pose graph; None if the registration failed, degenerated or is in doubt."""
+    verdict: Verdict | None = None
+    """Verdict on a pose that was found; None of a given one, or if none was found."""
+    score: float = 0.0
+    """Score of the evidence for a pose that was found, 0 to 1."""
 
     @property
     def link(self) -> tuple[int, int]:
         """Source and target."""
         return self.source, self.target
 
+    @property
+    def holds(self) -> bool:
+        """Whether it is evidence for a pose, and nothing contradicts it."""
+        return self.edge is not None and self.edge.agrees
 
-def accepted(found: Agreement, given: bool) -> bool:
-    """Return whether the measurements confirm a pose or, from given poses, do not contradict it."""
-    return not less(found, LEAST_AGREEMENT) if given else confirmed(found)
+    @property
+    def refuted(self) -> bool:
+        """Whether the measurements contradict the pose to which a given one led."""
+        return less(self.agreement, LEAST_AGREEMENT)
 
 
 def less(found: Agreement, least: float) -> bool:
@@ -67,17 +78,9 @@ def confirmed(found: Agreement) -> bool:
     return found.overlap_share >= SURE_OVERLAP and found.within_2pct_share >= SURE_AGREEMENT
 
 
-def score(found: Agreement) -> float:
-    """Score a pose found from anywhere: its agreement, or 0 if the overlap is too small."""
-    return found.within_2pct_share if found.overlap_share >= SURE_OVERLAP else 0.0
-
-
-def strength(found: Agreement) -> float:
-    """Return the odds that a shared measurement agrees: one with .96 weighs more than two with .9."""
-    if not found.shared:
-        return LEAST_ODDS
-    odds = found.within / max(1, found.shared - found.within)
-    return float(np.clip(odds, LEAST_ODDS, MOST_ODDS))
+def odds(share: float) -> float:
+    """Return the odds that a measurement agrees: a share of .96 weighs more than two of .9."""
+    return float(np.clip(share / max(1.0 - share, 1e-9), LEAST_ODDS, MOST_ODDS))
 
 
 def attempt_given(
@@ -87,8 +90,14 @@ def attempt_given(
     config: RegistrationConfig,
     T_init: FloatArray,
 ) -> Attempt:
-    """Register a node to another from a start pose; if the measurements contradict the result, try wider
+    """Register a node to another from their given poses; if the measurements contradict the result, try wider
     gates.
+
+    Args:
+        source, target: the two nodes.
+        link: their numbers.
+        config: settings of the registration.
+        T_init: (4, 4) start pose T_target_source.
     """
 
     def work() -> RegistrationResult:
@@ -100,65 +109,98 @@ def attempt_given(
                     return wider
         return result
 
-    return _attempt(source, target, link, (source.cloud, target.cloud), True, work, T_init)
+    try:
+        result = work()
+    except ReconstructionError as error:
+        return _failed(link, True, T_init, str(error))
+    found = both_ways(source, target, result.T_target_source)
+    strength = odds(found.within_2pct_share) if found.shared else LEAST_ODDS
+    attempt = Attempt(*link, True, _without_pairs(result), found, None)
+    return replace(attempt, edge=_edge(source, target, link, result, strength, not attempt.refuted))
 
 
-def attempt_anywhere(
+def attempt_found(
     source: NodeSample,
     target: NodeSample,
     link: tuple[int, int],
-    clouds: tuple[PointCloud, PointCloud],
     config: RegistrationConfig,
-    thorough: bool,
+    start: Start,
+    views: Views,
 ) -> Attempt:
-    """Register a node to another without a start pose.
+    """Search for the pose of a node relative to another; if it is sure, register the nodes there.
 
     Args:
         source, target: the two nodes.
         link: their numbers.
-        clouds: their whole clouds, for the features.
-        config: settings of the registration.
-        thorough: whether a second size of features is tried.
+        config: settings of the last registration, whose gate is that of the search if that is smaller.
+        start: way to find start poses.
+        views: the nodes' surfaces.
     """
+    clouds, judge = (views.cloud(link[0]), views.cloud(link[1])), views.judge(*link)
+    try:
+        found = search(*clouds, [start], judge, config)
+    except ReconstructionError as error:
+        return _failed(link, False, np.eye(4), str(error))
+    T_found = found.candidate.T_target_source
+    if not found.verdict.sure:
+        return _doubted(source, target, link, found, found.verdict.text)
+    final = replace(config, start="given", gate_m=min(config.gate_m, found.candidate.gate_m), direction="p2q")
+    result = _registered(source, target, final, T_found)
+    if isinstance(result, str):
+        return _doubted(source, target, link, found, result)
+    if not same(result.T_target_source, T_found, *clouds):
+        return _doubted(source, target, link, found, "the registration leaves the pose that was found")
+    agreement = both_ways(source, target, result.T_target_source)
+    score = found.candidate.evidence.score
+    edge = _edge(source, target, link, result, odds(score), not less(agreement, FOUND_AGREEMENT))
+    return Attempt(*link, False, _without_pairs(result), agreement, edge, found.verdict, score)
 
-    def judged(T_target_source: FloatArray) -> float:
-        return score(both_ways(source, target, T_target_source))
 
-    def work() -> RegistrationResult:
-        return register_anywhere(*clouds, config, judged, SURE_AGREEMENT, thorough)
+def _registered(
+    source: NodeSample, target: NodeSample, config: RegistrationConfig, T_init: FloatArray
+) -> RegistrationResult | str:
+    """Register two nodes; returns the reason if it fails or degenerates."""
+    try:
+        result = register(source.cloud, target.cloud, config, T_init)
+    except ReconstructionError as error:
+        return str(error)
+    return result if _usable(result) else result.stop_reason
 
-    T_given = geometry.inverse(target.frame.T_world_camera) @ source.frame.T_world_camera
-    return _attempt(source, target, link, clouds, False, work, T_given)
+
+def _doubted(
+    source: NodeSample, target: NodeSample, link: tuple[int, int], found: Found, reason: str
+) -> Attempt:
+    """Return the attempt of a pose that is not believed."""
+    T = found.candidate.T_target_source
+    agreement = both_ways(source, target, T)
+    result = RegistrationResult(T, (), False, reason)
+    return Attempt(*link, False, result, agreement, None, found.verdict, found.candidate.evidence.score)
 
 
-def _attempt(
+def _failed(link: tuple[int, int], given: bool, T: FloatArray, reason: str) -> Attempt:
+    """Return the attempt of a registration that led nowhere; the pose is its start."""
+    return Attempt(*link, given, RegistrationResult(T, (), False, reason), NOTHING_SHARED, None)
+
+
+def _usable(result: RegistrationResult) -> bool:
+    return bool(result.steps) and not result.stop_reason.startswith("degenerate")
+
+
+def _edge(
     source: NodeSample,
     target: NodeSample,
     link: tuple[int, int],
-    clouds: tuple[PointCloud, PointCloud],
-    given: bool,
-    work: Callable[[], RegistrationResult],
-    T_without: FloatArray,
-) -> Attempt:
-    """Run a registration and judge its result; if it fails, the pose is ``T_without``."""
-    try:
-        result = work()
-    except ReconstructionError as error:
-        failed = RegistrationResult(T_without, (), False, str(error))
-        return Attempt(*link, given, failed, NOTHING_SHARED, None)
-    found = both_ways(source, target, result.T_target_source)
-    edge = None
-    if result.steps and not result.stop_reason.startswith("degenerate"):
-        moving, fixed = clouds
-        here, there = result.steps[-1].pairs.T
-        normals = (
-            Normals(moving.points_m, moving.normals).at(here),
-            Normals(fixed.points_m, fixed.normals).at(there),
-        )
-        information = registration_information(result, moving.points_m, *normals)
-        accepts = accepted(found, given)
-        edge = PoseEdge(*link, result.T_target_source, information, strength(found), accepts)
-    return Attempt(*link, given, _without_pairs(result), found, edge)
+    result: RegistrationResult,
+    strength: float,
+    agrees: bool,
+) -> PoseEdge | None:
+    """Return the evidence of a registration of two nodes' clouds; None if it degenerated."""
+    if not _usable(result):
+        return None
+    sides = zip((source.cloud, target.cloud), result.steps[-1].pairs.T, strict=True)
+    normals = [Normals(cloud.points_m, cloud.normals).at(rows) for cloud, rows in sides]
+    information = registration_information(result, source.cloud.points_m, normals[0], normals[1])
+    return PoseEdge(*link, result.T_target_source, information, strength, agrees)
 
 
 def _without_pairs(result: RegistrationResult) -> RegistrationResult:

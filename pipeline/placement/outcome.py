@@ -66,7 +66,7 @@ class Placement:
     verdicts: tuple[NodeVerdict, ...] = ()
     """Verdict on each node; empty means that all are placed."""
     agreements: tuple[NodeAgreement, ...] = ()
-    """Agreements of all pairs of placed nodes."""
+    """Agreements of all pairs of placed nodes whose views meet."""
 
     def placed(self, items: Sequence[Item]) -> list[Item]:
         """Return the items of placed nodes, from one item per node."""
@@ -82,7 +82,7 @@ class Placement:
     @property
     def apart(self) -> bool:
         """Whether there are several nodes, but no two are placed relative to each other."""
-        return len(self.verdicts) > 1 and not self.agreements
+        return len(self.verdicts) > 1 and sum(verdict.placed for verdict in self.verdicts) < 2
 
     @property
     def sentences(self) -> list[str]:

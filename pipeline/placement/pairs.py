@@ -6,39 +6,58 @@ from collections.abc import Callable, Iterator, Sequence
 
 from pipeline.placement.loops import Groups
 from pipeline.placement.samples import NodeSample, shared_view
+from pipeline.types import FloatArray
 
 SHARED_VIEW = 0.25
 """Least share of a node's points in another's image for registering the two."""
 GIVEN_PAIRS = 4
-"""Most earlier nodes to which a node with a given pose is registered: those with the largest common view."""
-SURE_PAIRS = 3
-"""Sure registrations of a node without a pose after which no more are looked for: one for the tree and two
-that close loops."""
-LOOP_TRIES = 6
-"""Most registrations of a node without a pose that are tried for the sake of loops alone."""
+"""Most earlier nodes to which a node with a pose is registered: those with the largest common view."""
+COLOUR_TRIES = 40
+"""Most pairs of a node that are tried by colour, to join it to others."""
+LONE_TRIES, GROUP_TRIES = 12, 2
+"""Most pairs of a node that are tried by surfaces: of one that colour joined to nothing, and of another."""
+BRIDGE_TRIES = 2
+"""Most further pairs that are tried where a single registration joins two groups."""
 
 Pair = tuple[int, int]
 """A later node and an earlier one: source and target."""
-Candidates = Callable[[Sequence[NodeSample]], Sequence[Pair]]
-"""Function that orders all pairs of nodes whose common view is unknown, the likeliest to overlap first."""
 
 
-def neighbours_first(nodes: Sequence[NodeSample]) -> list[Pair]:
-    """Order the pairs by the distance of their nodes in the rig: images taken in a row overlap most."""
-    count = len(nodes)
-    return [(near + apart, near) for apart in range(1, count) for near in range(count - apart)]
+def likeliest_first(known: Sequence[bool], likeness: Callable[[int, int], float]) -> list[Pair]:
+    """Order the pairs that are not both known by their likeness; equal ones by their distance in the rig.
+
+    Images that were taken in a row overlap most.
+
+    Args:
+        known: whether each node's pose is known.
+        likeness: returns how much alike two nodes' images are.
+    """
+    count = len(known)
+    pairs = [(near + apart, near) for apart in range(1, count) for near in range(count - apart)]
+    unknown = [pair for pair in pairs if not (known[pair[0]] and known[pair[1]])]
+    return sorted(unknown, key=lambda pair: -likeness(*pair))
 
 
-def given_pairs(nodes: Sequence[NodeSample], known: Sequence[bool]) -> tuple[list[Pair], list[Pair]]:
-    """Return pairs of nodes with known poses: each node with its best earlier partner, and those for loops.
+def given_pairs(
+    nodes: Sequence[NodeSample], poses: Sequence[FloatArray], group: Sequence[int | None]
+) -> tuple[list[Pair], list[Pair]]:
+    """Return pairs of nodes with poses: each node with its best earlier partner, and those for loops.
 
     The partner is the earlier node in whose image most of the node's points are; up to ``GIVEN_PAIRS`` - 1
     others follow, if they see at least ``SHARED_VIEW`` of the node.
+
+    Args:
+        nodes: the nodes.
+        poses: (4, 4) pose T_group_camera of each.
+        group: number of the frame in which each pose is; None without a pose.
     """
     partners, others = [], []
     for index in range(1, len(nodes)):
-        earlier = [k for k in range(index) if known[index] and known[k]]
-        shares = {k: shared_view(nodes[index], nodes[k]) for k in earlier}
+        shares = {
+            k: shared_view(nodes[index], nodes[k], poses[index], poses[k])
+            for k in range(index)
+            if group[index] is not None and group[k] == group[index]
+        }
         if not shares:
             continue
         partner, *more = sorted(shares, key=lambda k: (-shares[k], k))[:GIVEN_PAIRS]
@@ -47,35 +66,62 @@ def given_pairs(nodes: Sequence[NodeSample], known: Sequence[bool]) -> tuple[lis
     return partners, others
 
 
-class UnknownPairs:
-    """The next pair to try among nodes of which some have no pose."""
+class JoiningPairs:
+    """Pairs that may join two groups of nodes, in a given order, while the smaller group's node has tries."""
 
-    def __init__(self, candidates: Sequence[Pair], known: Sequence[bool]) -> None:
-        """Begin with all candidates that are not both known, the likeliest first."""
-        self._left = [(one, other) for one, other in candidates if not (known[one] and known[other])]
-        self._tries = [0] * len(known)
-
-    def next(self, links: Sequence[Pair], nodes: int) -> tuple[Pair, bool] | None:
-        """Return the next pair, and whether it may join two groups of nodes; None if there are enough.
+    def __init__(self, candidates: Sequence[Pair], tries: Sequence[int]) -> None:
+        """Begin with all candidates.
 
         Args:
-            links: pairs of nodes whose registrations are sure and agree with each other.
-            nodes: number of nodes.
+            candidates: pairs, the likeliest first.
+            tries: most pairs of each node.
         """
-        groups = Groups(nodes, links)
-        sure = [sum(node in link for link in links) for node in range(nodes)]
-        joins = next((pair for pair in self._left if groups.of(pair[0]) != groups.of(pair[1])), None)
-        pair = joins or next(self._for_loops(sure), None)
-        if pair is None:
-            return None
-        self._left.remove(pair)
-        if joins is None:
-            for node in pair:
-                self._tries[node] += 1
-        return pair, joins is not None
+        self._left, self._tries = list(candidates), list(tries)
 
-    def _for_loops(self, sure: Sequence[int]) -> Iterator[Pair]:
-        """Yield the pairs in which a node has too few sure registrations and tries left."""
+    def next(self, links: Sequence[Pair]) -> Pair | None:
+        """Return the next pair; None if there is none.
+
+        Args:
+            links: pairs of nodes whose poses relative to each other are known.
+        """
+        groups = Groups(len(self._tries), links)
+        sizes = {node: len(members) for members in groups.sets() for node in members}
         for pair in self._left:
-            if any(sure[node] < SURE_PAIRS and self._tries[node] < LOOP_TRIES for node in pair):
+            node = min(pair, key=lambda node: (sizes[node], -self._tries[node]))
+            if groups.of(pair[0]) != groups.of(pair[1]) and self._tries[node] > 0:
+                self._tries[node] -= 1
+                self._left.remove(pair)
+                return pair
+        return None
+
+
+def lone_tries(nodes: int, links: Sequence[Pair]) -> list[int]:
+    """Return the most pairs of each node that are tried by surfaces, after all tries by colour."""
+    linked = {node for link in links for node in link}
+    return [GROUP_TRIES if node in linked else LONE_TRIES for node in range(nodes)]
+
+
+def across_bridges(candidates: Sequence[Pair], links: Sequence[Pair], nodes: int) -> Iterator[Pair]:
+    """Yield pairs across each link without which its group would be two, the likeliest first.
+
+    Args:
+        candidates: pairs that were not tried, the likeliest first.
+        links: pairs of nodes whose poses relative to each other are known.
+        nodes: number of nodes.
+    """
+    yielded: set[Pair] = set()
+    whole = Groups(nodes, links)
+    for bridge in links:
+        parts = Groups(nodes, [link for link in links if link != bridge])
+        if parts.of(bridge[0]) == parts.of(bridge[1]):
+            continue
+        across = [
+            pair
+            for pair in candidates
+            if whole.of(pair[0]) == whole.of(pair[1]) == whole.of(bridge[0])
+            and parts.of(pair[0]) != parts.of(pair[1])
+        ]
+        for pair in across[:BRIDGE_TRIES]:
+            if pair not in yielded:
+                yielded.add(pair)
                 yield pair

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -10,15 +10,17 @@ import numpy as np
 from pipeline.config import NodePoints, RegistrationConfig
 from pipeline.kernels import geometry
 from pipeline.nodes import NodeClouds
-from pipeline.placement.agreement import NOTHING_SHARED
-from pipeline.placement.attempt import Attempt, accepted, attempt_anywhere, attempt_given
+from pipeline.placement.agreement import NOTHING_SHARED, Agreement
+from pipeline.placement.attempt import Attempt, attempt_given
 from pipeline.placement.edges import PoseEdge
-from pipeline.placement.loops import Groups, best_loops
+from pipeline.placement.loops import Groups
 from pipeline.placement.outcome import NodeAgreement, NodeRegistration, NodeVerdict, Placement
-from pipeline.placement.pairs import Candidates, Pair, UnknownPairs, given_pairs, neighbours_first
+from pipeline.placement.pairs import given_pairs
 from pipeline.placement.pose_graph import PoseGraph, solve_pose_graph
-from pipeline.placement.samples import NodeSample, both_ways, sample_of
+from pipeline.placement.samples import NodeSample, both_ways, sample_of, shared_view
+from pipeline.placement.unknown import UnknownPoses
 from pipeline.placement.verdicts import verdicts_of
+from pipeline.placement.views import Views
 from pipeline.types import FloatArray, RgbdFrame
 
 
@@ -27,42 +29,35 @@ def place_nodes(
     nodes: Sequence[NodeClouds],
     config: RegistrationConfig,
     align_with: NodePoints = "sensor",
-    candidates: Candidates = neighbours_first,
 ) -> Placement:
     """Place the nodes relative to each other by registering pairs, enough for a tree and loops.
 
-    Nodes with known poses are registered to those earlier ones with the largest common view. Other pairs
-    start from anywhere, the likeliest first, and count only if both cameras' measurements confirm them; they
-    are tried until all nodes are joined and each is in loops. Registrations that contradict the measurements
-    or their loops are rejected; the others give the poses by least squares. The first node with a known pose
-    keeps it. A node with a known pose that no good registration reaches is placed relative to the earlier
-    node with the largest common view; if their registration degenerates, by the given poses. A node without a
-    pose that none reaches is excluded, and so is one whose measurements contradict the others' at its final
-    pose.
+    Nodes with known poses are registered to those earlier ones with the largest common view; the others are
+    searched for (``UnknownPoses``). Registrations that contradict the measurements or their loops are
+    rejected; the others give the poses by least squares. The first node with a known pose keeps it. A node
+    with a known pose that no good registration reaches is placed relative to the earlier node with the
+    largest common view; if the measurements refute that too, by the given poses. A node without a pose that
+    none reaches is excluded, and so is one whose measurements contradict the others' at its final pose.
 
     Args:
         frames: the nodes' images with their given poses.
         nodes: the clouds of the nodes.
         config: settings of the pairwise registration; with ``start="global"`` all poses count as unknown.
         align_with: which of a node's clouds is registered.
-        candidates: orders the pairs with unknown common view, the likeliest to overlap first.
     """
     known = [config.start == "given" and frame.pose_known for frame in frames]
     if len(nodes) == 1:
         alone = NodeVerdict(nodes[0].name, True, NOTHING_SHARED)
         return Placement((), (frames[0].T_world_camera,), (alone,))
     samples = [sample_of(*node, config, align_with) for node in zip(frames, nodes, strict=True)]
-    tried = _attempts(samples, nodes, config, align_with, known, candidates)
+    tried = _from_given_poses(samples, known, config)
+    if not all(known):
+        tried = UnknownPoses(samples, known, config, Views(frames, config.seed), tried).attempts()
     edges = [attempt.edge for attempt in tried if attempt.edge is not None]
     reference, group = _reference(known, edges)
     graph = solve_pose_graph([sample.graph_points_m for sample in samples], edges, reference)
     poses = _poses(frames, graph.T_reference_node, reference, group, tried)
-    agreements = {
-        (source, target): both_ways(
-            samples[source], samples[target], geometry.inverse(poses[target]) @ poses[source]
-        )
-        for target, source in combinations(group, 2)
-    }
+    agreements = dict(_agreements(samples, poses, group))
     names = [node.name for node in nodes]
     verdicts = verdicts_of(names, group, agreements, tried)
     return Placement(
@@ -77,45 +72,34 @@ def place_nodes(
     )
 
 
-def _attempts(
-    samples: Sequence[NodeSample],
-    nodes: Sequence[NodeClouds],
-    config: RegistrationConfig,
-    align_with: NodePoints,
-    known: Sequence[bool],
-    candidates: Candidates,
+def _from_given_poses(
+    samples: Sequence[NodeSample], known: Sequence[bool], config: RegistrationConfig
 ) -> list[Attempt]:
-    """Register all pairs that are worth it; those of given poses first, and of them each node's partner."""
-    partners, others = given_pairs(samples, known)
-    tried = []
-    for source, target in (*partners, *others):
-        here, there = samples[source], samples[target]
-        T_init = geometry.inverse(there.frame.T_world_camera) @ here.frame.T_world_camera
-        tried.append(attempt_given(here, there, (source, target), config, T_init))
-    if all(known):
-        return tried
-    unknown = UnknownPairs(candidates(samples), known)
-    while (pair := unknown.next(_sure_links(known, tried), len(nodes))) is not None:
-        (source, target), joins = pair
-        clouds = getattr(nodes[source], align_with), getattr(nodes[target], align_with)
-        tried.append(
-            attempt_anywhere(samples[source], samples[target], (source, target), clouds, config, joins)
+    """Register the nodes with known poses; each node's partner first."""
+    poses = [sample.frame.T_world_camera for sample in samples]
+    partners, others = given_pairs(samples, poses, [0 if one else None for one in known])
+    return [
+        attempt_given(
+            samples[source],
+            samples[target],
+            (source, target),
+            config,
+            geometry.inverse(poses[target]) @ poses[source],
         )
-    return tried
-
-
-def _sure_links(known: Sequence[bool], tried: Sequence[Attempt]) -> list[Pair]:
-    """Return the pairs whose registrations agree with the measurements and with each other, and links between
-    the nodes with known poses.
-    """
-    edges = [attempt.edge for attempt in tried if attempt.edge is not None]
-    agreeing = best_loops(len(known), edges).agreeing(len(edges))
-    links = [
-        (edge.source, edge.target)
-        for edge, agrees in zip(edges, agreeing, strict=True)
-        if agrees and edge.agrees
+        for source, target in (*partners, *others)
     ]
-    return links + list(pairwise(index for index, one in enumerate(known) if one))
+
+
+def _agreements(
+    samples: Sequence[NodeSample], poses: Sequence[FloatArray], group: Sequence[int]
+) -> Iterable[tuple[tuple[int, int], Agreement]]:
+    """Yield the agreement of all pairs of nodes of a group of which one sees points of the other."""
+    for target, source in combinations(group, 2):
+        here, there = samples[source], samples[target]
+        seen = shared_view(here, there, poses[source], poses[target])
+        if seen or shared_view(there, here, poses[target], poses[source]):
+            T_target_source = geometry.inverse(poses[target]) @ poses[source]
+            yield (source, target), both_ways(here, there, T_target_source)
 
 
 def _registrations(
@@ -164,8 +148,7 @@ def _poses(
             T_target_node = (
                 geometry.inverse(frames[attempt.target].T_world_camera) @ frames[index].T_world_camera
             )
-            agreed = accepted(attempt.agreement, given=True)
             poses[index] = poses[attempt.target] @ (
-                attempt.result.T_target_source if agreed else T_target_node
+                T_target_node if attempt.refuted else attempt.result.T_target_source
             )
     return poses

@@ -71,11 +71,10 @@ def both_ways(source: NodeSample, target: NodeSample, T_target_source: FloatArra
     )
 
 
-def shared_view(node: NodeSample, other: NodeSample) -> float:
-    """Return the share of a node's points that project into another node's image, by the given poses."""
+def shared_view(node: NodeSample, other: NodeSample, T_node: FloatArray, T_other: FloatArray) -> float:
+    """Return the share of a node's points that project into another node's image at (4, 4) poses of both."""
     points_m = node.measured.points_m[:: max(1, len(node.measured) // VIEW_POINTS)]
-    T_other_camera = geometry.inverse(other.frame.T_world_camera) @ node.frame.T_world_camera
-    seen_m = geometry.apply(T_other_camera, points_m)
+    seen_m = geometry.apply(geometry.inverse(T_other) @ T_node, points_m)
     seen_m = seen_m[seen_m[:, 2] > 0.1]
     uv = geometry.project(other.frame.intrinsics, seen_m)
     size_px = (other.frame.intrinsics.width_px, other.frame.intrinsics.height_px)

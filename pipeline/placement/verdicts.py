@@ -13,7 +13,6 @@ from pipeline.placement.attempt import (
     SURE_AGREEMENT,
     Attempt,
     less,
-    score,
 )
 from pipeline.placement.outcome import NodeVerdict
 
@@ -72,15 +71,26 @@ def _contradiction(name: str, found: Agreement) -> str:
 def _lost(names: Sequence[str], index: int, tried: Sequence[Attempt]) -> str:
     """Return why a node is connected to no other."""
     mine = [trial for trial in tried if index in (trial.source, trial.target)]
-    best = max(mine, key=lambda trial: (score(trial.agreement), trial.agreement.shared))
-    other = names[best.target if best.source == index else best.source]
-    why = f"beside {other}: {best.result.stop_reason.partition(';')[0].rstrip('.')}"
-    if best.agreement.shared:
-        why = (
-            f"of what it and {other} both measured where it fits best, "
-            f"{best.agreement.within_2pct_share:.0%} is within 2 %"
-        )
+    best = max(mine, key=lambda trial: (trial.score, trial.agreement.shared), default=None)
+    why = ""
+    if best is not None:
+        other = names[best.target if best.source == index else best.source]
+        why = f" ({_why_not(best, other)})"
     return (
-        f"{names[index]} is left out: its pose is not known, and it fits nowhere beside the others "
-        f"({why}); try to give its pose, or images that share more of the place"
+        f"{names[index]} is left out: its pose is not known, and it fits nowhere beside the others{why}; "
+        "try to give its pose, or images that share more of the place"
+    )
+
+
+def _why_not(best: Attempt, other: str) -> str:
+    """Return why the best attempt to place a node relative to another is not used."""
+    if best.verdict is None:
+        return f"beside {other}: {best.result.stop_reason.partition(';')[0].rstrip('.')}"
+    if not best.verdict.sure:
+        return f"beside {other}, where it fits best, {' and '.join(best.verdict.reasons)}"
+    if best.edge is None:
+        return f"beside {other}: {best.result.stop_reason}"
+    return (
+        f"of what it and {other} both measured where it fits best, "
+        f"{best.agreement.within_2pct_share:.0%} is within 2 %"
     )

@@ -4,7 +4,17 @@ import numpy as np
 
 from pipeline.kernels.geometry import look_at
 from pipeline.placement.loops import Groups
-from pipeline.placement.pairs import GIVEN_PAIRS, UnknownPairs, given_pairs, neighbours_first
+from pipeline.placement.pairs import (
+    BRIDGE_TRIES,
+    GIVEN_PAIRS,
+    GROUP_TRIES,
+    LONE_TRIES,
+    JoiningPairs,
+    across_bridges,
+    given_pairs,
+    likeliest_first,
+    lone_tries,
+)
 from pipeline.placement.samples import NodeSample
 from pipeline.types import CameraIntrinsics, DepthMap, PointCloud, RgbdFrame
 
@@ -25,46 +35,84 @@ def nodes_around(count):
     return nodes
 
 
-def tried_until_enough(count, sure, known=None):
-    """Pairs that are tried if those for which ``sure`` is true succeed."""
-    pairs = UnknownPairs(neighbours_first([None] * count), known or [False] * count)
-    links, tried = [], []
-    while (found := pairs.next(links, count)) is not None:
-        tried.append(found[0])
-        if sure(*found[0]):
-            links.append(found[0])
+def joined(order, tries, sure, links=()):
+    """Pairs that are tried, and the links, if those for which ``sure`` is true succeed."""
+    pairs, tried, links = JoiningPairs(order, tries), [], list(links)
+    while (pair := pairs.next(links)) is not None:
+        tried.append(pair)
+        if sure(*pair):
+            links.append(pair)
     return tried, links
 
 
-def test_twenty_nodes_in_a_row_need_three_pairs_each_and_not_all():
-    tried, links = tried_until_enough(20, lambda one, other: abs(one - other) <= 3)
-    assert len(tried) <= 3 * 20
-    assert len(set(tried)) == len(tried)
-    assert len(Groups(20, links).sets()) == 1
-    assert min(sum(node in link for link in links) for node in range(20)) >= 3
+def alike(one, other):
+    return 0.0
+
+
+def test_twenty_nodes_in_a_row_need_a_tree_and_not_all_pairs():
+    order = likeliest_first([False] * 20, alike)
+    tried, links = joined(order, [40] * 20, lambda one, other: abs(one - other) <= 3)
+    assert tried == links == [(k, k - 1) for k in range(1, 20)]
+
+
+def test_images_that_are_alike_come_first_and_of_equal_ones_neighbours():
+    order = likeliest_first([False] * 4, lambda one, other: 9.0 if (one, other) == (3, 0) else 1.0)
+    assert order == [(3, 0), (1, 0), (2, 1), (3, 2), (2, 0), (3, 1)]
+
+
+def test_pairs_of_nodes_with_poses_are_not_tried_without_them():
+    order = likeliest_first([True, True, False, True], alike)
+    assert sorted(order) == [(2, 0), (2, 1), (3, 2)]
 
 
 def test_nodes_in_a_mixed_order_are_joined_all_the_same():
-    order = np.random.default_rng(1).permutation(12)
-    _, links = tried_until_enough(12, lambda one, other: abs(order[one] - order[other]) <= 2)
+    places = np.random.default_rng(1).permutation(12)
+    order = likeliest_first([False] * 12, alike)
+    _, links = joined(order, [LONE_TRIES] * 12, lambda one, other: abs(places[one] - places[other]) <= 2)
     assert len(Groups(12, links).sets()) == 1
 
 
 def test_a_stranger_is_tried_beside_every_other_before_it_is_given_up():
-    tried, links = tried_until_enough(6, lambda one, other: 2 not in (one, other))
+    order = likeliest_first([False] * 6, alike)
+    tried, links = joined(order, lone_tries(6, []), lambda one, other: 2 not in (one, other))
     assert {pair for pair in tried if 2 in pair} == {(2, 0), (2, 1), (3, 2), (4, 2), (5, 2)}
     assert len(Groups(6, links).sets()) == 2
 
 
-def test_pairs_of_nodes_with_poses_are_not_tried_without_them():
-    tried, _ = tried_until_enough(4, lambda one, other: True, [True, True, False, True])
-    assert all(2 in pair for pair in tried)
+def test_a_stranger_among_many_costs_few_tries_and_two_groups_a_few_a_node():
+    chain = [(k, k - 1) for k in range(1, 60)]
+    order = likeliest_first([False] * 61, alike)
+    tried, _ = joined(order, lone_tries(61, chain), lambda one, other: False, chain)
+    assert len(tried) == LONE_TRIES
+    assert all(60 in pair for pair in tried)
+    halves = [link for link in chain if link != (20, 19)]
+    tried, _ = joined(
+        order[:], lone_tries(61, [*halves, (60, 59)]), lambda one, other: False, [*halves, (60, 59)]
+    )
+    assert len(tried) == 20 * GROUP_TRIES
+
+
+def test_pairs_across_a_bridge_are_the_likeliest_and_loops_have_none():
+    ring, tail = [(1, 0), (2, 1), (2, 0)], [(3, 2), (4, 3), (4, 2)]
+    candidates = [(4, 1), (4, 0), (3, 1), (3, 0)]
+    assert list(across_bridges(candidates, [*ring, *tail], 5)) == []
+    bridged = [*ring, (3, 2), (4, 3)]
+    assert list(across_bridges(candidates, bridged, 5)) == candidates[:BRIDGE_TRIES]
 
 
 def test_nodes_with_poses_have_a_partner_and_a_few_loops_and_the_ring_closes():
-    partners, others = given_pairs(nodes_around(24), [True] * 24)
+    nodes = nodes_around(24)
+    poses = [node.frame.T_world_camera for node in nodes]
+    partners, others = given_pairs(nodes, poses, [0] * 24)
     assert [source for source, _ in partners] == list(range(1, 24))
     assert len(partners) + len(others) <= GIVEN_PAIRS * 24
     links = set(partners) | set(others)
     assert {(k, k - 1) for k in range(1, 24)} | {(23, 0)} <= links
     assert all(min(a - b, 24 - a + b) <= 3 for a, b in others)
+
+
+def test_nodes_in_different_frames_are_no_pair():
+    nodes = nodes_around(4)
+    poses = [node.frame.T_world_camera for node in nodes]
+    partners, others = given_pairs(nodes, poses, [0, 0, None, 3])
+    assert (partners, others) == ([(1, 0)], [])

@@ -53,15 +53,15 @@ def test_a_given_pose_beyond_the_gate_is_corrected_by_a_wider_one(room):
 
 
 @pytest.mark.parametrize(
-    ("normals", "motion"),
-    [([(0.0, 0.0, 1.0)], "sliding across"), ([(1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)], "sliding along y")],
+    "normals",
+    [[(0.0, 0.0, 1.0)], [(1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)]],
     ids=["one wall", "two walls"],
 )
-def test_views_of_walls_alone_do_not_place_a_node(normals, motion):
+def test_views_of_walls_alone_do_not_place_a_node(normals):
     """Bare walls agree wherever one slides along them."""
     placement = placed(walls("one", normals, 0.0), walls("other", normals, 0.05))
     assert placement.placed(["one", "other"]) == ["one"]
-    assert motion in placement.sentences[0]
+    assert "hardly hold the pose in one direction" in placement.sentences[0]
 
 
 def walls(name: str, normals, turn_rad: float) -> RgbdFrame:
