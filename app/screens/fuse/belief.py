@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.config import RegistrationConfig
-from pipeline.kernels.geometry import rotation_angle_rad
 from pipeline.registration.finding.evidence import Evidence, Judge
 from pipeline.registration.finding.rivals import mirrored_axis, quarter_turns
-from pipeline.registration.finding.search import default_gates_m, same
+from pipeline.registration.finding.search import default_gates_m, same, turn_deg
 from pipeline.registration.finding.surface import Surface
 from pipeline.registration.finding.verdict import Verdict, verdict_on
 from pipeline.types import FloatArray, PointCloud
@@ -55,17 +54,13 @@ class Belief:
         if not rivals:
             return ()
         found = [
-            (not one.evidence.clearly_better(evidence), _turn_deg(one.T_target_source, T)) for one in rivals
+            (not one.evidence.clearly_better(evidence), turn_deg(one.T_target_source, T)) for one in rivals
         ]
-        as_well, turn_deg = min(found)
-        return (f"turned by {turn_deg:.0f} degrees, the source fits {'as well' if as_well else 'better'}",)
+        as_well, turned_deg = min(found)
+        return (f"turned by {turned_deg:.0f} degrees, the source fits {'as well' if as_well else 'better'}",)
 
     def _mirrored(self, T: FloatArray, evidence: Evidence) -> tuple[str, ...]:
         """Return a reason if a mirrored source fits without doubt."""
         gates_m = default_gates_m(self._target, "surfaces", self._config.seed)
         axis = mirrored_axis(self._source, self._target, [T], gates_m, self._judge, evidence, self._config)
         return (f"one cloud is mirrored, since with {axis} negated the source fits",) if axis else ()
-
-
-def _turn_deg(T_a: FloatArray, T_b: FloatArray) -> float:
-    return float(np.degrees(rotation_angle_rad(T_a[:3, :3].T @ T_b[:3, :3])))
