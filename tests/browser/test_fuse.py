@@ -60,6 +60,13 @@ def clock(page):
     return page.locator(".packetmesh-dock-time").inner_text()
 
 
+def verdict_at_end(page, lane):
+    """What is said of a lane's answer at the end of the race that is shown by now."""
+    press(page, "End")
+    page.wait_for_timeout(200)
+    return page.locator(".packetmesh-board .verdict").nth(lane).inner_text()
+
+
 def test_the_race_is_driven_by_keys_alone_and_tells_who_wins(fuse):
     """From the click on its step on, no mouse: the dock has the keys by itself."""
     start_cm = board(fuse)
@@ -193,30 +200,28 @@ def test_the_histogram_moves_with_the_player(fuse):
 
 
 DOUBTS = {11: "sliding along x changes nothing", 12: "turned by 90 degrees", 13: "one cloud is mirrored"}
-LAST = "inferred on sensor", "corridor", "square room", "mirrored room"
+SHOWS = *["node on node"] * 9, "inferred on sensor", "corridor", "square room", "mirrored room"
+METHODS = 2, 2, 2, 2, 4, 4, 2, 2, 3, 3, 2, 2, 2
+"""What the lesson's stops show, and how many methods race there."""
 
 
 def test_the_lesson_walks_its_stops_and_sets_the_controls(fuse):
     unfold(fuse, "Lesson: ICP against CEICP")
-    starts, lanes, shows = set(), set(), []
+    starts = set()
     for stop in range(1, 14):
         fuse.get_by_role("button", name="Next", exact=True).click()
         fuse.get_by_text(f"({stop} of 13)").locator("visible=true").first.wait_for()
         fuse.get_by_role("button", name="Skip", exact=True).click()
         expect(fuse.get_by_text("Take a guess").locator("visible=true")).to_have_count(0)
+        expect(fuse.get_by_label("Show", exact=True).first).to_have_value(f"race: {SHOWS[stop - 1]}")
+        expect(fuse.locator(".packetmesh-board .number")).to_have_count(METHODS[stop - 1])
         starts.add(fuse.get_by_label("Start", exact=True).first.input_value())
-        fuse.wait_for_timeout(300)
-        fuse.get_by_text("Up to date").wait_for()
-        lanes.add(len(numbers(fuse, "Start error")))
-        shows.append(fuse.get_by_label("Show", exact=True).first.input_value())
         if stop == 10:
-            assert re.search("of .* m?s$", clock(fuse))
+            expect(fuse.locator(".packetmesh-dock-time")).to_have_text(re.compile("of .* m?s$"))
         if stop > 10:
-            said = fuse.locator(".packetmesh-board .verdict").nth(1)
-            expect(said).to_have_text(re.compile(f"^RMSE [23][.]\\d\\d cm · doubtful: .*{DOUBTS[stop]}"))
+            doubt = re.compile(f"RMSE [23][.]\\d\\d cm · doubtful: .*{DOUBTS[stop]}")
+            assert any(doubt.match(verdict_at_end(fuse, 1)) for _ in range(150))
     assert starts == {"aligned", "slightly off (3°, 6 cm)", "far off (20°, 40 cm)", "by hand"}
-    assert lanes == {2, 3, 4}
-    assert shows[9:] == [f"race: {name}" for name in LAST]
     fuse.get_by_role("button", name="Back", exact=True).click()
     fuse.get_by_text("(12 of 13)").locator("visible=true").first.wait_for()
 
