@@ -83,7 +83,7 @@ def _run(lane: RaceLane, view: RaceView) -> RaceRun:
         color=color_of(lane.rival),
         poses=np.array([view.T_world_target @ step.T_target_source for step in lane.steps]),
         offs_cm=np.array([100.0 * step.off_m for step in lane.steps]),
-        notes=(*notes, f"{end} after {lane.iterations} iterations"),
+        notes=(*notes, f"{end} after {lane.iterations} iterations · {lane.verdict}"),
         arrived=arrived,
         shades=np.stack([step.shades for step in lane.steps]),
         lens=tuple(step.lens for step in lane.steps),

@@ -43,7 +43,7 @@ def test_every_step_of_every_method_is_there_with_its_error(view, show):
         assert len(run.poses) == len(run.notes) == len(run.lens) == len(lane.steps)
         np.testing.assert_allclose(run.offs_cm, [100.0 * step.off_m for step in lane.steps])
         assert run.color == color_of(lane.rival)
-        assert str(lane.iterations) in run.notes[-1]
+        assert run.notes[-1].endswith(f"after {lane.iterations} iterations · {lane.verdict}")
     assert show.steps == max(len(lane.steps) for lane in view.lanes)
 
 
