@@ -19,6 +19,7 @@ from pipeline.kernels.kdtree import (
     tree_of,
     working_space,
 )
+from pipeline.kernels.point_sets import ascending
 from pipeline.registration.neighbourhood import Normals
 from pipeline.registration.sample import random_keys
 from pipeline.types import ByteArray, FloatArray, IntArray, PointCloud
@@ -358,7 +359,8 @@ class _Cloud:
         count = min(len(self.points_m), max(6, round(share * len(self.points_m))))
         if count not in self._subsets:
             whole = count == len(self.points_m)
-            self._subsets[count] = _Subset(self, np.arange(count) if whole else np.sort(self._order[:count]))
+            rows = np.arange(count) if whole else ascending(self._order[:count], len(self.points_m))
+            self._subsets[count] = _Subset(self, rows)
         return self._subsets[count]
 
     @cached_property

@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.kernels.kdtree import KdTree, compiled, tree_of
 from pipeline.kernels.local_planes import patch_normals
-from pipeline.kernels.point_sets import neighbour_distances_m
+from pipeline.kernels.point_sets import ascending, neighbour_distances_m
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 _log = logging.getLogger(__name__)
@@ -50,7 +50,7 @@ class Normals:
             rows, self._all = np.arange(len(self._found)), True
         missing = _enter(rows, self._found)
         if len(missing):
-            places = np.sort(self._places[missing])
+            places = ascending(self._places[missing], len(self._found))
             found = patch_normals(self._tree, NORMAL_NEIGHBOURS, places)
             _enter_facing(found, self._tree.order[places], self._points_m, self._normals)
         return self._normals

@@ -71,6 +71,7 @@ def quick_registration(
     direction: Direction,
     config: RegistrationConfig,
     seed: int | None = None,
+    points: int = QUICK_POINTS,
 ) -> FloatArray:
     """Return the (4, 4) pose that CEICP-A reaches from a start with few points.
 
@@ -82,6 +83,7 @@ def quick_registration(
         direction: its direction.
         config: its other settings.
         seed: seed of the draw of points; None for the settings'.
+        points: largest number of points of each cloud.
 
     Raises:
         ReconstructionError: no pairs are within the gate, or they leave the motion open from the beginning.
@@ -93,7 +95,7 @@ def quick_registration(
         gate_m=gate_m,
         direction="both" if config.with_scale else direction,
         sigma_decay=QUICK_DECAY,
-        max_points=min(QUICK_POINTS, max(6, int(DRAWN_SHARE * min(len(source), len(target))))),
+        max_points=min(points, max(6, int(DRAWN_SHARE * min(len(source), len(target))))),
         seed=config.seed if seed is None else seed,
     )
     result = register(source, target, quick, T_start)

@@ -48,6 +48,8 @@ DRAWS = 3
 """Further draws of the points that must lead to the same pose, …"""
 MOST_SPREAD_VOXELS = 0.5
 """… within so many fiftieths of the target's extent: 3 cm in a view of 3 m."""
+MORE_POINTS = 4 * QUICK_POINTS
+"""Points of an answer and its draws where those of quick registrations differ by more."""
 LEAST_TURN_DEG = 10.0
 """A rival turned by less is described by its distance."""
 
@@ -211,10 +213,12 @@ def _doubted(
     doubts: tuple[str, ...] = ()
     spread_m = _spread_m(source, target, answer, config)
     most_m = MOST_SPREAD_VOXELS * default_voxel_m(target)
+    if most_m < spread_m < np.inf:
+        answer, spread_m = _with_more_points(source, target, answer, judge, config)
     if spread_m <= most_m and np.isnan(answer.evidence.color_correlation):
-        answer, doubts = _unless_rivalled(source, target, found, judge, config)
-        if answer is not found.candidate:
-            spread_m = _spread_m(source, target, answer, config)
+        best, doubts = _unless_rivalled(source, target, found.way, answer, judge, config)
+        if best is not answer:
+            answer, spread_m = best, _spread_m(source, target, best, config)
     if np.isinf(spread_m):
         doubts = (*doubts, "another draw of the points finds no pose")
     elif spread_m > most_m:
@@ -223,17 +227,33 @@ def _doubted(
     return replace(found, candidate=answer, verdict=verdict, spread_m=spread_m, settled=spread_m <= most_m)
 
 
+def _with_more_points(
+    source: PointCloud, target: PointCloud, answer: Candidate, judge: Judge, config: RegistrationConfig
+) -> tuple[Candidate, float]:
+    """Return the answer with more points, and its spread; as it was, with an infinite one, if that fails."""
+    way = answer.T_start, answer.gate_m, answer.direction
+    try:
+        T = quick_registration(source, target, *way, config, points=MORE_POINTS)
+    except ReconstructionError:
+        return answer, float("inf")
+    better = replace(answer, T_target_source=T, evidence=judge(T))
+    return better, _spread_m(source, target, better, config, MORE_POINTS)
+
+
 def _spread_m(
-    source: PointCloud, target: PointCloud, candidate: Candidate, config: RegistrationConfig
+    source: PointCloud,
+    target: PointCloud,
+    candidate: Candidate,
+    config: RegistrationConfig,
+    points: int = QUICK_POINTS,
 ) -> float:
     """Return the largest point error between a candidate and further draws of the points from its start."""
     some_m = compared_points_m(source)
     farthest_m = 0.0
     for seed in range(config.seed + 1, config.seed + 1 + DRAWS):
         try:
-            T = quick_registration(
-                source, target, candidate.T_start, candidate.gate_m, candidate.direction, config, seed
-            )
+            way = candidate.T_start, candidate.gate_m, candidate.direction
+            T = quick_registration(source, target, *way, config, seed, points)
         except ReconstructionError:
             return float("inf")
         farthest_m = max(farthest_m, point_error_m(T, candidate.T_target_source, some_m))
@@ -241,16 +261,21 @@ def _spread_m(
 
 
 def _unless_rivalled(
-    source: PointCloud, target: PointCloud, found: Found, judge: Judge, config: RegistrationConfig
+    source: PointCloud,
+    target: PointCloud,
+    way: Way,
+    answer: Candidate,
+    judge: Judge,
+    config: RegistrationConfig,
 ) -> tuple[Candidate, tuple[str, ...]]:
     """Return the answer or the rival that fits clearly better, and a doubt if another one fits as well.
 
     Rivals are quarter turns and, of a given start without free space to refute its answer, the pose to which
     features of the surfaces lead: half a room slid along the other half can fit almost as well.
     """
-    answer, T = found.candidate, found.candidate.T_target_source
+    T = answer.T_target_source
     turns = quarter_turns(source, target, T, 2.0 * answer.gate_m, judge, config)
-    tried = [*turns, *(_by_features(source, target, judge, config) if found.way == "given" else ())]
+    tried = [*turns, *(_by_features(source, target, judge, config) if way == "given" else ())]
     others = [
         one
         for one in tried

@@ -1,6 +1,6 @@
 """The verdict on a pose: sure, doubtful or none, and why (SPEC 4.12).
 
-The thresholds were fitted on 219 pairs of views of the validation rooms of ``lab.places``; ``packetmesh bench
+The thresholds were fitted on pairs of views of the validation rooms of ``lab.places``; ``packetmesh bench
 --only places`` judges them on other rooms.
 """
 
@@ -15,15 +15,15 @@ Word = Literal["sure", "doubtful", "none"]
 
 LEAST_OVERLAP = 0.08
 """Least share of a cloud's points that the other can judge."""
-LEAST_ON = 0.75
-"""Least share of the judged points on the other's surface."""
-MOST_THROUGH = 0.01
+LEAST_ON, LEAST_ON_COLORED = 0.75, 0.7
+"""Least share of the judged points on the other's surface, without colours and with colours that match."""
+MOST_THROUGH = 0.02
 """Largest share of the judged points in free space: a few are already a sign of a wrong pose."""
 LEAST_STIFFNESS = 0.006
 """Least stiffness of the points on the surfaces; below it, noise decides along the weakest motion."""
 MOST_HEIGHT = 1.7
 """Largest ratio of the distances from the surfaces to the noise of the points."""
-LEAST_CORRELATION = 0.85
+LEAST_CORRELATION = 0.75
 """Least correlation of the colours where the clouds meet: floor on ceiling has about 0."""
 NO_POSE_ON, NO_POSE_OVERLAP = 0.35, 0.02
 """With smaller shares, nothing speaks for the pose."""
@@ -70,7 +70,8 @@ def _reasons(evidence: Evidence) -> tuple[str, ...]:
         reasons.append(
             f"{evidence.through_share:.1%} of the shared points lie where the other camera saw through"
         )
-    if evidence.on_share < LEAST_ON:
+    colors_match = evidence.color_correlation >= LEAST_CORRELATION
+    if evidence.on_share < (LEAST_ON_COLORED if colors_match else LEAST_ON):
         reasons.append(f"only {evidence.on_share:.0%} of the shared points lie on the other cloud's surface")
     elif evidence.height_ratio > MOST_HEIGHT:
         reasons.append(f"the surfaces are {evidence.height_ratio:.1f} times the points' noise apart")
