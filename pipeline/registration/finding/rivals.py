@@ -1,4 +1,4 @@
-"""Other poses and other clouds that could fit as well: quarter turns, a mirrored source, a scaled one."""
+"""Other poses and clouds that could fit as well: quarter turns, slides, a mirrored source, a scaled one."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def quarter_turns(
         judge: judge of these clouds.
         config: settings of the registrations.
     """
-    axes = np.linalg.eigh(judge.target.normals.T @ judge.target.normals)[1]
+    axes = _main_axes(judge)
     along_m = judge.target.points_m @ axes
     center_m = axes @ (0.5 * np.quantile(along_m, [0.02, 0.98], axis=0).sum(axis=0))
     for axis in axes.T:
@@ -60,6 +60,40 @@ def quarter_turns(
             with suppress(ReconstructionError):
                 found = quick_registration(source, target, T_start, gate_m, DIRECTIONS[0], config)
                 yield Candidate(T_start, found, gate_m, DIRECTIONS[0], judge(found))
+
+
+def slides(
+    source: PointCloud,
+    target: PointCloud,
+    T: FloatArray,
+    step_m: float,
+    gate_m: float,
+    judge: Judge,
+    config: RegistrationConfig,
+) -> Iterator[Candidate]:
+    """Shift the source to both sides along the place's own axes and register it; yields where each leads.
+
+    Shelves and chairs in a row fit one place farther along, too.
+
+    Args:
+        source: the cloud that moves.
+        target: the cloud that stays.
+        T: (4, 4) pose T_target_source of the answer.
+        step_m: length of the shifts.
+        gate_m: gate of the registrations.
+        judge: judge of these clouds.
+        config: settings of the registrations.
+    """
+    for axis in _main_axes(judge).T:
+        for shift_m in (-step_m * axis, step_m * axis):
+            T_start = rigid(np.eye(3), shift_m) @ T
+            yield from candidates(source, target, T_start, [gate_m], judge, config)
+
+
+def _main_axes(judge: Judge) -> FloatArray:
+    """Return (3, 3) main directions of the target's normals, in columns."""
+    axes: FloatArray = np.linalg.eigh(judge.target.normals.T @ judge.target.normals)[1]
+    return axes
 
 
 def mirrored_axis(

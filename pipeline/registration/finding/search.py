@@ -19,8 +19,8 @@ from pipeline.registration.finding.candidates import (
     quick_registration,
 )
 from pipeline.registration.finding.evidence import Judge
-from pipeline.registration.finding.rivals import quarter_turns
-from pipeline.registration.finding.verdict import Verdict, verdict_on
+from pipeline.registration.finding.rivals import quarter_turns, slides
+from pipeline.registration.finding.verdict import LITTLE_THROUGH, Verdict, verdict_on
 from pipeline.registration.global_start import default_voxel_m, global_starts
 from pipeline.registration.metrics import point_error_m
 from pipeline.registration.neighbourhood import median_spacing_m
@@ -48,6 +48,8 @@ DRAWS = 3
 """Further draws of the points that must lead to the same pose, …"""
 MOST_SPREAD_VOXELS = 0.5
 """… within so many fiftieths of the target's extent: 3 cm in a view of 3 m."""
+SLIDE_VOXELS = 2.5
+"""Shift to other poses that are compared with an answer of which a little is in free space."""
 MORE_POINTS = 4 * QUICK_POINTS
 """Points of an answer and its draws where those of quick registrations differ by more."""
 LEAST_TURN_DEG = 10.0
@@ -207,6 +209,8 @@ def _doubted(
     Where both clouds have colours, these have refuted all quarter turns but that of a room of one colour.
     """
     answer = found.candidate
+    if answer.evidence.through_share > LITTLE_THROUGH:
+        answer = _best_slide(source, target, answer, judge, config)
     if _bare(judge) and (before := _scored_better(source, target, answer, tried)) is not None:
         doubt = _rival_text(source, answer, before)
         return replace(found, verdict=verdict_on(answer.evidence, (doubt,)))
@@ -225,6 +229,19 @@ def _doubted(
         doubts = (*doubts, f"other draws of the points end up to {length(spread_m)} away")
     verdict = verdict_on(answer.evidence, doubts)
     return replace(found, candidate=answer, verdict=verdict, spread_m=spread_m, settled=spread_m <= most_m)
+
+
+def _best_slide(
+    source: PointCloud, target: PointCloud, answer: Candidate, judge: Judge, config: RegistrationConfig
+) -> Candidate:
+    """Return the answer, or the pose nearby that passes all tests with a better score."""
+    step_m, gate_m = (
+        SLIDE_VOXELS * default_voxel_m(target),
+        default_gates_m(target, "surfaces", config.seed)[0],
+    )
+    others = slides(source, target, answer.T_target_source, step_m, gate_m, judge, config)
+    sure = [one for one in others if verdict_on(one.evidence).sure]
+    return max([answer, *sure], key=lambda one: one.evidence.score)
 
 
 def _with_more_points(

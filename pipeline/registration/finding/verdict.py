@@ -17,8 +17,9 @@ LEAST_OVERLAP = 0.08
 """Least share of a cloud's points that the other can judge."""
 LEAST_ON, LEAST_ON_COLORED = 0.75, 0.7
 """Least share of the judged points on the other's surface, without colours and with colours that match."""
-MOST_THROUGH = 0.02
-"""Largest share of the judged points in free space: a few are already a sign of a wrong pose."""
+LITTLE_THROUGH, MOST_THROUGH = 0.01, 0.02
+"""Shares of the judged points in free space: a few are already a sign of a wrong pose. Above the first, poses
+nearby are tried; the second is the largest that may be sure."""
 LEAST_STIFFNESS = 0.006
 """Least stiffness of the points on the surfaces; below it, noise decides along the weakest motion."""
 MOST_HEIGHT = 1.7

@@ -10,6 +10,7 @@ from pipeline.config import RegistrationConfig
 from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.registration import point_error_m
 from pipeline.registration.finding.evidence import Judge
+from pipeline.registration.finding.rivals import slides
 from pipeline.registration.finding.search import (
     Start,
     by_surfaces,
@@ -95,6 +96,25 @@ def test_from_across_the_room_features_lead_to_the_place(clouds):
     assert found.way == "surfaces"
     assert found.verdict.text == "sure"
     assert error_m(found, moved, T_TRUE @ far) < 0.01
+
+
+def comb(seed: int) -> PointCloud:
+    """A wall of 3 x 1 m with grooves 7 cm wide and 8 cm deep, one every 15 cm, and an open box at its end."""
+    rng = np.random.default_rng(seed)
+    x_m, y_m = rng.uniform(0.0, 3.0, 12_000), rng.uniform(0.0, 1.0, 12_000)
+    wall_m = np.stack([x_m, y_m, np.where(x_m % 0.15 < 0.07, 0.08, 0.0)], axis=1)
+    end_m = np.stack([np.full(3000, 3.0), *rng.uniform(-0.6, [[1.0], [0.6]], (2, 3000))], axis=1)
+    floor_m = np.stack([*rng.uniform(0.0, [[3.0], [0.6]], (2, 6000)), np.zeros(6000)], axis=1)[:, [0, 2, 1]]
+    return PointCloud(np.concatenate([wall_m, end_m, floor_m]) + rng.normal(0.0, 0.001, (21_000, 3)))
+
+
+def test_one_groove_farther_along_a_slide_leads_back():
+    source, target = comb(0), comb(1)
+    judge, T_wrong = Judge(Surface(source), Surface(target)), rigid(np.eye(3), [-0.15, 0.0, 0.0])
+    found = list(slides(source, target, T_wrong, 0.14, 0.1, judge, CONFIG))
+    best = max(found, key=lambda one: one.evidence.score)
+    assert point_error_m(best.T_target_source, np.eye(4), source.points_m) < 0.01
+    assert best.evidence.score > judge(T_wrong).score
 
 
 @pytest.mark.parametrize("part", ["source", "target"])
