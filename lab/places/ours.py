@@ -18,7 +18,8 @@ from pipeline.pairs.found import find_place, settled_answer
 from pipeline.pairs.register import DEFAULT_METHOD, Pair
 from pipeline.registration.colour import lifted_features
 from pipeline.registration.finding.evidence import Judge
-from pipeline.registration.finding.search import by_colour, by_surfaces, search
+from pipeline.registration.finding.search import search
+from pipeline.registration.finding.starts import by_colour, by_surfaces
 from pipeline.registration.finding.surface import Surface
 from pipeline.types import FloatArray, PointCloud
 

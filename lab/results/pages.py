@@ -9,7 +9,7 @@ from lab.benchmarks.filling import FLAT, OURS
 from lab.claims.claim import VERDICTS, is_beyond
 from lab.claims.registry import CLAIMS
 from lab.results import completion, places, tables, verdicts
-from lab.results.markdown import Row, listed
+from lab.results.markdown import Row, listed, percent
 from lab.results.record import ROOT, Record, Records, read_records
 from packetmesh.files import atomic_path
 
@@ -113,6 +113,8 @@ def readme_results(records: Records) -> Iterator[str]:
         yield _fusion(records["reconstruct"].numbers)
     if "registration_claims" in records:
         yield _registration(records["registration_claims"].numbers)
+    if PLACES in records:
+        yield _places(records[PLACES].numbers)
     if "depth_claims" in records:
         yield _depth(records["depth_claims"].numbers["C12"]["ours"])
     if "bench_depth" in records:
@@ -143,6 +145,19 @@ def _registration(numbers: Row) -> str:
     return (
         f"**CEICP does not always win.** Plain ICP ends nearer to the truth in {lost} of {conditions} "
         f"conditions ({_link('which', 'registration-the-thesiss-claims')})."
+    )
+
+
+def _places(numbers: Row) -> str:
+    """Compare the pairs with the least and the largest overlap."""
+    runs = [run for run in numbers[places.BY_OVERLAP]["runs"] if run["program"] == places.OURS]
+    least, most = (fold(runs, key=lambda run: run["overlap"]) for fold in (min, max))
+    found = {run["overlap"]: f"{percent(run['right'] / run['pairs'], 0)}" for run in (least, most)}
+    return (
+        "**Two views that share little seldom find each other.** Without a start, "
+        f"{found[least['overlap']]} of the pairs that share {percent(least['overlap'], 0)} are placed, and "
+        f"{found[most['overlap']]} of those that share {percent(most['overlap'], 0)} "
+        f"({_link('other programs', 'registration-views-placed-without-a-start')})."
     )
 
 

@@ -25,7 +25,8 @@ def places(numbers: Row) -> str:
         f"{pairs} pairs of rendered RGB-D views, 320 x 240, of rooms on which nothing was fitted; no program "
         "gets a start. Overlap: each view shares at least this part of its measured surface with the other. "
         f"Right: within {RIGHT_DEG:g}° and {100.0 * RIGHT_M:g} cm; intervals are 95 % (Wilson). Other "
-        "programs' answers are refined by Open3D's ICP; they give no verdict.",
+        "programs' answers are refined by Open3D's ICP; they give no verdict. Every program has one core "
+        "(OMP_NUM_THREADS=1, NUMBA_NUM_THREADS=1).",
         f"![Share of right answers over the overlap, by program]({RECALL})",
         _recalls(runs),
     ]

@@ -10,20 +10,12 @@ from pipeline.config import RegistrationConfig
 from pipeline.pairs.register import Answer, Pair, run_methods
 from pipeline.registration import point_error_m
 from pipeline.registration.finding.candidates import QUICK_DECAY
+from pipeline.registration.finding.doubts import DRAWS
 from pipeline.registration.finding.evidence import Judge
+from pipeline.registration.finding.poses import compared_points_m, length, same, turn_deg
 from pipeline.registration.finding.rivals import better_scale, mirrored_axis
-from pipeline.registration.finding.search import (
-    DRAWS,
-    Found,
-    Start,
-    by_surfaces,
-    compared_points_m,
-    default_gates_m,
-    length,
-    same,
-    search,
-    turn_deg,
-)
+from pipeline.registration.finding.search import Found, search
+from pipeline.registration.finding.starts import Start, by_surfaces, default_gates_m
 from pipeline.registration.finding.surface import Surface
 from pipeline.registration.finding.verdict import verdict_on
 from pipeline.registration.global_start import default_voxel_m

@@ -17,7 +17,7 @@ from pipeline.kernels.point_sets import distinct_rows, middle_extent_m
 from pipeline.pairs.units import check_units
 from pipeline.registration import average_hausdorff_m, point_error_m, register_timed
 from pipeline.registration.finding.evidence import Evidence
-from pipeline.registration.finding.search import Way
+from pipeline.registration.finding.starts import Way
 from pipeline.registration.finding.verdict import Verdict
 from pipeline.registration.methods import METHODS
 from pipeline.registration.neighbourhood import pca_normals

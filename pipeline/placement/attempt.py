@@ -13,7 +13,9 @@ from pipeline.placement.edges import PoseEdge, registration_information
 from pipeline.placement.samples import NodeSample, both_ways
 from pipeline.placement.views import Views
 from pipeline.registration import register
-from pipeline.registration.finding.search import Found, Start, same, search
+from pipeline.registration.finding.poses import same
+from pipeline.registration.finding.search import Found, search
+from pipeline.registration.finding.starts import Start
 from pipeline.registration.finding.verdict import Verdict
 from pipeline.registration.neighbourhood import Normals
 from pipeline.types import FloatArray, RegistrationResult

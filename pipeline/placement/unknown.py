@@ -22,7 +22,7 @@ from pipeline.placement.pairs import (
 )
 from pipeline.placement.samples import NodeSample
 from pipeline.placement.views import Views
-from pipeline.registration.finding.search import Start
+from pipeline.registration.finding.starts import Start
 
 
 class UnknownPoses:

@@ -8,7 +8,7 @@ from functools import lru_cache
 from pipeline.acquisition import back_project
 from pipeline.registration.colour import LiftedFeatures, lifted_features, match_score
 from pipeline.registration.finding.evidence import Judge
-from pipeline.registration.finding.search import Start, by_colour, by_surfaces
+from pipeline.registration.finding.starts import Start, by_colour, by_surfaces
 from pipeline.registration.finding.surface import Surface
 from pipeline.types import PointCloud, RgbdFrame
 

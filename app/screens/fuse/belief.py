@@ -6,8 +6,9 @@ import numpy as np
 
 from pipeline.config import RegistrationConfig
 from pipeline.registration.finding.evidence import Evidence, Judge
+from pipeline.registration.finding.poses import same, turn_deg
 from pipeline.registration.finding.rivals import mirrored_axis, quarter_turns
-from pipeline.registration.finding.search import default_gates_m, same, turn_deg
+from pipeline.registration.finding.starts import default_gates_m
 from pipeline.registration.finding.surface import Surface
 from pipeline.registration.finding.verdict import Verdict, verdict_on
 from pipeline.types import FloatArray, PointCloud

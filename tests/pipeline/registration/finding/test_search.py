@@ -10,16 +10,10 @@ from pipeline.config import RegistrationConfig
 from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.registration import point_error_m
 from pipeline.registration.finding.evidence import Judge
+from pipeline.registration.finding.poses import compared_points_m, same, turn_deg
 from pipeline.registration.finding.rivals import slides
-from pipeline.registration.finding.search import (
-    Start,
-    by_surfaces,
-    compared_points_m,
-    default_gates_m,
-    same,
-    search,
-    turn_deg,
-)
+from pipeline.registration.finding.search import search
+from pipeline.registration.finding.starts import Start, by_surfaces, default_gates_m
 from pipeline.registration.finding.surface import Surface
 from pipeline.registration.finding.verdict import verdict_on
 from pipeline.types import PointCloud

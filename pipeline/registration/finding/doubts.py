@@ -1,0 +1,172 @@
+"""Doubts about an answer whose evidence has none: other draws of the points, and other poses that fit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from packetmesh.errors import ReconstructionError
+from pipeline.config import RegistrationConfig
+from pipeline.registration.finding.candidates import (
+    QUICK_POINTS,
+    Candidate,
+    candidates,
+    quick_registration,
+)
+from pipeline.registration.finding.evidence import Judge
+from pipeline.registration.finding.poses import compared_points_m, length, same, turn_deg
+from pipeline.registration.finding.rivals import quarter_turns, slides
+from pipeline.registration.finding.starts import Way, by_surfaces, default_gates_m
+from pipeline.registration.finding.verdict import LITTLE_THROUGH, verdict_on
+from pipeline.registration.global_start import default_voxel_m
+from pipeline.registration.metrics import point_error_m
+from pipeline.types import FloatArray, PointCloud
+
+DRAWS = 3
+"""Further draws of the points that must lead to the same pose, …"""
+MOST_SPREAD_VOXELS = 0.5
+"""… within so many fiftieths of the target's extent: 3 cm in a view of 3 m."""
+MORE_POINTS = 4 * QUICK_POINTS
+"""Points of an answer and its draws where those of quick registrations differ by more."""
+SLIDE_VOXELS = 2.5
+"""Shift to other poses that are compared with an answer of which a little is in free space."""
+LEAST_TURN_DEG = 10.0
+"""A rival turned by less is described by its distance."""
+
+
+class Checked(NamedTuple):
+    """An answer, or a better one that was found while it was checked."""
+
+    candidate: Candidate
+    doubts: tuple[str, ...]
+    spread_m: float
+    """Largest point error between the pose and those of other draws of the points; infinite if one failed,
+    NaN if another pose had the better score."""
+    settled: bool
+    """Whether the draws agree: without doubts it is sure, else a rival is the only doubt."""
+
+
+@dataclass(frozen=True, slots=True)
+class Checks:
+    """Tries to doubt answers for two clouds."""
+
+    source: PointCloud
+    target: PointCloud
+    judge: Judge
+    config: RegistrationConfig
+
+    def __call__(self, way: Way, answer: Candidate, tried: Sequence[Candidate]) -> Checked:
+        """Check an answer without doubts, from some kind of start, beside all registrations that were tried.
+
+        Where both clouds have colours, these have refuted all quarter turns but that of a room of one colour.
+        """
+        if answer.evidence.through_share > LITTLE_THROUGH:
+            answer = self._best_slide(answer)
+        if self._bare and (before := self._scored_better(answer, tried)) is not None:
+            return Checked(answer, (self._rival_text(answer, before),), float("nan"), settled=False)
+        doubts: tuple[str, ...] = ()
+        spread_m, most_m = self._spread_m(answer), MOST_SPREAD_VOXELS * default_voxel_m(self.target)
+        if most_m < spread_m < np.inf:
+            answer, spread_m = self._with_more_points(answer)
+        if spread_m <= most_m and np.isnan(answer.evidence.color_correlation):
+            best, doubts = self._unless_rivalled(way, answer)
+            if best is not answer:
+                answer, spread_m = best, self._spread_m(best)
+        if np.isinf(spread_m):
+            doubts = (*doubts, "another draw of the points finds no pose")
+        elif spread_m > most_m:
+            doubts = (*doubts, f"other draws of the points end up to {length(spread_m)} away")
+        return Checked(answer, doubts, spread_m, settled=spread_m <= most_m)
+
+    @property
+    def _bare(self) -> bool:
+        """Whether no free space can refute a pose, since a cloud has no viewpoint."""
+        return self.judge.source.view is None or self.judge.target.view is None
+
+    def _best_slide(self, answer: Candidate) -> Candidate:
+        """Return the answer, or the pose nearby that passes all tests with a better score."""
+        step_m = SLIDE_VOXELS * default_voxel_m(self.target)
+        gate_m = default_gates_m(self.target, "surfaces", self.config.seed)[0]
+        T, clouds = answer.T_target_source, (self.source, self.target)
+        others = slides(*clouds, T, step_m, gate_m, self.judge, self.config)
+        sure = [one for one in others if verdict_on(one.evidence).sure]
+        return max([answer, *sure], key=lambda one: one.evidence.score)
+
+    def _with_more_points(self, answer: Candidate) -> tuple[Candidate, float]:
+        """Return the answer with more points, and its spread; as it was, with infinity, if that fails."""
+        try:
+            T = self._again(answer, self.config.seed, MORE_POINTS)
+        except ReconstructionError:
+            return answer, float("inf")
+        better = replace(answer, T_target_source=T, evidence=self.judge(T))
+        return better, self._spread_m(better, MORE_POINTS)
+
+    def _spread_m(self, answer: Candidate, points: int = QUICK_POINTS) -> float:
+        """Return the largest point error between an answer and further draws of the points from its start."""
+        some_m = compared_points_m(self.source)
+        farthest_m = 0.0
+        for seed in range(self.config.seed + 1, self.config.seed + 1 + DRAWS):
+            try:
+                T = self._again(answer, seed, points)
+            except ReconstructionError:
+                return float("inf")
+            farthest_m = max(farthest_m, point_error_m(T, answer.T_target_source, some_m))
+        return farthest_m
+
+    def _again(self, answer: Candidate, seed: int, points: int) -> FloatArray:
+        """Return the pose that another draw of the points leads to."""
+        way = answer.T_start, answer.gate_m, answer.direction
+        return quick_registration(self.source, self.target, *way, self.config, seed, points)
+
+    def _unless_rivalled(self, way: Way, answer: Candidate) -> tuple[Candidate, tuple[str, ...]]:
+        """Return the answer or the rival that fits clearly better, and a doubt if another one fits as well.
+
+        Rivals are quarter turns and, of a given start without free space to refute its answer, the pose to
+        which features of the surfaces lead: half a room slid along the other half can fit almost as well.
+        """
+        clouds, T = (self.source, self.target), answer.T_target_source
+        turns = quarter_turns(*clouds, T, 2.0 * answer.gate_m, self.judge, self.config)
+        tried = [*turns, *(self._by_features() if way == "given" and self._bare else ())]
+        others = [
+            one
+            for one in tried
+            if verdict_on(one.evidence).sure and not same(one.T_target_source, T, *clouds)
+        ]
+        best = min([answer, *others], key=lambda one: one.evidence.against_share)
+        if not best.evidence.clearly_better(answer.evidence):
+            best = answer
+        rivals = [
+            one
+            for one in (answer, *others)
+            if not best.evidence.clearly_better(one.evidence)
+            and not same(one.T_target_source, best.T_target_source, *clouds)
+        ]
+        if not rivals:
+            return best, ()
+        return best, (self._rival_text(best, min(rivals, key=lambda one: one.evidence.against_share)),)
+
+    def _scored_better(self, answer: Candidate, tried: Sequence[Candidate]) -> Candidate | None:
+        """Return the tried registration with the best score if it led elsewhere than the answer."""
+        best = max(tried, key=lambda one: one.evidence.score)
+        elsewhere = not same(best.T_target_source, answer.T_target_source, self.source, self.target)
+        return best if elsewhere and best.evidence.score > answer.evidence.score else None
+
+    def _by_features(self) -> Iterable[Candidate]:
+        """Yield where the first start by features leads."""
+        try:
+            T_start = next(iter(by_surfaces(self.source, self.target, self.config.seed).poses()))
+        except ReconstructionError:
+            return
+        gates_m = default_gates_m(self.target, "surfaces", self.config.seed)
+        yield from candidates(self.source, self.target, T_start, gates_m, self.judge, self.config)
+
+    def _rival_text(self, answer: Candidate, rival: Candidate) -> str:
+        poses = answer.T_target_source, rival.T_target_source
+        turned_deg = turn_deg(*poses)
+        apart_m = point_error_m(*poses, compared_points_m(self.source))
+        turned = turned_deg >= LEAST_TURN_DEG
+        how = f"turned by {turned_deg:.0f} degrees" if turned else f"{length(apart_m)} away"
+        return f"{how}, the source fits as well"

@@ -1,0 +1,76 @@
+"""Where start poses come from, and the gates that suit them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from packetmesh.errors import ReconstructionError
+from pipeline.registration.colour import LiftedFeatures, colour_start
+from pipeline.registration.finding.candidates import QUICK_POINTS
+from pipeline.registration.global_start import default_voxel_m, global_starts
+from pipeline.registration.neighbourhood import median_spacing_m
+from pipeline.registration.sample import draw
+from pipeline.types import FloatArray, PointCloud
+
+Way = Literal["given", "colour", "surfaces"]
+"""Where a start pose comes from: the user, features of the colour images, features of the surfaces."""
+
+GIVEN_VOXELS = (1.25, 2.5, 5.0, 10.0, 20.0)
+"""Gates from a given start, in fiftieths of the target's extent: 0.15 to 2.4 m in a room of 6 m."""
+FOUND_VOXELS = (1.25, 2.5)
+"""Gates from a start that was found."""
+FEATURE_TRIES = ((1.6, 3), (1.0, 1))
+"""Voxel sizes for features of the surfaces, in the same unit, with the number of tries of each: the coarse
+one is the fastest."""
+LEAST_GATE_OF_SPACING = 6.0
+"""Least gate, in median spacings of the registered target points."""
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """A way to find start poses."""
+
+    way: Way
+    poses: Callable[[], Iterable[FloatArray]]
+    """Finds (4, 4) start poses T_target_source; raises ReconstructionError if there are none."""
+
+
+def by_surfaces(source: PointCloud, target: PointCloud, seed: int = 0) -> Start:
+    """Return start poses from features of the surfaces (FPFH), coarse ones first."""
+
+    def poses() -> Iterable[FloatArray]:
+        found, reason = 0, None
+        for voxels, tries in FEATURE_TRIES:
+            seeds = range(seed, seed + tries)
+            try:
+                for T_start in global_starts(source, target, voxels * default_voxel_m(target), seeds):
+                    yield T_start
+                    found += 1
+            except ReconstructionError as error:
+                reason = error
+        if reason is not None and not found:
+            raise reason
+
+    return Start("surfaces", poses)
+
+
+def by_colour(source: LiftedFeatures, target: LiftedFeatures) -> Start:
+    """Return the start pose on which features of the colour images agree."""
+
+    def poses() -> Iterable[FloatArray]:
+        found = colour_start(source, target)
+        if found.T_target_source is None:
+            raise ReconstructionError(found.why_none)
+        yield found.T_target_source
+
+    return Start("colour", poses)
+
+
+def default_gates_m(target: PointCloud, way: Way, seed: int = 0) -> list[float]:
+    """Return gates for a target, ascending: a gate is a promise of how far the start is off."""
+    few = draw(target, QUICK_POINTS, seed, "target").points_m
+    least_m = LEAST_GATE_OF_SPACING * median_spacing_m(few)
+    shares = GIVEN_VOXELS if way == "given" else FOUND_VOXELS
+    return sorted({max(least_m, share * default_voxel_m(target)) for share in shares})
