@@ -48,7 +48,7 @@ def find_place(pair: Pair, config: RegistrationConfig, gate_m: float | None) -> 
         ReconstructionError: no start pose leads to a registration.
     """
     judge = Judge(Surface(pair.source, config.seed), Surface(pair.target, config.seed))
-    starts = [by_surfaces(pair.source, pair.target, config.seed)]
+    starts = [by_surfaces(pair.source, pair.target)]
     if config.start == "given":
         starts.insert(0, Start("given", lambda: [pair.T_init]))
     found = search(pair.source, pair.target, starts, judge, config, () if gate_m is None else (gate_m,))

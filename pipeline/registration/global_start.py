@@ -2,25 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from packetmesh.errors import InputError, ReconstructionError
+from pipeline.kernels.geometry import apply
+from pipeline.kernels.kdtree import KdTree
 from pipeline.kernels.open3d_runtime import o3d
 from pipeline.kernels.point_sets import middle_extent_m
-from pipeline.types import FloatArray, PointCloud
+from pipeline.registration.consensus import WITHIN_SD, Motion, PointPairs, Scale, consensus
+from pipeline.types import FloatArray, IntArray, PointCloud
 
 VOXELS_ACROSS = 50
 """Default number of thinning voxels across the target's extent."""
-NORMAL_REACH, FEATURE_REACH, PAIR_REACH = 2.0, 5.0, 1.5
-"""Radii of normals and features and largest distance of a pair, in voxels (Open3D's proportions)."""
-EDGE_RATIO = 0.9
-"""Least ratio of the edge lengths between matched points in a hypothesis of RANSAC."""
-RANSAC_ITERATIONS, RANSAC_CONFIDENCE = 100_000, 0.999
-SMALLEST_SHARE = 0.15
-"""Least share of the source points with a partner in the target."""
+NORMAL_REACH, FEATURE_REACH = 2.0, 5.0
+"""Radii of normals and features, in voxels (Open3D's proportions)."""
+SHORTEST, OTHER = 2.0, 3.0
+"""Least distance of compared pairs, and of different start poses, in voxels."""
+NEAR = 1.5
+"""A point is near the target within so many voxels."""
+START_VOXELS = 1.6
+"""Voxel of a single start pose, in default voxels: with coarse features the first one is right more often."""
+MOST_PAIRS = 1500
+"""Largest number of pairs of features that are compared, the most alike first."""
+LEAST_VOTES = 5.0
+"""Least votes of a start pose; a few wrong pairs always agree."""
+DIFFERENT_STARTS = 3
+"""Largest number of start poses."""
+ROWS = 1000
+"""Features that are compared with all others at once: what they take of the memory is bounded."""
 
 
 def default_voxel_m(target: PointCloud) -> float:
@@ -37,59 +48,80 @@ def default_voxel_m(target: PointCloud) -> float:
     return extent_m / VOXELS_ACROSS
 
 
-def global_start(source: PointCloud, target: PointCloud, voxel_m: float, seed: int = 0) -> FloatArray:
+def global_start(source: PointCloud, target: PointCloud) -> FloatArray:
     """Find the (4, 4) T_target_source to about two voxels by FPFH features (Rusu et al. 2009).
 
     Args:
-        source, target, voxel_m: as for ``global_starts``.
-        seed: random seed.
+        source: the cloud that moves.
+        target: the cloud that stays.
 
     Raises:
-        ReconstructionError: the pose does not match enough points.
+        ReconstructionError: too few features agree on one pose.
     """
-    return next(global_starts(source, target, voxel_m, (seed,)))
+    return global_starts(source, target, START_VOXELS * default_voxel_m(target))[0]
 
 
-def global_starts(
-    source: PointCloud, target: PointCloud, voxel_m: float, seeds: Sequence[int]
-) -> Iterator[FloatArray]:
-    """Find a (4, 4) T_target_source for each seed of Open3D's RANSAC; its answers at low overlap differ.
+def global_starts(source: PointCloud, target: PointCloud, voxel_m: float) -> list[FloatArray]:
+    """Find up to three (4, 4) T_target_source, clearly different ones, that most pairs of features fit.
 
-    Estimated normals are oriented towards the origin, so clouds without normals should be in their cameras'
-    frames. Open3D's fast global registration finds no pose that RANSAC misses.
+    Pairs are each other's most similar FPFH features. ``consensus`` finds the motions without random samples,
+    so the same clouds give the same bits; they are ranked by their votes times the share of the source's
+    points that they bring near the target. Estimated normals are oriented towards the origin, so clouds
+    without normals should be in their cameras' frames.
 
     Args:
         source: the cloud that moves.
         target: the cloud that stays.
         voxel_m: voxel edge to which both clouds are first thinned.
-        seeds: random seeds.
 
     Raises:
-        ReconstructionError: no pose matches enough points.
+        ReconstructionError: too few features agree on one pose.
     """
-    (moving, moving_features), (fixed, fixed_features) = (
-        _with_features(cloud, voxel_m) for cloud in (source, target)
-    )
-    if min(len(moving.points), len(fixed.points)) < 3:
+    (moving_m, moving), (fixed_m, fixed) = (_with_features(cloud, voxel_m) for cloud in (source, target))
+    if min(len(moving_m), len(fixed_m)) < 3:
         raise ReconstructionError(
             f"Too few points remain at {voxel_m:.3g} m to find a start pose; give one, or a smaller voxel."
         )
-    most = 0.0
-    for seed in seeds:
-        o3d.utility.random.seed(seed)
-        found = _by_ransac(moving, fixed, moving_features, fixed_features, PAIR_REACH * voxel_m)
-        most = max(most, found.fitness)
-        if found.fitness >= SMALLEST_SHARE:
-            yield np.array(found.transformation)
-    if most < SMALLEST_SHARE:
+    rows, partners = _mutual_nearest(moving, fixed)
+    votes = np.ones(len(rows))
+    pairs = PointPairs(moving_m[rows], fixed_m[partners], votes * voxel_m / WITHIN_SD, votes)
+    scale = Scale(voxel_m, SHORTEST * voxel_m, OTHER * voxel_m, from_origin=False)
+    found = [motion for motion in consensus(pairs, scale) if motion.votes >= LEAST_VOTES]
+    tree = KdTree(fixed_m)
+
+    def rank(motion: Motion) -> float:
+        near = tree.nearest(apply(motion.T_target_source, moving_m), 1)[0] <= NEAR * voxel_m
+        return motion.votes * float(np.mean(near))
+
+    found.sort(key=rank, reverse=True)
+    if not found:
         raise ReconstructionError(
-            f"No start pose brings more than {most:.0%} of the source points to the target: "
-            "the clouds hardly overlap or have no features; give a start pose."
+            f"Of {len(pairs)} features of similar surfaces too few agree on one pose: the clouds hardly "
+            "overlap or have no features; give a start pose."
         )
+    return [motion.T_target_source for motion in found[:DIFFERENT_STARTS]]
 
 
-def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[Any, Any]:
-    """Return the thinned cloud with normals, and its features."""
+def _mutual_nearest(moving: FloatArray, fixed: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return rows of (N, 33) and (M, 33) features that are most alike for each other, the best first."""
+    nearest, least = np.empty(len(moving), np.intp), np.empty(len(moving), np.float32)
+    back, back_least = np.zeros(len(fixed), np.intp), np.full(len(fixed), np.inf, np.float32)
+    squares = np.sum(fixed**2, axis=1)
+    for first in range(0, len(moving), ROWS):
+        some = moving[first : first + ROWS]
+        apart = np.sum(some**2, axis=1)[:, None] + squares - 2.0 * some @ fixed.T
+        of_some = slice(first, first + len(some))
+        nearest[of_some], least[of_some] = apart.argmin(axis=1), apart.min(axis=1)
+        closer = apart.min(axis=0) < back_least
+        back[closer] = first + apart.argmin(axis=0)[closer]
+        back_least[closer] = apart.min(axis=0)[closer]
+    rows = np.flatnonzero(back[nearest] == np.arange(len(moving)))
+    rows = rows[np.argsort(least[rows], kind="stable")[:MOST_PAIRS]]
+    return rows, nearest[rows]
+
+
+def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[FloatArray, FloatArray]:
+    """Return (N, 3) thinned points, and their (N, 33) features, float32."""
     points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points_m))
     given = cloud.normals
     if given is not None and not (np.isfinite(given).all() and given.any(axis=1).all()):
@@ -102,23 +134,5 @@ def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[Any, Any]:
         points.orient_normals_towards_camera_location(np.zeros(3))
     o3d_registration: Any = o3d.pipelines.registration  # its stubs require an optional argument
     reach = o3d.geometry.KDTreeSearchParamHybrid(FEATURE_REACH * voxel_m, 100)
-    return points, o3d_registration.compute_fpfh_feature(points, reach)
-
-
-def _by_ransac(source: Any, target: Any, source_features: Any, target_features: Any, reach_m: float) -> Any:
-    o3d_registration = o3d.pipelines.registration
-    return o3d_registration.registration_ransac_based_on_feature_matching(
-        source,
-        target,
-        source_features,
-        target_features,
-        True,
-        reach_m,
-        o3d_registration.TransformationEstimationPointToPoint(False),
-        3,
-        [
-            o3d_registration.CorrespondenceCheckerBasedOnEdgeLength(EDGE_RATIO),
-            o3d_registration.CorrespondenceCheckerBasedOnDistance(reach_m),
-        ],
-        o3d_registration.RANSACConvergenceCriteria(RANSAC_ITERATIONS, RANSAC_CONFIDENCE),
-    )
+    features = o3d_registration.compute_fpfh_feature(points, reach).data
+    return np.asarray(points.points), np.ascontiguousarray(features.T, np.float32)

@@ -15,7 +15,7 @@ from pipeline.config import RegistrationConfig
 from pipeline.kernels.geometry import apply, rotation_angle_rad
 from pipeline.kernels.kdtree import compiled
 from pipeline.registration.anderson import Acceleration
-from pipeline.registration.global_start import default_voxel_m, global_start
+from pipeline.registration.global_start import global_start
 from pipeline.registration.matching import Matcher, Matching
 from pipeline.registration.methods import METHODS, MethodStart
 from pipeline.registration.residual import DegenerateError, residual_for
@@ -128,7 +128,7 @@ def _start_pose(
 ) -> FloatArray:
     """Return the (4, 4) T_target_source of the first matching."""
     if config.start == "global":
-        return global_start(source, target, default_voxel_m(target), config.seed)
+        return global_start(source, target)
     T = np.eye(4) if T_init is None else np.array(T_init, dtype=np.float64)
     if T.shape != (4, 4) or not np.isfinite(T).all():
         raise InputError("The start pose must be a 4 x 4 matrix of finite numbers.")

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from pipeline.registration.colour.features import LiftedFeatures
+from pipeline.registration.consensus import PointPairs
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 RATIO = 0.85
@@ -23,28 +22,11 @@ SCORE_FEATURES = 400
 """Number of each frame's strongest features that ``match_score`` compares."""
 
 
-@dataclass(frozen=True, slots=True)
-class Matches:
-    """Pairs of features that may be the same; many are not."""
-
-    source_m: FloatArray
-    """(M, 3)."""
-    target_m: FloatArray
-    """(M, 3)."""
-    sigma_m: FloatArray
-    """(M,) standard deviation of the pair's distance at the right pose."""
-    votes: FloatArray
-    """(M,) votes of a pair for a pose that it fits."""
-
-    def __len__(self) -> int:
-        return len(self.votes)
-
-
-def matches(source: LiftedFeatures, target: LiftedFeatures) -> Matches:
+def matches(source: LiftedFeatures, target: LiftedFeatures) -> PointPairs:
     """Return the matches of two frames, those of tags first."""
     tags, tags_of_target = np.nonzero(source.tag_keys[:, None] == target.tag_keys)
     alike, alike_of_target = _mutual(source, target, None)
-    return Matches(
+    return PointPairs(
         np.concatenate([source.tag_points_m[tags], source.points_m[alike]]),
         np.concatenate([target.tag_points_m[tags_of_target], target.points_m[alike_of_target]]),
         np.hypot(

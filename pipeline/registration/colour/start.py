@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipeline.registration.colour.consensus import consensus
 from pipeline.registration.colour.features import LiftedFeatures
 from pipeline.registration.colour.matches import matches
+from pipeline.registration.consensus import consensus
 from pipeline.types import FloatArray
 
 LEAST_VOTES = 3.5
@@ -41,12 +41,12 @@ def colour_start(source: LiftedFeatures, target: LiftedFeatures) -> ColourStart:
         return ColourStart(None, 0, 0, 0.0, 0.0, why)
     pairs = matches(source, target)
     found = consensus(pairs)
-    if found is None or found.votes < LEAST_VOTES:
-        fit = 0 if found is None else int(found.inliers.sum())
+    if not found or found[0].votes < LEAST_VOTES:
+        fit = int(found[0].inliers.sum()) if found else 0
         why = (
             f"Of {len(pairs)} features that look alike in {source.name} and {target.name}, {fit} agree on "
             "one pose, too few for a start; let the views share more, or give a start pose."
         )
         return ColourStart(None, len(pairs), fit, 0.0, 0.0, why)
-    inliers = int(found.inliers.sum())
-    return ColourStart(found.T_target_source, len(pairs), inliers, found.votes, found.rival_votes, "")
+    best, rival_votes = found[0], found[1].votes if len(found) > 1 else 0.0
+    return ColourStart(best.T_target_source, len(pairs), int(best.inliers.sum()), best.votes, rival_votes, "")

@@ -157,7 +157,7 @@ class Checks:
     def _by_features(self) -> Iterable[Candidate]:
         """Yield where the first start by features leads."""
         try:
-            T_start = next(iter(by_surfaces(self.source, self.target, self.config.seed).poses()))
+            T_start = next(iter(by_surfaces(self.source, self.target).poses()))
         except ReconstructionError:
             return
         gates_m = default_gates_m(self.target, "surfaces", self.config.seed)

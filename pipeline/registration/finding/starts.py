@@ -9,7 +9,7 @@ from typing import Literal
 from packetmesh.errors import ReconstructionError
 from pipeline.registration.colour import LiftedFeatures, colour_start
 from pipeline.registration.finding.candidates import QUICK_POINTS
-from pipeline.registration.global_start import default_voxel_m, global_starts
+from pipeline.registration.global_start import START_VOXELS, default_voxel_m, global_starts
 from pipeline.registration.neighbourhood import median_spacing_m
 from pipeline.registration.sample import draw
 from pipeline.types import FloatArray, PointCloud
@@ -21,9 +21,8 @@ GIVEN_VOXELS = (1.25, 2.5, 5.0, 10.0, 20.0)
 """Gates from a given start, in fiftieths of the target's extent: 0.15 to 2.4 m in a room of 6 m."""
 FOUND_VOXELS = (1.25, 2.5)
 """Gates from a start that was found."""
-FEATURE_TRIES = ((1.6, 3), (1.0, 1))
-"""Voxel sizes for features of the surfaces, in the same unit, with the number of tries of each: the coarse
-one is the fastest."""
+FEATURE_VOXELS = (START_VOXELS, 1.0)
+"""Voxel sizes for features of the surfaces, in the same unit: the coarse one is the fastest."""
 LEAST_GATE_OF_SPACING = 6.0
 """Least gate, in median spacings of the registered target points."""
 
@@ -37,15 +36,14 @@ class Start:
     """Finds (4, 4) start poses T_target_source; raises ReconstructionError if there are none."""
 
 
-def by_surfaces(source: PointCloud, target: PointCloud, seed: int = 0) -> Start:
+def by_surfaces(source: PointCloud, target: PointCloud) -> Start:
     """Return start poses from features of the surfaces (FPFH), coarse ones first."""
 
     def poses() -> Iterable[FloatArray]:
         found, reason = 0, None
-        for voxels, tries in FEATURE_TRIES:
-            seeds = range(seed, seed + tries)
+        for voxels in FEATURE_VOXELS:
             try:
-                for T_start in global_starts(source, target, voxels * default_voxel_m(target), seeds):
+                for T_start in global_starts(source, target, voxels * default_voxel_m(target)):
                     yield T_start
                     found += 1
             except ReconstructionError as error:

@@ -7,20 +7,17 @@ spatial compatibility for efficient and robust point cloud registration", CVPR 2
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from pipeline.kernels.geometry import apply, rotation_angle_rad
-from pipeline.registration.colour.matches import Matches
 from pipeline.registration.residual import DegenerateError, weighted_procrustes
 from pipeline.types import BoolArray, FloatArray
 
 WITHIN_SD = 3.0
-"""A pair fits a motion if its distance is at most this many standard deviations, or ``LEAST_M``."""
-LEAST_M = 0.02
-SHORTEST_M = 0.05
-"""Pairs nearer to each other than this say little about a motion, and are not compared."""
+"""A pair fits a motion if its distance is at most this many standard deviations, or ``least_m``."""
 SEEDS = 40
 """Largest number of pairs from which a motion is computed, those with most agreement first."""
 GROUP = 12
@@ -29,53 +26,84 @@ ROUNDS = 4
 """Times that the motion is computed again from the pairs that fit it."""
 FLAT = 0.2
 """Points are in one plane if their spread across it is below this share of the smaller one along it."""
-OTHER_RAD, OTHER_M = np.radians(10.0), 0.3
-"""Motions that differ by more are different answers."""
+OTHER_RAD = np.radians(10.0)
 
 
-class Found(NamedTuple):
-    """A motion, the pairs that fit it, and its strongest rival."""
+@dataclass(frozen=True, slots=True)
+class PointPairs:
+    """Pairs of points that may be the same; many are not."""
+
+    source_m: FloatArray
+    """(M, 3)."""
+    target_m: FloatArray
+    """(M, 3)."""
+    sigma_m: FloatArray
+    """(M,) standard deviation of the pair's distance at the right pose."""
+    votes: FloatArray
+    """(M,) votes of a pair for a pose that it fits."""
+
+    def __len__(self) -> int:
+        return len(self.votes)
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """Lengths of the place; the defaults suit a room that a camera sees."""
+
+    least_m: float = 0.02
+    """A pair at this distance fits, however small its standard deviation."""
+    shortest_m: float = 0.05
+    """Pairs nearer to each other than this say little about a motion, and are not compared."""
+    other_m: float = 0.3
+    """Motions that differ by more, or by 10 degrees, are different answers."""
+    from_origin: bool = True
+    """Whether both were seen from their origins, so that no motion may show a plane from behind."""
+
+
+ROOM = Scale()
+
+
+class Motion(NamedTuple):
+    """A motion, and the pairs that fit it."""
 
     T_target_source: FloatArray
     inliers: BoolArray
     """(M,)."""
     votes: float
     """Votes of the pairs that fit; a pair counts less, the farther it is off."""
-    rival_votes: float
-    """Votes of the best of the clearly different motions; 0 without one."""
 
 
-def consensus(pairs: Matches) -> Found | None:
-    """Find the rigid motion that most pairs fit; None if no three pairs agree."""
+def consensus(pairs: PointPairs, scale: Scale = ROOM) -> list[Motion]:
+    """Find clearly different rigid motions that most pairs fit, best first; none if no three pairs agree."""
     if len(pairs) < 3:
-        return None
-    limit_m = np.maximum(WITHIN_SD * pairs.sigma_m, LEAST_M)
-    agreement = _agreement(pairs, limit_m)
+        return []
+    limit_m = np.maximum(WITHIN_SD * pairs.sigma_m, scale.least_m)
+    agreement = _agreement(pairs, limit_m, scale.shortest_m)
     strength = agreement @ pairs.votes.astype(np.float32)
-    found: list[Found] = []
+    found: list[Motion] = []
     explained = np.zeros(len(pairs), bool)
     for seed in np.argsort(-strength, kind="stable")[:SEEDS]:
         if explained[seed] or not strength[seed] > 0.0:
             continue
         group = np.argsort(-agreement[seed], kind="stable")[:GROUP]
         group = np.append(group[agreement[seed, group] > 0.0], seed)
-        motion = _refined(pairs, limit_m, group)
+        motion = _refined(pairs, limit_m, group, scale.from_origin)
         if motion is not None:
             found.append(motion)
             explained |= motion.inliers
-    if not found:
-        return None
-    best = max(found, key=lambda one: one.votes)
-    rivals = [one.votes for one in found if _differ(one.T_target_source, best.T_target_source)]
-    return best._replace(rival_votes=max(rivals, default=0.0))
+    different: list[Motion] = []
+    for one in sorted(found, key=lambda one: -one.votes):
+        if all(_differ(one.T_target_source, other.T_target_source, scale.other_m) for other in different):
+            different.append(one)
+    return different
 
 
-def _agreement(pairs: Matches, limit_m: FloatArray) -> FloatArray:
+def _agreement(pairs: PointPairs, limit_m: FloatArray, shortest_m: float) -> FloatArray:
     """Return (M, M) votes of the pairs that agree with two pairs that agree with each other; else 0."""
     apart_source_m, apart_target_m = _distances_m(pairs.source_m), _distances_m(pairs.target_m)
     tolerance_m = np.hypot(limit_m[:, None], limit_m)
     same = np.abs(apart_source_m - apart_target_m) < tolerance_m
-    same &= np.minimum(apart_source_m, apart_target_m) > SHORTEST_M
+    same &= np.minimum(apart_source_m, apart_target_m) > shortest_m
     agree = same.astype(np.float32)
     return agree * ((agree * pairs.votes.astype(np.float32)) @ agree)
 
@@ -87,7 +115,7 @@ def _distances_m(points_m: FloatArray) -> FloatArray:
     return np.sqrt(np.maximum(squared[:, None] + squared - 2.0 * centred_m @ centred_m.T, 0.0))
 
 
-def _refined(pairs: Matches, limit_m: FloatArray, rows: np.ndarray) -> Found | None:
+def _refined(pairs: PointPairs, limit_m: FloatArray, rows: np.ndarray, from_origin: bool) -> Motion | None:
     """Return the motion of some pairs, computed again from all that fit it; None if fewer than 3 do."""
     try:
         for _ in range(ROUNDS):
@@ -100,10 +128,10 @@ def _refined(pairs: Matches, limit_m: FloatArray, rows: np.ndarray) -> Found | N
     except DegenerateError:
         return None
     inliers = off < 1.0
-    if inliers.sum() < 3 or _from_behind(pairs.target_m[inliers], T):
+    if inliers.sum() < 3 or (from_origin and _from_behind(pairs.target_m[inliers], T)):
         return None
     votes = float(np.sum(pairs.votes[inliers] * (1.0 - off[inliers] ** 2)))
-    return Found(T, inliers, votes, 0.0)
+    return Motion(T, inliers, votes)
 
 
 def _from_behind(target_m: FloatArray, T_target_source: FloatArray) -> bool:
@@ -119,6 +147,6 @@ def _from_behind(target_m: FloatArray, T_target_source: FloatArray) -> bool:
     return bool(spread[2] < FLAT * spread[1] and sides[0] * sides[1] < 0.0)
 
 
-def _differ(T_a: FloatArray, T_b: FloatArray) -> bool:
+def _differ(T_a: FloatArray, T_b: FloatArray, other_m: float) -> bool:
     apart_m = float(np.linalg.norm(T_a[:3, 3] - T_b[:3, 3]))
-    return apart_m > OTHER_M or rotation_angle_rad(T_a[:3, :3].T @ T_b[:3, :3]) > OTHER_RAD
+    return apart_m > other_m or rotation_angle_rad(T_a[:3, :3].T @ T_b[:3, :3]) > OTHER_RAD
