@@ -29,6 +29,8 @@ SLOW = (
         "pipeline/placement/test_*.py",
     ),
     *(
+        "pipeline/pairs/test_found.py",
+        "pipeline/registration/finding/test_search.py",
         "pipeline/registration/test_[agpr]*.py",
         "pipeline/surface/test_baselines.py",
         "packetmesh/test_[ei]*.py",
