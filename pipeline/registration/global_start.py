@@ -24,6 +24,8 @@ NEAR = 1.5
 """A point is near the target within so many voxels."""
 START_VOXELS = 1.6
 """Voxel of a single start pose, in default voxels: with coarse features the first one is right more often."""
+POINTS_OF_VOXEL = 4.0
+"""Least mean number of points in a voxel."""
 MOST_PAIRS = 1500
 """Largest number of pairs of features that are compared, the most alike first."""
 LEAST_VOTES = 5.0
@@ -72,11 +74,13 @@ def global_starts(source: PointCloud, target: PointCloud, voxel_m: float) -> lis
     Args:
         source: the cloud that moves.
         target: the cloud that stays.
-        voxel_m: voxel edge to which both clouds are first thinned.
+        voxel_m: voxel edge to which both clouds are first thinned; larger if it would hold less than four
+            points, which have no features but noise.
 
     Raises:
         ReconstructionError: too few features agree on one pose.
     """
+    voxel_m = max(_filled_voxel_m(cloud, voxel_m) for cloud in (source, target))
     (moving_m, moving), (fixed_m, fixed) = (_with_features(cloud, voxel_m) for cloud in (source, target))
     if min(len(moving_m), len(fixed_m)) < 3:
         raise ReconstructionError(
@@ -100,6 +104,13 @@ def global_starts(source: PointCloud, target: PointCloud, voxel_m: float) -> lis
             "overlap or have no features; give a start pose."
         )
     return [motion.T_target_source for motion in found[:DIFFERENT_STARTS]]
+
+
+def _filled_voxel_m(cloud: PointCloud, voxel_m: float) -> float:
+    """Return a voxel edge, at least the given one, of which each holds some points of a surface."""
+    points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points_m))
+    filled = len(points.voxel_down_sample(voxel_m).points)
+    return float(voxel_m * np.sqrt(max(1.0, POINTS_OF_VOXEL * filled / max(1, len(cloud)))))
 
 
 def _mutual_nearest(moving: FloatArray, fixed: FloatArray) -> tuple[IntArray, IntArray]:

@@ -35,6 +35,11 @@ class Evidence:
     """Judged points of both that lie on the other's surface, within the noise."""
     through: int
     """Judged points of both that lie where the other's camera saw through; 0 without a viewpoint."""
+    refutable: bool
+    """Whether a viewpoint is known, so that free space could refute the pose."""
+    one_side_share: float
+    """Share of the points on the surface that have both clouds' middles on one side: two rooms back to back
+    share a wall that they see from opposite sides. 1 with a viewpoint, whose free space tells more."""
     height_ratio: float
     """Root mean square distance of the points on the surface from its tangent planes, over the noise."""
     stiffness: float
@@ -99,6 +104,8 @@ class Judge:
             asked=(len(there.judged), len(back.judged)),
             on=len(heights),
             through=int(there.through.sum() + back.through.sum()),
+            refutable=self._refutable,
+            one_side_share=self._one_side_share(places_m, normals, T_target_source),
             height_ratio=float(np.sqrt(np.mean(heights**2))) if len(heights) else float("inf"),
             stiffness=stiffness(places_m, normals),
             open_motions=open_motions(places_m, normals) if len(heights) else "any motion",
@@ -112,6 +119,18 @@ class Judge:
         turned /= np.linalg.norm(turned, axis=1, keepdims=True)
         places_m = apply(T, self.source.points_m[moving]), self.target.points_m[fixed]
         return np.concatenate(places_m), np.concatenate([turned, self.target.normals[fixed]])
+
+    def _one_side_share(self, places_m: FloatArray, normals: FloatArray, T: FloatArray) -> float:
+        """Return the share of (N, 3) places, with their normals, that have both middles on one side."""
+        if self._refutable or not len(places_m):
+            return 1.0
+        middles_m = apply(T, self.source.middle_m[None])[0], self.target.middle_m
+        sides = [np.einsum("ni,ni->n", middle_m - places_m, normals) > 0.0 for middle_m in middles_m]
+        return float(np.mean(sides[0] == sides[1]))
+
+    @property
+    def _refutable(self) -> bool:
+        return self.source.view is not None or self.target.view is not None
 
     def _color_correlation(self, there: Judgement, back: Judgement) -> float:
         """Return the correlation of the colours of points on the other's surface and of their nearest."""

@@ -68,6 +68,7 @@ class Surface:
         """(n,) rows of the points that the other cloud judges."""
         self.view: RangeImage | None = range_image(cloud.points_m)
         """Free space, if the cloud was seen from its origin."""
+        self.middle_m: FloatArray = np.median(self.points_m, axis=0)
 
     def judge(self, other: Surface, T: FloatArray) -> Judgement:
         """Judge the asked points of another cloud, moved into this frame by a motion or similarity ``T``."""

@@ -15,8 +15,11 @@ Word = Literal["sure", "doubtful", "none"]
 
 LEAST_OVERLAP = 0.08
 """Least share of a cloud's points that the other can judge."""
-LEAST_ON, LEAST_ON_COLORED = 0.75, 0.7
-"""Least share of the judged points on the other's surface, without colours and with colours that match."""
+LEAST_ON, LEAST_ON_COLORED, LEAST_ON_BARE = 0.75, 0.7, 0.95
+"""Least share of the judged points on the other's surface: where free space or colours could refute the pose,
+where both could and the colours match, and where nothing else could."""
+LEAST_ONE_SIDE = 0.6
+"""Least share of the points on the surface that have both clouds' middles on one side."""
 LITTLE_THROUGH, MOST_THROUGH = 0.01, 0.02
 """Shares of the judged points in free space: a few are already a sign of a wrong pose. Above the first, poses
 nearby are tried; the second is the largest that may be sure."""
@@ -71,9 +74,10 @@ def _reasons(evidence: Evidence) -> tuple[str, ...]:
         reasons.append(
             f"{evidence.through_share:.1%} of the shared points lie where the other camera saw through"
         )
-    colors_match = evidence.color_correlation >= LEAST_CORRELATION
-    if evidence.on_share < (LEAST_ON_COLORED if colors_match else LEAST_ON):
+    if evidence.on_share < _least_on(evidence):
         reasons.append(f"only {evidence.on_share:.0%} of the shared points lie on the other cloud's surface")
+    elif evidence.one_side_share < LEAST_ONE_SIDE:
+        reasons.append("the clouds see what they share from opposite sides, like two rooms back to back")
     elif evidence.height_ratio > MOST_HEIGHT:
         reasons.append(f"the surfaces are {evidence.height_ratio:.1f} times the points' noise apart")
     if evidence.color_correlation < LEAST_CORRELATION:  # NaN without colours
@@ -83,3 +87,11 @@ def _reasons(evidence: Evidence) -> tuple[str, ...]:
     elif evidence.stiffness < LEAST_STIFFNESS:
         reasons.append("the surfaces where the clouds meet hardly hold the pose in one direction")
     return tuple(reasons)
+
+
+def _least_on(evidence: Evidence) -> float:
+    """Return the least share on the surface for a sure pose: less where other evidence speaks for it, too."""
+    colors_match = evidence.color_correlation >= LEAST_CORRELATION  # not without colours
+    if evidence.refutable:
+        return LEAST_ON_COLORED if colors_match else LEAST_ON
+    return LEAST_ON if colors_match else LEAST_ON_BARE

@@ -17,7 +17,7 @@ def slid(x_m: float, y_m: float = 0.0, z_m: float = 0.0) -> np.ndarray:
 
 
 def evidence(judged=(1000, 1000), on=1800, through=0) -> Evidence:
-    return Evidence(judged, (2000, 4000), on, through, 1.0, 0.1, "", float("nan"))
+    return Evidence(judged, (2000, 4000), on, through, True, 1.0, 1.0, 0.1, "", float("nan"))
 
 
 @pytest.fixture(scope="module")
@@ -172,3 +172,10 @@ def test_clearly_better_is_half_of_what_speaks_against_the_other():
     assert evidence(on=1940).clearly_better(evidence(on=1860))  # 3 % against 7 %
     assert not evidence(on=1940).clearly_better(evidence(on=1870))  # against 6.5 %
     assert not evidence(on=2000).clearly_better(evidence(on=1991))
+
+
+def test_two_rooms_back_to_back_see_their_wall_from_opposite_sides():
+    source, target = (PointCloud(room(seed)) for seed in (1, 2))
+    judge = Judge(Surface(source), Surface(target))
+    assert judge(np.eye(4)).one_side_share > 0.95
+    assert judge(slid(4.0)).one_side_share < 0.3

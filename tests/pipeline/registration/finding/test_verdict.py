@@ -7,7 +7,7 @@ import pytest
 from pipeline.registration.finding.evidence import Evidence
 from pipeline.registration.finding.verdict import verdict_on
 
-GOOD = Evidence((1000, 1000), (2000, 2000), 1950, 0, 1.0, 0.05, "", float("nan"))
+GOOD = Evidence((1000, 1000), (2000, 2000), 1950, 0, True, 1.0, 1.0, 0.05, "", float("nan"))
 
 
 def test_nothing_against_a_pose_is_sure():
@@ -23,6 +23,8 @@ def test_nothing_against_a_pose_is_sure():
         ({"judged": (100, 100), "on": 195}, "doubtful", "share only 5% of their points"),
         ({"through": 60}, "doubtful", "3.0% of the shared points lie where the other camera saw through"),
         ({"on": 1200}, "doubtful", "only 60% of the shared points lie on the other cloud's surface"),
+        ({"refutable": False, "on": 1880}, "doubtful", "only 94% of the shared points lie on"),
+        ({"one_side_share": 0.5}, "doubtful", "from opposite sides, like two rooms back to back"),
         ({"height_ratio": 1.8}, "doubtful", "the surfaces are 1.8 times the points' noise apart"),
         ({"color_correlation": 0.2}, "doubtful", "colours there do not match (correlation 0.20)"),
         ({"open_motions": "sliding along y"}, "doubtful", "sliding along y changes nothing"),
