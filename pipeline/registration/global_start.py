@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from pipeline.kernels.kdtree import KdTree
 from pipeline.kernels.open3d_runtime import o3d
 from pipeline.kernels.point_sets import middle_extent_m
 from pipeline.registration.consensus import WITHIN_SD, Motion, PointPairs, Scale, consensus
+from pipeline.registration.finding.viewpoint import range_image
 from pipeline.types import FloatArray, IntArray, PointCloud
 
 VOXELS_ACROSS = 50
@@ -32,6 +34,11 @@ LEAST_VOTES = 5.0
 """Least votes of a start pose; a few wrong pairs always agree."""
 DIFFERENT_STARTS = 3
 """Largest number of start poses."""
+PAIR_REACH, EDGE_RATIO = 1.5, 0.9
+"""Of RANSAC: largest distance of a pair in voxels, least ratio of the edge lengths between matched points."""
+RANSAC_ITERATIONS, RANSAC_CONFIDENCE = 100_000, 0.999
+SMALLEST_SHARE = 0.15
+"""Least share of the source points with a partner in the target after RANSAC."""
 ROWS = 1000
 """Features that are compared with all others at once: what they take of the memory is bounded."""
 
@@ -60,7 +67,48 @@ def global_start(source: PointCloud, target: PointCloud) -> FloatArray:
     Raises:
         ReconstructionError: too few features agree on one pose.
     """
+    if without_viewpoint(source, target):
+        return next(sampled_starts(source, target, default_voxel_m(target), (0,)))
     return global_starts(source, target, START_VOXELS * default_voxel_m(target))[0]
+
+
+def without_viewpoint(source: PointCloud, target: PointCloud) -> bool:
+    """Return whether one of the clouds was not seen from its origin.
+
+    Its normals have no sure sign then, and random samples, which are tested on the points, find more than the
+    consensus of the features.
+    """
+    return any(range_image(cloud.points_m) is None for cloud in (source, target))
+
+
+def sampled_starts(
+    source: PointCloud, target: PointCloud, voxel_m: float, seeds: Sequence[int]
+) -> Iterator[FloatArray]:
+    """Find a (4, 4) T_target_source for each seed of Open3D's RANSAC; its answers at low overlap differ.
+
+    Args:
+        source, target, voxel_m: as for ``global_starts``.
+        seeds: random seeds.
+
+    Raises:
+        ReconstructionError: no pose matches enough points.
+    """
+    (moving, moving_features), (fixed, fixed_features) = (
+        _with_features(cloud, voxel_m) for cloud in (source, target)
+    )
+    _refuse_few(moving, fixed, voxel_m)
+    most = 0.0
+    for seed in seeds:
+        o3d.utility.random.seed(seed)
+        found = _by_ransac(moving, fixed, moving_features, fixed_features, PAIR_REACH * voxel_m)
+        most = max(most, found.fitness)
+        if found.fitness >= SMALLEST_SHARE:
+            yield np.array(found.transformation)
+    if most < SMALLEST_SHARE:
+        raise ReconstructionError(
+            f"No start pose brings more than {most:.0%} of the source points to the target: "
+            "the clouds hardly overlap or have no features; give a start pose."
+        )
 
 
 def global_starts(source: PointCloud, target: PointCloud, voxel_m: float) -> list[FloatArray]:
@@ -81,11 +129,10 @@ def global_starts(source: PointCloud, target: PointCloud, voxel_m: float) -> lis
         ReconstructionError: too few features agree on one pose.
     """
     voxel_m = max(_filled_voxel_m(cloud, voxel_m) for cloud in (source, target))
-    (moving_m, moving), (fixed_m, fixed) = (_with_features(cloud, voxel_m) for cloud in (source, target))
-    if min(len(moving_m), len(fixed_m)) < 3:
-        raise ReconstructionError(
-            f"Too few points remain at {voxel_m:.3g} m to find a start pose; give one, or a smaller voxel."
-        )
+    clouds = [_with_features(cloud, voxel_m) for cloud in (source, target)]
+    _refuse_few(clouds[0][0], clouds[1][0], voxel_m)
+    moving_m, fixed_m = (np.asarray(points.points) for points, _ in clouds)
+    moving, fixed = (np.ascontiguousarray(features.data.T, np.float32) for _, features in clouds)
     rows, partners = _mutual_nearest(moving, fixed)
     votes = np.ones(len(rows))
     pairs = PointPairs(moving_m[rows], fixed_m[partners], votes * voxel_m / WITHIN_SD, votes)
@@ -131,8 +178,15 @@ def _mutual_nearest(moving: FloatArray, fixed: FloatArray) -> tuple[IntArray, In
     return rows, nearest[rows]
 
 
-def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[FloatArray, FloatArray]:
-    """Return (N, 3) thinned points, and their (N, 33) features, float32."""
+def _refuse_few(moving: Any, fixed: Any, voxel_m: float) -> None:
+    if min(len(moving.points), len(fixed.points)) < 3:
+        raise ReconstructionError(
+            f"Too few points remain at {voxel_m:.3g} m to find a start pose; give one, or a smaller voxel."
+        )
+
+
+def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[Any, Any]:
+    """Return the thinned cloud with normals, and its features."""
     points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points_m))
     given = cloud.normals
     if given is not None and not (np.isfinite(given).all() and given.any(axis=1).all()):
@@ -145,5 +199,23 @@ def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[FloatArray, Float
         points.orient_normals_towards_camera_location(np.zeros(3))
     o3d_registration: Any = o3d.pipelines.registration  # its stubs require an optional argument
     reach = o3d.geometry.KDTreeSearchParamHybrid(FEATURE_REACH * voxel_m, 100)
-    features = o3d_registration.compute_fpfh_feature(points, reach).data
-    return np.asarray(points.points), np.ascontiguousarray(features.T, np.float32)
+    return points, o3d_registration.compute_fpfh_feature(points, reach)
+
+
+def _by_ransac(source: Any, target: Any, source_features: Any, target_features: Any, reach_m: float) -> Any:
+    o3d_registration = o3d.pipelines.registration
+    return o3d_registration.registration_ransac_based_on_feature_matching(
+        source,
+        target,
+        source_features,
+        target_features,
+        True,
+        reach_m,
+        o3d_registration.TransformationEstimationPointToPoint(False),
+        3,
+        [
+            o3d_registration.CorrespondenceCheckerBasedOnEdgeLength(EDGE_RATIO),
+            o3d_registration.CorrespondenceCheckerBasedOnDistance(reach_m),
+        ],
+        o3d_registration.RANSACConvergenceCriteria(RANSAC_ITERATIONS, RANSAC_CONFIDENCE),
+    )

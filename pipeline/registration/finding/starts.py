@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 from packetmesh.errors import ReconstructionError
 from pipeline.registration.colour import LiftedFeatures, colour_start
 from pipeline.registration.finding.candidates import QUICK_POINTS
-from pipeline.registration.global_start import START_VOXELS, default_voxel_m, global_starts
+from pipeline.registration.global_start import (
+    START_VOXELS,
+    default_voxel_m,
+    global_starts,
+    sampled_starts,
+    without_viewpoint,
+)
 from pipeline.registration.neighbourhood import median_spacing_m
 from pipeline.registration.sample import draw
 from pipeline.types import FloatArray, PointCloud
@@ -23,6 +30,8 @@ FOUND_VOXELS = (1.25, 2.5)
 """Gates from a start that was found."""
 FEATURE_VOXELS = (START_VOXELS, 1.0)
 """Voxel sizes for features of the surfaces, in the same unit: the coarse one is the fastest."""
+SEEDS = (0, 1, 2)
+"""Seeds of random samples."""
 LEAST_GATE_OF_SPACING = 6.0
 """Least gate, in median spacings of the registered target points."""
 
@@ -37,13 +46,23 @@ class Start:
 
 
 def by_surfaces(source: PointCloud, target: PointCloud) -> Start:
-    """Return start poses from features of the surfaces (FPFH), coarse ones first."""
+    """Return start poses from features of the surfaces (FPFH), coarse ones first.
+
+    Those of random samples come first where a cloud has no viewpoint, and else last, if there are no others.
+    """
 
     def poses() -> Iterable[FloatArray]:
+        agreed = [partial(global_starts, source, target, voxels * unit_m) for voxels in FEATURE_VOXELS]
+        sampled = partial(sampled_starts, source, target, START_VOXELS * unit_m, SEEDS)
+        bare = without_viewpoint(source, target)
+        ways: Sequence[Callable[[], Iterable[FloatArray]]]
+        ways = (sampled, *agreed) if bare else (*agreed, sampled)
         found, reason = 0, None
-        for voxels in FEATURE_VOXELS:
+        for way in ways:
+            if way is sampled and found:
+                return
             try:
-                for T_start in global_starts(source, target, voxels * default_voxel_m(target)):
+                for T_start in way():
                     yield T_start
                     found += 1
             except ReconstructionError as error:
@@ -51,6 +70,7 @@ def by_surfaces(source: PointCloud, target: PointCloud) -> Start:
         if reason is not None and not found:
             raise reason
 
+    unit_m = default_voxel_m(target)
     return Start("surfaces", poses)
 
 
