@@ -212,7 +212,7 @@ def test_a_flood_is_not_heard_but_the_hand_after_it_is(server, browser, monkeypa
     monkeypatch.setattr(gates, "MOST_A_SECOND", 0.0)
     for k in range(2000):
         browser.set("slider", (k % 10) / 10)
-    wait_for(lambda: server.gate.dropped[FLOOD] == 1980)
+    wait_for(lambda: server.gate.dropped[FLOOD] >= 1980)  # more if the page greeted after the change
     monkeypatch.setattr(gates, "MOST_A_SECOND", 200.0)
     time.sleep(0.1)
     browser.set("list", "b")
