@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.config import RegistrationConfig
+from pipeline.registration import point_error_m
 from pipeline.registration.finding.evidence import Evidence, Judge
-from pipeline.registration.finding.poses import same, turn_deg
-from pipeline.registration.finding.rivals import mirrored_axis, quarter_turns
+from pipeline.registration.finding.poses import compared_points_m, length, same, turn_deg
+from pipeline.registration.finding.rivals import better_slide, mirrored_axis, quarter_turns
 from pipeline.registration.finding.starts import default_gates_m
 from pipeline.registration.finding.surface import Surface
 from pipeline.registration.finding.verdict import Verdict, verdict_on
@@ -17,8 +18,9 @@ from pipeline.types import FloatArray, PointCloud
 class Belief:
     """Judges the poses of two clouds, which are prepared once.
 
-    Quarter turns and a mirrored source are tried where the clouds have no colours that would refute them.
-    They take a second; the evidence of a pose takes 10 ms.
+    Quarter turns and a mirrored source are tried where the clouds have no colours that would refute them, and
+    poses nearby where a little of the answer lies in free space. They take a second; the evidence of a pose
+    takes 10 ms.
     """
 
     def __init__(self, source: PointCloud, target: PointCloud, config: RegistrationConfig) -> None:
@@ -32,15 +34,27 @@ class Belief:
         """Return the verdict on a (4, 4) pose."""
         evidence = self._judge(T_target_source)
         verdict = verdict_on(evidence)
-        if verdict.word == "none" or evidence.open_motions or np.isfinite(evidence.color_correlation):
+        colored = bool(np.isfinite(evidence.color_correlation))
+        if verdict.word == "none" or evidence.open_motions or (colored and not verdict.sure):
             return verdict
         for T, reasons in self._known:
             if same(T, T_target_source, self._source, self._target):
                 return verdict_on(evidence, reasons)
-        other = self._other_pose if verdict.sure else self._mirrored
-        reasons = other(T_target_source, evidence)
+        reasons = self._nearby(T_target_source, evidence) if verdict.sure else ()
+        if not colored:
+            other = self._other_pose if verdict.sure else self._mirrored
+            reasons = (*reasons, *other(T_target_source, evidence))
         self._known.append((T_target_source, reasons))
         return verdict_on(evidence, reasons)
+
+    def _nearby(self, T: FloatArray, evidence: Evidence) -> tuple[str, ...]:
+        """Return a reason if the source fits better nearby."""
+        clouds = self._source, self._target
+        better = better_slide(*clouds, T, evidence, self._judge, self._config)
+        if better is None or same(better.T_target_source, T, *clouds):
+            return ()
+        away_m = point_error_m(better.T_target_source, T, compared_points_m(self._source))
+        return (f"{length(away_m)} away, the source fits better",)
 
     def _other_pose(self, T: FloatArray, evidence: Evidence) -> tuple[str, ...]:
         """Return a reason if the source fits as well when it is turned by quarters."""

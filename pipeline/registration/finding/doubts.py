@@ -18,9 +18,9 @@ from pipeline.registration.finding.candidates import (
 )
 from pipeline.registration.finding.evidence import Judge
 from pipeline.registration.finding.poses import compared_points_m, length, same, turn_deg
-from pipeline.registration.finding.rivals import quarter_turns, slides
+from pipeline.registration.finding.rivals import better_slide, quarter_turns
 from pipeline.registration.finding.starts import Way, by_surfaces, default_gates_m
-from pipeline.registration.finding.verdict import LITTLE_THROUGH, verdict_on
+from pipeline.registration.finding.verdict import verdict_on
 from pipeline.registration.global_start import default_voxel_m
 from pipeline.registration.metrics import point_error_m
 from pipeline.types import FloatArray, PointCloud
@@ -31,8 +31,6 @@ MOST_SPREAD_VOXELS = 0.5
 """… within so many fiftieths of the target's extent: 3 cm in a view of 3 m."""
 MORE_POINTS = 4 * QUICK_POINTS
 """Points of an answer and its draws where those of quick registrations differ by more."""
-SLIDE_VOXELS = 2.5
-"""Shift to other poses that are compared with an answer of which a little is in free space."""
 LEAST_TURN_DEG = 10.0
 """A rival turned by less is described by its distance."""
 
@@ -63,8 +61,8 @@ class Checks:
 
         Where both clouds have colours, these have refuted all quarter turns but that of a room of one colour.
         """
-        if answer.evidence.through_share > LITTLE_THROUGH:
-            answer = self._best_slide(answer)
+        at, clouds = (answer.T_target_source, answer.evidence), (self.source, self.target)
+        answer = better_slide(*clouds, *at, self.judge, self.config) or answer
         if self._bare and (before := self._scored_better(answer, tried)) is not None:
             return Checked(answer, (self._rival_text(answer, before),), float("nan"), settled=False)
         doubts: tuple[str, ...] = ()
@@ -85,15 +83,6 @@ class Checks:
     def _bare(self) -> bool:
         """Whether no free space can refute a pose, since a cloud has no viewpoint."""
         return self.judge.source.view is None or self.judge.target.view is None
-
-    def _best_slide(self, answer: Candidate) -> Candidate:
-        """Return the answer, or the pose nearby that passes all tests with a better score."""
-        step_m = SLIDE_VOXELS * default_voxel_m(self.target)
-        gate_m = default_gates_m(self.target, "surfaces", self.config.seed)[0]
-        T, clouds = answer.T_target_source, (self.source, self.target)
-        others = slides(*clouds, T, step_m, gate_m, self.judge, self.config)
-        sure = [one for one in others if verdict_on(one.evidence).sure]
-        return max([answer, *sure], key=lambda one: one.evidence.score)
 
     def _with_more_points(self, answer: Candidate) -> tuple[Candidate, float]:
         """Return the answer with more points, and its spread; as it was, with infinity, if that fails."""

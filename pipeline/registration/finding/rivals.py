@@ -19,12 +19,16 @@ from pipeline.registration.finding.candidates import (
     quick_registration,
 )
 from pipeline.registration.finding.evidence import Evidence, Judge
+from pipeline.registration.finding.starts import default_gates_m
 from pipeline.registration.finding.surface import Surface
-from pipeline.registration.finding.verdict import verdict_on
+from pipeline.registration.finding.verdict import LITTLE_THROUGH, verdict_on
+from pipeline.registration.global_start import default_voxel_m
 from pipeline.registration.loop import register
 from pipeline.types import FloatArray, PointCloud
 
 QUARTERS_DEG = (90.0, 180.0, 270.0)
+SLIDE_VOXELS = 2.5
+"""Shift to poses nearby, in fiftieths of the target's extent."""
 LEAST_SCALE_ERROR = 0.01
 """A factor nearer to 1 is within the error of a depth camera."""
 
@@ -62,32 +66,40 @@ def quarter_turns(
                 yield Candidate(T_start, found, gate_m, DIRECTIONS[0], judge(found))
 
 
-def slides(
+def better_slide(
     source: PointCloud,
     target: PointCloud,
     T: FloatArray,
-    step_m: float,
-    gate_m: float,
+    evidence: Evidence,
     judge: Judge,
     config: RegistrationConfig,
-) -> Iterator[Candidate]:
-    """Shift the source to both sides along the place's own axes and register it; yields where each leads.
+) -> Candidate | None:
+    """Return the pose nearby that passes all tests with a better score than an answer of which a little is in
+    free space; else None.
 
-    Shelves and chairs in a row fit one place farther along, too.
+    Shelves and chairs in a row fit one place farther along, too: the source is shifted to both sides along
+    the place's own axes and registered.
 
     Args:
         source: the cloud that moves.
         target: the cloud that stays.
         T: (4, 4) pose T_target_source of the answer.
-        step_m: length of the shifts.
-        gate_m: gate of the registrations.
+        evidence: its evidence.
         judge: judge of these clouds.
         config: settings of the registrations.
     """
-    for axis in _main_axes(judge).T:
-        for shift_m in (-step_m * axis, step_m * axis):
-            T_start = rigid(np.eye(3), shift_m) @ T
-            yield from candidates(source, target, T_start, [gate_m], judge, config)
+    if evidence.through_share <= LITTLE_THROUGH:
+        return None
+    step_m = SLIDE_VOXELS * default_voxel_m(target)
+    gate_m = default_gates_m(target, "surfaces", config.seed)[0]
+    best = None
+    for shift_m in step_m * np.vstack([_main_axes(judge).T, -_main_axes(judge).T]):
+        T_start = rigid(np.eye(3), shift_m) @ T
+        for other in candidates(source, target, T_start, [gate_m], judge, config):
+            least = evidence if best is None else best.evidence
+            if verdict_on(other.evidence).sure and other.evidence.score > least.score:
+                best = other
+    return best
 
 
 def _main_axes(judge: Judge) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -48,30 +48,36 @@ class Start:
 def by_surfaces(source: PointCloud, target: PointCloud) -> Start:
     """Return start poses from features of the surfaces (FPFH), coarse ones first.
 
-    Those of random samples come first where a cloud has no viewpoint, and else last, if there are no others.
+    Those of random samples come first where a cloud has no viewpoint, and else if there are no others.
     """
 
-    def poses() -> Iterable[FloatArray]:
-        agreed = [partial(global_starts, source, target, voxels * unit_m) for voxels in FEATURE_VOXELS]
+    def poses() -> Iterator[FloatArray]:
+        unit_m = default_voxel_m(target)
         sampled = partial(sampled_starts, source, target, START_VOXELS * unit_m, SEEDS)
-        bare = without_viewpoint(source, target)
-        ways: Sequence[Callable[[], Iterable[FloatArray]]]
-        ways = (sampled, *agreed) if bare else (*agreed, sampled)
-        found, reason = 0, None
-        for way in ways:
-            if way is sampled and found:
-                return
-            try:
-                for T_start in way():
-                    yield T_start
-                    found += 1
-            except ReconstructionError as error:
-                reason = error
-        if reason is not None and not found:
-            raise reason
+        agreed = [partial(global_starts, source, target, voxels * unit_m) for voxels in FEATURE_VOXELS]
+        if without_viewpoint(source, target):
+            yield from _all([sampled, *agreed])
+            return
+        try:
+            yield from _all(agreed)
+        except ReconstructionError:
+            yield from sampled()
 
-    unit_m = default_voxel_m(target)
     return Start("surfaces", poses)
+
+
+def _all(ways: Sequence[Callable[[], Iterable[FloatArray]]]) -> Iterator[FloatArray]:
+    """Yield the poses of all ways; where none has one, the last one's error is raised."""
+    found, reason = 0, None
+    for way in ways:
+        try:
+            for T_start in way():
+                yield T_start
+                found += 1
+        except ReconstructionError as error:
+            reason = error
+    if reason is not None and not found:
+        raise reason
 
 
 def by_colour(source: LiftedFeatures, target: LiftedFeatures) -> Start:

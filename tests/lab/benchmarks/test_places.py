@@ -1,12 +1,14 @@
 """Rows of answers become recalls by overlap and verdicts by bins; table and picture say the same."""
 
 import xml.etree.ElementTree as ET
+from types import SimpleNamespace
 
 import pytest
 
 from lab.benchmarks.places import DIFFERENT, NOTHING, by_overlap, by_verdict
 from lab.places.ours import OURS
 from lab.results.chart import BOTTOM, HEIGHT, TOP, Series, chart
+from lab.results.pages import PLACES, readme_results
 from lab.results.places import BY_OVERLAP, pictures, places
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -68,6 +70,12 @@ def test_the_table_says_what_was_counted():
     assert f"| {OURS} | 60 % | 4 | 75.0 % | 30 to 95 % | 4 | 1 (25.0 %) | 1.5 |" in text
     assert "| peer | 60 % | 2 | 50.0 % | 9 to 91 % | – | – | 1 |" in text
     assert text.startswith("6 pairs")
+
+
+def test_the_readme_says_how_many_are_placed_at_the_least_and_the_largest_overlap():
+    numbers = {BY_OVERLAP: {"runs": by_overlap(ROWS)}}
+    (line,) = readme_results({PLACES: SimpleNamespace(numbers=numbers)})
+    assert "50 % of the pairs that share 15 % are placed, and 75 % of those that share 60 %" in line
 
 
 def test_the_picture_has_a_line_for_each_program_with_a_mark_where_it_was_measured():

@@ -7,6 +7,7 @@ from lab.worlds import box_room
 from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
 from pipeline.kernels.geometry import inverse, rigid, rotation_exp
+from pipeline.registration import global_start as starts
 from pipeline.registration import iterate_registration, point_error_m, register
 from pipeline.registration.global_start import global_start, global_starts
 from pipeline.types import PointCloud
@@ -60,3 +61,22 @@ def test_too_coarse_a_voxel_is_refused(pair):
     source, target, _ = pair
     with pytest.raises(ReconstructionError, match="Too few points remain at 100 m"):
         global_starts(source, target, 100.0)
+
+
+def test_features_are_paired_with_the_most_alike_in_any_number_of_blocks(monkeypatch):
+    rng = np.random.default_rng(0)
+    moving, fixed = (rng.normal(size=(count, 33)).astype(np.float32) for count in (230, 170))
+    apart = np.linalg.norm(moving[:, None] - fixed, axis=2)
+    mutual = [(i, j) for i, j in enumerate(apart.argmin(axis=1)) if apart[:, j].argmin() == i]
+    for rows in (1000, 100, 7):
+        monkeypatch.setattr(starts, "ROWS", rows)
+        found = list(zip(*starts._mutual_nearest(moving, fixed), strict=True))
+        assert found == sorted(mutual, key=lambda pair: apart[pair])
+    monkeypatch.setattr(starts, "MOST_PAIRS", 5)
+    assert list(zip(*starts._mutual_nearest(moving, fixed), strict=True)) == found[:5]
+
+
+def test_a_sparse_cloud_gets_larger_voxels():
+    plane_m = np.random.default_rng(0).uniform(0.0, 1.0, (1000, 3)) * [1.0, 1.0, 0.0]
+    assert starts._filled_voxel_m(PointCloud(plane_m), 0.2) == 0.2
+    assert starts._filled_voxel_m(PointCloud(plane_m), 0.01) == pytest.approx(0.02, rel=0.05)

@@ -9,9 +9,12 @@ from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
 from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.registration import point_error_m
+from pipeline.registration.finding import doubts
+from pipeline.registration.finding.candidates import Candidate
+from pipeline.registration.finding.doubts import Checks
 from pipeline.registration.finding.evidence import Judge
 from pipeline.registration.finding.poses import compared_points_m, same, turn_deg
-from pipeline.registration.finding.rivals import slides
+from pipeline.registration.finding.rivals import better_slide
 from pipeline.registration.finding.search import search
 from pipeline.registration.finding.starts import Start, by_surfaces, default_gates_m
 from pipeline.registration.finding.surface import Surface
@@ -97,18 +100,35 @@ def comb(seed: int) -> PointCloud:
     rng = np.random.default_rng(seed)
     x_m, y_m = rng.uniform(0.0, 3.0, 12_000), rng.uniform(0.0, 1.0, 12_000)
     wall_m = np.stack([x_m, y_m, np.where(x_m % 0.15 < 0.07, 0.08, 0.0)], axis=1)
-    end_m = np.stack([np.full(3000, 3.0), *rng.uniform(-0.6, [[1.0], [0.6]], (2, 3000))], axis=1)
+    end_m = np.stack([np.full(6000, 3.0), *rng.uniform(-0.6, [[1.0], [0.6]], (2, 6000))], axis=1)
     floor_m = np.stack([*rng.uniform(0.0, [[3.0], [0.6]], (2, 6000)), np.zeros(6000)], axis=1)[:, [0, 2, 1]]
-    return PointCloud(np.concatenate([wall_m, end_m, floor_m]) + rng.normal(0.0, 0.001, (21_000, 3)))
+    return PointCloud(np.concatenate([wall_m, end_m, floor_m]) + rng.normal(0.0, 0.001, (24_000, 3)))
 
 
 def test_one_groove_farther_along_a_slide_leads_back():
     source, target = comb(0), comb(1)
     judge, T_wrong = Judge(Surface(source), Surface(target)), rigid(np.eye(3), [-0.15, 0.0, 0.0])
-    found = list(slides(source, target, T_wrong, 0.14, 0.1, judge, CONFIG))
-    best = max(found, key=lambda one: one.evidence.score)
-    assert point_error_m(best.T_target_source, np.eye(4), source.points_m) < 0.01
-    assert best.evidence.score > judge(T_wrong).score
+    evidence = judge(T_wrong)
+    assert evidence.on_share > 0.75
+    assert better_slide(source, target, T_wrong, evidence, judge, CONFIG) is None  # nothing in free space
+    seen_through = replace(evidence, through=sum(evidence.judged) // 50)
+    better = better_slide(source, target, T_wrong, seen_through, judge, CONFIG)
+    assert point_error_m(better.T_target_source, np.eye(4), source.points_m) < 0.01
+    assert better.evidence.score > evidence.score
+
+
+def test_where_few_points_lead_apart_more_points_decide(monkeypatch, clouds, answer):
+    """An answer 5 cm from where the draws of its points lead is registered again, with more of them."""
+    source, target = clouds
+    checks = Checks(source, target, Judge(Surface(source), Surface(target)), CONFIG)
+    monkeypatch.setattr(doubts, "MORE_POINTS", 2000)
+    rough = Candidate(
+        np.eye(4), rigid(np.eye(3), [0.05, 0.0, 0.0]) @ T_TRUE, 0.3, "p2q", answer.candidate.evidence
+    )
+    checked = checks("given", rough, [rough])
+    assert checked.settled
+    assert checked.spread_m < 0.01
+    assert point_error_m(checked.candidate.T_target_source, T_TRUE, source.points_m) < 0.01
 
 
 @pytest.mark.parametrize("part", ["source", "target"])
