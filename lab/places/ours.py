@@ -49,7 +49,7 @@ def place(views: PlacesPair, with_color: bool) -> Placed:
     """Find the pose of two RGB-D views; without colour their images are not looked at."""
     started = time.perf_counter()
     source, target = back_project(views.source), back_project(views.target)
-    starts = [by_surfaces(source, target)]
+    starts = [by_surfaces(source, target, from_cameras=True)]
     if with_color:
         starts.insert(0, by_colour(lifted_features(views.source), lifted_features(views.target)))
     else:

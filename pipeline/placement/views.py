@@ -54,4 +54,4 @@ class Views:
 
     def by_surfaces(self, source: int, target: int) -> Start:
         """Return the starts that features of two nodes' surfaces give."""
-        return by_surfaces(self.cloud(source), self.cloud(target))
+        return by_surfaces(self.cloud(source), self.cloud(target), from_cameras=True)

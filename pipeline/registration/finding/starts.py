@@ -45,23 +45,24 @@ class Start:
     """Finds (4, 4) start poses T_target_source; raises ReconstructionError if there are none."""
 
 
-def by_surfaces(source: PointCloud, target: PointCloud) -> Start:
+def by_surfaces(source: PointCloud, target: PointCloud, from_cameras: bool = False) -> Start:
     """Return start poses from features of the surfaces (FPFH), coarse ones first.
 
-    Those of random samples come first where a cloud has no viewpoint, and else if there are no others.
+    Args:
+        source: the cloud that moves.
+        target: the cloud that stays.
+        from_cameras: whether both are known to be seen from their origins. Then the features' consensus is
+            enough; else random samples follow, and come first where a cloud was clearly not seen from there.
     """
 
     def poses() -> Iterator[FloatArray]:
         unit_m = default_voxel_m(target)
-        sampled = partial(sampled_starts, source, target, START_VOXELS * unit_m, SEEDS)
         agreed = [partial(global_starts, source, target, voxels * unit_m) for voxels in FEATURE_VOXELS]
-        if without_viewpoint(source, target):
-            yield from _all([sampled, *agreed])
-            return
-        try:
-            yield from _all(agreed)
-        except ReconstructionError:
-            yield from sampled()
+        if from_cameras:
+            return _all(agreed)
+        sampled = partial(sampled_starts, source, target, START_VOXELS * unit_m, SEEDS)
+        bare = without_viewpoint(source, target)
+        return _all([sampled, *agreed] if bare else [*agreed, sampled])
 
     return Start("surfaces", poses)
 

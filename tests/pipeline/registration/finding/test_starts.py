@@ -1,4 +1,4 @@
-"""Features that agree first, random samples where there is no viewpoint or nothing else."""
+"""Features that agree, and random samples where no camera is known: first without a viewpoint, else last."""
 
 import numpy as np
 import pytest
@@ -31,15 +31,16 @@ def ways(monkeypatch):
     return found
 
 
-def poses(clouds) -> list[float]:
-    return [float(T[0, 3]) for T in by_surfaces(*clouds).poses()]
+def poses(clouds, from_cameras=False) -> list[float]:
+    return [float(T[0, 3]) for T in by_surfaces(*clouds, from_cameras).poses()]
 
 
-def test_views_are_found_by_agreement_at_both_sizes(ways):
-    assert poses(VIEWS) == [1.0, 1.0]
+def test_views_of_cameras_are_found_by_agreement_at_both_sizes(ways):
+    assert poses(VIEWS, from_cameras=True) == [1.0, 1.0]
 
 
-def test_views_without_agreement_are_sampled(ways):
+def test_clouds_that_look_like_views_are_sampled_last(ways):
+    assert poses(VIEWS) == [1.0, 1.0, 2.0]
     ways["agreed"] = []
     assert poses(VIEWS) == [2.0]
 
