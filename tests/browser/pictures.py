@@ -1,4 +1,4 @@
-"""Make pictures of docs/ again: ``python tests/browser/pictures.py [fuse] [surface] [network] ...``.
+"""Make pictures of docs/ again: ``python -m tests.browser.pictures [fuse] [surface] [network] ...``.
 
 ``fuse``, ``surface``, ``network`` and ``calibrate`` open the app in Chromium; ``kinect`` reconstructs the two
 real frames of ``--frames``, a folder with ``kinect_desk`` and ``kinect_basket``.
@@ -15,8 +15,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from conftest import ARGUMENTS, chromium_path
-from hands import canvas, go, press, unfold
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
@@ -27,6 +25,8 @@ from lab.claims.depth.scenes import DATA
 from pipeline.kernels.rays import Camera
 from pipeline.surface.pictures import mesh_picture
 from pipeline.types import PointSource
+from tests.browser.conftest import ARGUMENTS, chromium_path
+from tests.browser.hands import canvas, go, press, unfold
 
 DOCS = Path(__file__).parents[2] / "docs"
 WINDOW_PX = {"width": 1400, "height": 860}
