@@ -18,7 +18,7 @@ from packetmesh.progress import drain
 
 PER_OVERLAP = 75
 """Held-out pairs of each overlap."""
-MIXED, LOOKED_AT = 600, 200
+MIXED, LOOKED_AT = 2200, 200
 """Held-out pairs of any overlap, for the verdict; the first had a part in a threshold (of the draws) and are
 left out."""
 OWN = (OURS, OURS_GEOMETRY)
