@@ -9,7 +9,6 @@ import numpy as np
 from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
 from pipeline.placement.agreement import NOTHING_SHARED, Agreement
-from pipeline.placement.edges import PoseEdge, registration_information
 from pipeline.placement.samples import NodeSample, both_ways
 from pipeline.placement.views import Views
 from pipeline.registration import register
@@ -17,6 +16,7 @@ from pipeline.registration.finding.poses import same
 from pipeline.registration.finding.search import Found, search
 from pipeline.registration.finding.starts import Start
 from pipeline.registration.finding.verdict import Verdict
+from pipeline.registration.graph.edges import PoseEdge, registration_information
 from pipeline.registration.neighbourhood import Normals
 from pipeline.types import FloatArray, RegistrationResult
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-from pipeline.placement.loops import Groups
 from pipeline.placement.samples import NodeSample, shared_view
+from pipeline.registration.graph.loops import Groups
 from pipeline.types import FloatArray
 
 SHARED_VIEW = 0.25

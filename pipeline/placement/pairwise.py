@@ -12,15 +12,15 @@ from pipeline.kernels import geometry
 from pipeline.nodes import NodeClouds
 from pipeline.placement.agreement import NOTHING_SHARED, Agreement
 from pipeline.placement.attempt import Attempt, attempt_given
-from pipeline.placement.edges import PoseEdge
-from pipeline.placement.loops import Groups
 from pipeline.placement.outcome import NodeAgreement, NodeRegistration, NodeVerdict, Placement
 from pipeline.placement.pairs import given_pairs
-from pipeline.placement.pose_graph import PoseGraph, solve_pose_graph
 from pipeline.placement.samples import NodeSample, both_ways, sample_of, shared_view
 from pipeline.placement.unknown import UnknownPoses
 from pipeline.placement.verdicts import verdicts_of
 from pipeline.placement.views import Views
+from pipeline.registration.graph.edges import PoseEdge
+from pipeline.registration.graph.loops import Groups
+from pipeline.registration.graph.pose_graph import PoseGraph, solve_pose_graph
 from pipeline.types import FloatArray, RgbdFrame
 
 

@@ -9,8 +9,6 @@ from itertools import pairwise
 from pipeline.config import RegistrationConfig
 from pipeline.kernels import geometry
 from pipeline.placement.attempt import Attempt, attempt_found
-from pipeline.placement.edges import PoseEdge
-from pipeline.placement.loops import best_loops
 from pipeline.placement.pairs import (
     COLOUR_TRIES,
     JoiningPairs,
@@ -23,6 +21,8 @@ from pipeline.placement.pairs import (
 from pipeline.placement.samples import NodeSample
 from pipeline.placement.views import Views
 from pipeline.registration.finding.starts import Start
+from pipeline.registration.graph.edges import PoseEdge
+from pipeline.registration.graph.loops import best_loops
 
 
 class UnknownPoses:

@@ -16,7 +16,7 @@ from pipeline.kernels.geometry import apply, rotation_angle_rad
 from pipeline.kernels.kdtree import compiled
 from pipeline.registration.anderson import Acceleration
 from pipeline.registration.global_start import global_start
-from pipeline.registration.matching import Matcher, Matching
+from pipeline.registration.matching import Matcher, Matches, Matching
 from pipeline.registration.methods import METHODS, MethodStart
 from pipeline.registration.residual import DegenerateError, residual_for
 from pipeline.registration.sample import Sample, draw
@@ -141,6 +141,36 @@ def _iterations(
     method = start(config, source.cloud, target.cloud)
     direction, with_normals = method.direction or config.direction, method.facing and config.metric == "plane"
     matcher = Matcher(source.cloud, target.cloud, direction, method.features, with_normals)
+    return _moved_until_still(method, matcher, source, target, config, T)
+
+
+def iterate_matched(
+    matcher: Matches, source: Sample, target: Sample, config: RegistrationConfig, T_init: FloatArray
+) -> Generator[RegistrationStep, None, str]:
+    """Register like ``iterate_registration``, with pairs that another matcher finds.
+
+    Args:
+        matcher: finds the pairs, whose rows are those of the samples.
+        source: all points that the matcher knows of the cloud that moves.
+        target: the same of the cloud that stays.
+        config: method, metric and their parameters.
+        T_init: (4, 4) start pose T_target_source.
+
+    Raises:
+        ReconstructionError: no pair is within the gate at the start pose.
+    """
+    method = METHODS[config.method](config, source.cloud, target.cloud)
+    return _moved_until_still(method, matcher, source, target, config, T_init)
+
+
+def _moved_until_still(
+    method: PairWeighting,
+    matcher: Matches,
+    source: Sample,
+    target: Sample,
+    config: RegistrationConfig,
+    T: FloatArray,
+) -> Generator[RegistrationStep, None, str]:
     residual = residual_for(config, matcher, method.unweighted_centroids)
     stop = StopRule(TRANSLATION_TOLERANCE_OF_GATE * config.gate_m)
     acceleration = Acceleration(apply(T, source.points_m)) if method.accelerated else None
@@ -186,7 +216,7 @@ def _iterations(
 
 
 def _weigh(
-    method: PairWeighting, matcher: Matcher, T: FloatArray, first: bool = False
+    method: PairWeighting, matcher: Matches, T: FloatArray, first: bool = False
 ) -> tuple[PairWeighting, Matching, PairWeights, float]:
     """Match and weigh the pairs at a pose; returns the method (widened if it keeps too few pairs), the
     matched pairs, the weighed pairs, and the effective number of pairs 1 / sum w^2.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -57,6 +58,24 @@ class Matching:
             None if self.normals is None else self.normals[rows],
             None if self.cosines is None else self.cosines[rows],
         )
+
+
+class Matches(Protocol):
+    """Finds the closest pairs of two clouds at any pose."""
+
+    target_normals: Normals
+    """Normals of all points of the target."""
+
+    def match(
+        self,
+        T_target_source: FloatArray,
+        neighbours: int = 1,
+        source_share: float = 1.0,
+        target_share: float = 1.0,
+        gate_m: float = float("inf"),
+    ) -> Matching:
+        """Find the pairs at a pose; see ``Matcher.match``."""
+        ...
 
 
 BEYOND_GATE = 1.5
@@ -128,7 +147,7 @@ class Matcher:
         assert self._source_normals is not None
         rows = pairs.source_rows, pairs.target_rows
         moving, fixed = self._source_normals.at(rows[0]), self.target_normals.at(rows[1])
-        normals, cosines = _mean_normals(T_target_source, moving, fixed, *rows)
+        normals, cosines = mean_normals(T_target_source, moving, fixed, *rows)
         return replace(pairs, normals=normals, cosines=cosines)
 
 
@@ -324,7 +343,7 @@ def _pairs(
 
 
 @compiled
-def _mean_normals(
+def mean_normals(
     T: FloatArray, moving: FloatArray, fixed: FloatArray, source_rows: IntArray, target_rows: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return pairs' (M, 3) mean normals in the target frame, and the (M,) cosines between the two.

@@ -13,7 +13,7 @@ from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
 from pipeline.kernels.geometry import apply, rigid
 from pipeline.kernels.kdtree import compiled, squared_distance
-from pipeline.registration.matching import Matcher, Matching
+from pipeline.registration.matching import Matches, Matching
 from pipeline.registration.neighbourhood import Normals
 from pipeline.registration.observability import open_motions
 from pipeline.types import FloatArray, IntArray
@@ -76,7 +76,7 @@ class PlaneResidual:
 
 
 def residual_for(
-    config: RegistrationConfig, matcher: Matcher, unweighted_centroids: bool = False
+    config: RegistrationConfig, matcher: Matches, unweighted_centroids: bool = False
 ) -> PointResidual | PlaneResidual:
     """Create the configured residual; a target without normals gets them from its points."""
     if config.metric == "point":

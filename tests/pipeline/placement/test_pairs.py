@@ -3,7 +3,6 @@
 import numpy as np
 
 from pipeline.kernels.geometry import look_at
-from pipeline.placement.loops import Groups
 from pipeline.placement.pairs import (
     BRIDGE_TRIES,
     GIVEN_PAIRS,
@@ -16,6 +15,7 @@ from pipeline.placement.pairs import (
     lone_tries,
 )
 from pipeline.placement.samples import NodeSample
+from pipeline.registration.graph.loops import Groups
 from pipeline.types import CameraIntrinsics, DepthMap, PointCloud, RgbdFrame
 
 CAMERA = CameraIntrinsics.pinhole(60.0, 60.0, 39.5, 29.5, 80, 60)

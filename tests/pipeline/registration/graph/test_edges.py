@@ -5,7 +5,8 @@ import pytest
 
 from pipeline.config import RegistrationConfig
 from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
-from pipeline.placement.edges import (
+from pipeline.registration import register
+from pipeline.registration.graph.edges import (
     FLOOR_M,
     OPEN_M,
     PoseEdge,
@@ -13,8 +14,7 @@ from pipeline.placement.edges import (
     registration_information,
     small_motion,
 )
-from pipeline.placement.pose_graph import solve_pose_graph
-from pipeline.registration import register
+from pipeline.registration.graph.pose_graph import solve_pose_graph
 from pipeline.registration.neighbourhood import pca_normals
 from pipeline.types import PointCloud
 

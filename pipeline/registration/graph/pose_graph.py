@@ -10,8 +10,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import splu
 
 from pipeline.kernels.geometry import rigid, rotation_exp
-from pipeline.placement.edges import PoseEdge, adjoint, small_motion
-from pipeline.placement.loops import LOOP_LIMIT, Groups, Loops, best_loops
+from pipeline.registration.graph.edges import PoseEdge, adjoint, small_motion
+from pipeline.registration.graph.loops import LOOP_LIMIT, Groups, Loops, best_loops
 from pipeline.registration.metrics import point_error_m
 from pipeline.types import FloatArray, IntArray
 

@@ -9,10 +9,10 @@ from lab.worlds import box_room
 from pipeline.config import RegistrationConfig
 from pipeline.kernels.geometry import inverse, rigid, rotation_exp
 from pipeline.kernels.open3d_runtime import o3d
-from pipeline.placement.edges import PoseEdge, registration_information
-from pipeline.placement.loops import loops_of, spanning_forest
-from pipeline.placement.pose_graph import optimised, solve_pose_graph
 from pipeline.registration import point_error_m, register
+from pipeline.registration.graph.edges import PoseEdge, registration_information
+from pipeline.registration.graph.loops import loops_of, spanning_forest
+from pipeline.registration.graph.pose_graph import optimised, solve_pose_graph
 from pipeline.registration.neighbourhood import pca_normals
 from tests.pipeline.registration.rooms import seen_by
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.kernels.geometry import inverse
-from pipeline.placement.edges import PoseEdge, adjoint, small_motion
+from pipeline.registration.graph.edges import PoseEdge, adjoint, small_motion
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 LOOP_LIMIT = 25.0

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from pipeline.kernels.geometry import inverse, rigid, rotation_exp
-from pipeline.placement.edges import PoseEdge
-from pipeline.placement.loops import best_loops, loops_of
-from pipeline.placement.pose_graph import solve_pose_graph
 from pipeline.registration import point_error_m
+from pipeline.registration.graph.edges import PoseEdge
+from pipeline.registration.graph.loops import best_loops, loops_of
+from pipeline.registration.graph.pose_graph import solve_pose_graph
 
 TURN_RAD, SHIFT_M = 0.004, 0.008
 """Standard errors of the edges; with the slack of loops 0.005 and 0.01."""
