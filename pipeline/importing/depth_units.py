@@ -20,7 +20,7 @@ from pipeline.io.depth_scale import (
     likely_depth_scale,
     usual_scale,
 )
-from pipeline.io.images import ReadDepth, read_color, read_depth_values
+from pipeline.io.images import NoDepthError, ReadDepth, read_color, read_depth_values
 from pipeline.types import BoolArray, DepthMap
 
 _ROTATED_SHARE = 0.95
@@ -30,7 +30,7 @@ def depth_in(candidate: Candidate, sequence: Sequence) -> ReadDepth:
     """Read the depth image of a moment, without depth of low confidence.
 
     Raises:
-        InputError: it cannot be read, or has no depth within 65 m.
+        InputError: it cannot be read, or has no depth within 65 m; NoDepthError if no depth can be used.
     """
     read = _depth_in(candidate.depth, sequence)
     if candidate.confidence is None:
@@ -38,7 +38,7 @@ def depth_in(candidate: Candidate, sequence: Sequence) -> ReadDepth:
     low = _low_confidence(candidate.confidence, read.depth.z_m.shape)
     z_m = np.where(low, np.float32(np.nan), read.depth.z_m)
     if not np.isfinite(z_m).any():
-        raise InputError(
+        raise NoDepthError(
             f"All depth in {candidate.depth} has low confidence by {candidate.confidence}; try to "
             "remove the confidence images, so that all depth is kept"
         )

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress, part
@@ -17,13 +16,10 @@ from pipeline.importing.depth_units import depth_in
 from pipeline.importing.kinds import kind_of, recognise
 from pipeline.importing.rig_folder import NodeImages, new_folder, write_node
 from pipeline.importing.sequence import Candidate, Sequence, distinct
+from pipeline.importing.upright import upright
 from pipeline.io.images import NoDepthError, ReadDepth, read_color
 from pipeline.io.same_view import depth_camera_of, same_view_note
-from pipeline.kernels.geometry import rigid
 from pipeline.types import MAX_NODES, AnyPath, FloatArray
-
-MOST_TILT_DEG = 35.0
-"""Largest angle of the cameras' mean upward direction to +z; beyond it the world is rotated upright."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +102,8 @@ def iterate_import(
     sequence, chosen, middle = _chosen(sequence, frames)
     written = []
     with new_folder(out) as folder_of_rig:
-        T_up_world = _upright([sequence.candidates[index] for index in chosen])
+        given = [sequence.candidates[index].T_world_camera for index in chosen]
+        T_up_world = upright([T for T in given if T is not None])
         for done, index in enumerate(chosen):
             yield Progress("images", 0.3 + 0.7 * done / len(chosen))
             candidate = sequence.candidates[index]
@@ -201,18 +198,3 @@ def _node_of(candidate: Candidate, sequence: Sequence, T_up_world: FloatArray | 
         depth_camera,
         T_color_depth,
     )
-
-
-def _upright(candidates: list[Candidate]) -> FloatArray | None:
-    """Return the rotation that makes the cameras' mean upward direction +z; None if z is already up.
-
-    Many recordings use the first camera's axes as world axes, but a rig's world has z up.
-    """
-    poses = [candidate.T_world_camera for candidate in candidates if candidate.T_world_camera is not None]
-    if not poses:
-        return None
-    up = -np.mean([T[:3, 1] for T in poses], axis=0)
-    if up[2] >= np.cos(np.deg2rad(MOST_TILT_DEG)) * np.linalg.norm(up):
-        return None
-    turn, _ = Rotation.align_vectors([[0.0, 0.0, 1.0]], [up])
-    return rigid(turn.as_matrix(), np.zeros(3))

@@ -15,7 +15,7 @@ from packetmesh.errors import InputError
 from pipeline.importing.sequence import DEPTH_SUFFIXES
 from pipeline.importing.tum import associate
 
-MOST_CANDIDATES = 600
+MOST_CANDIDATES = 12_000
 """Largest number of frames that are considered; longer recordings are subsampled."""
 COLOR_FOLDERS = ("color", "rgb", "image", "images")
 COLOR_SUFFIXES = (".jpg", ".jpeg", ".png", ".ppm")
