@@ -1,0 +1,1 @@
+"""Recordings of a hand-held depth camera that walks through a rendered room, with their truth."""

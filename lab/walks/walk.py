@@ -1,0 +1,135 @@
+"""Rendering of a walk into a folder of TUM form, and reading of its truth."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from lab.places.pairs import FOV_DEG
+from lab.walks.path import RATE_HZ, walk_poses
+from lab.worlds.film import Film
+from lab.worlds.raycast import world_mesh
+from lab.worlds.render import Renderer
+from lab.worlds.scene import Rng, Scene
+from lab.worlds.sensor import sense_depth
+from packetmesh.errors import InputError
+from packetmesh.files import atomic_path, writable_folder
+from pipeline.importing.tum import UNITS_PER_METRE
+from pipeline.io.images import write_color
+from pipeline.io.intrinsics import write_intrinsics
+from pipeline.types import AnyPath, CameraIntrinsics, DepthMap, FloatArray, IntArray
+
+TRUE_POSES = "groundtruth_true.txt"
+"""True poses; under TUM's own name the importer would take them as given."""
+TRUTH = "truth.npz"
+
+
+@dataclass(frozen=True, slots=True)
+class WalkTruth:
+    """Ground truth of a walk."""
+
+    vertices_m: FloatArray
+    """(V, 3) of the room's surface, world frame."""
+    triangles: IntArray
+    """(F, 3)."""
+    T_world_camera: FloatArray
+    """(N, 4, 4) pose of every frame."""
+
+
+def kinect(width_px: int) -> CameraIntrinsics:
+    """Return the pinhole camera of a Kinect's field of view, ``width_px`` wide, 4:3."""
+    height_px = width_px * 3 // 4
+    focal_px = 0.5 * width_px / np.tan(np.radians(0.5 * FOV_DEG))
+    return CameraIntrinsics.pinhole(
+        focal_px, focal_px, 0.5 * (width_px - 1), 0.5 * (height_px - 1), width_px, height_px
+    )
+
+
+def render_walk(scene: Scene, frames: int, camera: CameraIntrinsics, out: AnyPath, seed: int = 0) -> None:
+    """Write a walk through a room frame by frame; the same arguments give the same bits.
+
+    All frames have one film (noise, blur and vignette), automatic exposure and no motion blur. The lists and
+    the truth are written first, so that the frames there are can be read before the last one is rendered.
+
+    Args:
+        scene: a closed room.
+        frames: number of frames, ``RATE_HZ`` a second.
+        camera: camera of all frames.
+        out: folder that is written.
+        seed: seed of path, light, film and sensor.
+
+    Raises:
+        InputError: the room has no such walk (``walk_poses``), or the folder cannot be written.
+    """
+    folder = writable_folder(out)
+    poses = walk_poses(scene, camera, frames, np.random.default_rng([seed, 29]))
+    _write_lists(folder, poses)
+    write_intrinsics(folder / "intrinsics.json", camera)
+    vertices_m, triangles = world_mesh(scene)
+    with atomic_path(folder / TRUTH) as temporary:
+        np.savez_compressed(
+            temporary, vertices_m=vertices_m, triangles=triangles, T_world_camera=np.array(poses)
+        )
+    renderer, rng = Renderer(scene, threads=1), np.random.default_rng([seed, 31])
+    film = _one_film(rng)
+    for k, T in enumerate(poses):
+        view = renderer.exposure(camera, T, "fast", rng).developed(film, rng)
+        write_color(folder / _file("rgb", k), view.rgb)
+        _write_depth(folder / _file("depth", k), sense_depth(view, camera, rng))
+
+
+def read_truth(folder: AnyPath) -> WalkTruth:
+    """Read the truth of a walk.
+
+    Raises:
+        InputError: the folder has no truth, or its file is damaged.
+    """
+    path = Path(folder) / TRUTH
+    try:
+        with np.load(path) as stored:
+            return WalkTruth(stored["vertices_m"], stored["triangles"], stored["T_world_camera"])
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        raise InputError(f"{path} is missing or damaged; render the walk again") from None
+
+
+def _one_film(rng: Rng) -> Film:
+    """Return a film without the random differences between photographs."""
+    usual = Film()
+    noise, blur_px, vignette = (rng.uniform(*of) for of in (usual.noise, usual.blur_px, usual.vignette))
+    return Film(0.0, 0.0, (noise, noise), (blur_px, blur_px), (vignette, vignette))
+
+
+def _write_lists(folder: Path, poses: Sequence[FloatArray]) -> None:
+    """Write rgb.txt, depth.txt and the true poses: time, position and quaternion (x, y, z, w)."""
+    times = [f"{k / RATE_HZ:.6f}" for k in range(len(poses))]
+    lines = {
+        f"{kind}.txt": [
+            f"# {kind} images: time in seconds, file",
+            *(f"{t} {_file(kind, k)}" for k, t in enumerate(times)),
+        ]
+        for kind in ("rgb", "depth")
+    }
+    lines[TRUE_POSES] = ["# camera to world: time in seconds, tx ty tz in metres, qx qy qz qw"]
+    for time, T in zip(times, poses, strict=True):
+        numbers = (*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_quat())
+        lines[TRUE_POSES].append(" ".join([time, *(f"{number:.9f}" for number in numbers)]))
+    for name, text in lines.items():
+        with atomic_path(folder / name) as temporary:
+            temporary.write_text("\n".join(text) + "\n")
+
+
+def _file(kind: str, index: int) -> str:
+    return f"{kind}/{index:06d}.png"
+
+
+def _write_depth(path: Path, depth: DepthMap) -> None:
+    """Write 16 bits, ``UNITS_PER_METRE``; 0 is unknown."""
+    units = np.rint(np.nan_to_num(depth.z_m) * UNITS_PER_METRE).astype(np.uint16)
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(cv2.imencode(".png", units)[1].tobytes())
