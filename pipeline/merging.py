@@ -17,12 +17,26 @@ from pipeline.surface.normals import estimate_normals
 from pipeline.surface.radii import spacing
 from pipeline.surface.smooth import smooth
 from pipeline.surface.voxel import in_cubes_of, voxel_average, voxel_for_count
-from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud, PointSource, RgbdFrame
+from pipeline.types import (
+    BoolArray,
+    CameraIntrinsics,
+    FloatArray,
+    IntArray,
+    PointCloud,
+    PointSource,
+    RgbdFrame,
+    Walk,
+)
 
 SIZING_POINTS = 2_000_000
 """About the most points from which the voxels' size is chosen; of more, every k-th is used."""
 NOISE_VOXELS = 2.0
 """Least voxel edge over the median noise of the averaged points: smaller voxels only reproduce the noise."""
+
+SPLAT = 2.0
+"""Side of the square that a point of the map covers, in voxels."""
+LEAST_GUESSED = 30
+"""Fewer inferred points of a keyframe have no normals and are left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +106,70 @@ def merge_fused(
     labelled = replace(measured, source=np.full(len(measured), PointSource.SENSOR, np.uint8))
     fused = PointCloud.concatenate([labelled, guesses])
     return FusedCloud(fused, voxel_m, *spacing(fused.points_m), len(measured))
+
+
+def merge_map(
+    walk: Walk,
+    frames: Sequence[RgbdFrame],
+    nodes: Sequence[NodeClouds],
+    T_world_camera: Sequence[FloatArray],
+    smoothing_passes: int,
+) -> FusedCloud:
+    """Add the nodes' inferred points to the map of a recording, where no frame measured.
+
+    A view's guess stands only at pixels that the map leaves open: elsewhere other frames have measured there.
+
+    Args:
+        walk: the recording, with its map.
+        frames: images of some keyframes.
+        nodes: their clouds.
+        T_world_camera: (4, 4) pose of each.
+        smoothing_passes: how many times every inferred point is moved onto the plane of its neighbours; the
+            map is an average of many frames already.
+    """
+    measured = replace(walk.map, source=np.full(len(walk.map), PointSource.SENSOR, np.uint8))
+    guessed = []
+    for index, node in enumerate(nodes):
+        cloud = node.fused
+        inferred = not_guessed_in_view(frames, nodes, T_world_camera, index)
+        inferred &= np.asarray(cloud.source) == PointSource.INFERRED
+        if inferred.any():
+            u, v = np.asarray(cloud.pixels).T
+            inferred &= ~covered(walk.map, walk.voxel_m, frames[index].intrinsics, T_world_camera[index])[
+                v, u
+            ]
+        guessed.append(replace(cloud, pixels=None).select(inferred))
+    some = [k for k, cloud in enumerate(guessed) if len(cloud) >= LEAST_GUESSED]
+    fused = measured
+    if some:
+        whole = thinned((guessed[k] for k in some), [T_world_camera[k] for k in some], walk.voxel_m)
+        alone = ~in_cubes_of(measured.points_m, whole.points_m, walk.voxel_m)
+        fused = PointCloud.concatenate([measured, smooth(whole, smoothing_passes).select(alone)])
+    return FusedCloud(fused, walk.voxel_m, *spacing(fused.points_m), len(measured))
+
+
+def covered(
+    cloud: PointCloud, spacing_m: float, camera: CameraIntrinsics, T_world_camera: FloatArray
+) -> BoolArray:
+    """Return (H, W) True for the pixels whose rays meet a cloud of about this spacing, world frame."""
+    own_m = geometry.apply(geometry.inverse(T_world_camera), cloud.points_m)
+    own_m = own_m[own_m[:, 2] > spacing_m]
+    pixels = geometry.project(camera, own_m)
+    reach = 0.5 * SPLAT * spacing_m * camera.fx_px / own_m[:, 2]
+    size = np.array([camera.width_px, camera.height_px])
+    inside = np.all((pixels > -reach[:, None]) & (pixels < size + reach[:, None]), axis=1)
+    first = np.clip(np.rint(pixels[inside] - reach[inside, None]).astype(int), 0, size)
+    last = np.clip(np.rint(pixels[inside] + reach[inside, None]).astype(int) + 1, 0, size)
+    corners = np.zeros((camera.height_px + 1, camera.width_px + 1), np.int32)  # of squares, summed up below
+    for (u, v), sign in (
+        (first.T, 1),
+        (last.T, 1),
+        ((first[:, 0], last[:, 1]), -1),
+        ((last[:, 0], first[:, 1]), -1),
+    ):
+        np.add.at(corners, (v, u), sign)
+    found: BoolArray = corners.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
+    return found
 
 
 def _joint(nodes: Sequence[NodeClouds], keep: Sequence[BoolArray | None]) -> Iterator[PointCloud]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Protocol, TypeAlias
 from pipeline.types import Rig
 
 if TYPE_CHECKING:
+    from pipeline.importing.recorded import FolderRecording
     from pipeline.io.calibrations import NodeFiles
 
 
@@ -150,6 +151,44 @@ class Calibrated:
         return [*self.source.arguments(), "--calibration", self.folder]
 
 
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """A recording whose camera walks; ``stages.open_rig`` tracks it."""
+
+    path: str
+    depth_scale: float | None = None
+    """Depth units per metre; by default that of the kind of recording."""
+    intrinsics: str | None = None
+    """Intrinsics of the colour camera; by default the recording's, or those of its kind."""
+
+    @property
+    def title(self) -> str:
+        return self.path
+
+    def open(self) -> FolderRecording:
+        """Open the recording; its images are read when they are requested.
+
+        Raises:
+            InputError: it cannot be used.
+        """
+        from pipeline.importing.recorded import open_recording
+
+        return open_recording(self.path, self.depth_scale, self.intrinsics)
+
+    def load(self) -> Rig:
+        """Track the recording and return its keyframes and its map."""
+        from packetmesh.progress import drain
+        from pipeline.recording.walk import iterate_walk
+
+        return drain(iterate_walk(self.open()))
+
+    def arguments(self) -> list[str]:
+        words = ["--recording", self.path]
+        if self.intrinsics is not None:
+            words += ["--intrinsics", self.intrinsics]
+        return [*words, *_depth_scale_argument(self.depth_scale)]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedRig:
     """A rig that is already in memory; it equals only itself."""
@@ -171,5 +210,5 @@ def _depth_scale_argument(depth_scale: float | None) -> list[str]:
     return [] if depth_scale is None else ["--depth-scale", f"{depth_scale:g}"]
 
 
-FileSource: TypeAlias = Demo | RigFolder | ImagePair | Calibrated
+FileSource: TypeAlias = Demo | RigFolder | ImagePair | Calibrated | Recorded
 """Sources that can be given on the command line."""

@@ -16,7 +16,7 @@ from typing import Any, Literal, Protocol, TypeVar
 
 import numpy as np
 
-from packetmesh.progress import Progress, drain
+from packetmesh.progress import Progress, drain, part
 from pipeline.acquisition import Acquired, acquire, without_rayless
 from pipeline.config import (
     AcquisitionConfig,
@@ -29,7 +29,7 @@ from pipeline.config import (
 from pipeline.depth import DepthNetwork
 from pipeline.kernels.rays import Camera
 from pipeline.kernels.threads import threads
-from pipeline.merging import FusedCloud, MergedClouds, merge, merge_fused
+from pipeline.merging import FusedCloud, MergedClouds, merge, merge_fused, merge_map
 from pipeline.nodes import (
     InferredDepth,
     NodeClouds,
@@ -39,7 +39,9 @@ from pipeline.nodes import (
 )
 from pipeline.placement.outcome import Placement, whole_placement
 from pipeline.placement.pairwise import place_nodes
-from pipeline.sources import Source
+from pipeline.placement.walked import place_walked
+from pipeline.recording.walk import iterate_walk
+from pipeline.sources import Recorded, Source
 from pipeline.spec import CHAIN, NEEDS, SIDE_BY_SIDE, Spec, StageName, key
 from pipeline.surface.ball_pivoting import roll_or_nothing
 from pipeline.surface.baselines import alpha_surface, poisson_surface
@@ -137,9 +139,12 @@ def _ready(stage: StageName, results: dict[StageName, Done]) -> bool:
 
 
 def open_rig(source: Source) -> Steps[Rig]:
-    """Load the images and, if it is known, the truth."""
+    """Load the images and, if it is known, the truth; a recording is tracked and mapped."""
     yield Progress(f"loading {source.title}", 0.0)
-    rig = source.load()
+    if isinstance(source, Recorded):
+        rig = yield from part(iterate_walk(source.open()), "recording", 0.0, 0.05, detail=True)
+    else:
+        rig = source.load()
     return replace(rig, frames=tuple(without_rayless(frame) for frame in rig.frames))
 
 
@@ -194,8 +199,10 @@ def _side_by_side(
 def register_nodes(
     config: RegistrationConfig, align_with: NodePoints, rig: Rig, nodes: tuple[NodeClouds, ...]
 ) -> Steps[Placement]:
-    """Register the nodes to one another."""
+    """Register the nodes to one another; those of a recording are at their final poses."""
     yield Progress("registering the nodes", 0.45)
+    if rig.walk is not None:
+        return place_walked(rig.frames, nodes)
     return place_nodes(rig.frames, nodes, config, align_with)
 
 
@@ -207,8 +214,10 @@ def fused_cloud(
     nodes: tuple[NodeClouds, ...],
     placement: Placement,
 ) -> Steps[FusedCloud]:
-    """Merge the nodes' clouds into the one from which the surface is made."""
+    """Merge the nodes' clouds, or those of a recording's map, into the one that the surface is made of."""
     yield Progress("merging the clouds", 0.6)
+    if rig.walk is not None:
+        return merge_map(rig.walk, rig.frames, nodes, placement.T_world_camera, smoothing_passes)
     return merge_fused(
         placement.placed(rig.frames),
         placement.placed(nodes),

@@ -45,8 +45,7 @@ class CameraIntrinsics:
     width_px: int
     height_px: int
     fisheye: bool = False
-    """Whether the lens is that of ``cv2.fisheye``: equidistant with four coefficients (Kannala and Brandt, "A
-    generic camera model", PAMI 2006)."""
+    """Whether the lens is that of ``cv2.fisheye``: equidistant, four coefficients (Kannala, Brandt 2006)."""
 
     @property
     def fx_px(self) -> float:
@@ -159,6 +158,8 @@ class Rig:
     name: str
     frames: tuple[RgbdFrame, ...]
     truth: RigTruth | None = None
+    walk: Walk | None = None
+    """The recording of which the nodes are a few frames, at their final poses."""
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -214,6 +215,39 @@ class PointCloud:
             normals=None if self.normals is None else self.normals @ (linear / scale).T,
             sigma_m=None if self.sigma_m is None else self.sigma_m * scale,
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A registration of two keyframes of a recording, ``source`` and ``target`` by their frame numbers."""
+
+    source: int
+    target: int
+    T_target_source: FloatArray
+    """(4, 4) pose of the source's depth camera in the target's."""
+    information: FloatArray
+    """(6, 6) inverse covariance of the small motion (turn in rad, then shift in m) that the pose lacks."""
+    overlap_share: float
+    agreeing_share: float
+    """Share of the points that both measured and at about the same depth."""
+    loop: bool = False
+    """Whether it closes a loop; else tracking made it."""
+    used: bool = True
+    """False for a registration that contradicts the others."""
+
+
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """A recording after tracking: where its camera was at each frame, and the surface that it measured."""
+
+    times_s: FloatArray
+    T_world_camera: tuple[FloatArray | None, ...]
+    """Pose of the colour camera at each frame; None where the camera was lost."""
+    keyframes: tuple[int, ...]
+    links: tuple[Link, ...]
+    map: PointCloud
+    """Measured points of all frames, with normals and ``sigma_m``, in the world frame."""
+    voxel_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,13 +324,11 @@ class SurfaceQuality:
     unused_points: int
     """Input points that no triangle uses."""
     within_2pct_share: float = float("nan")
-    """Share of the measured pixels whose ray meets the mesh within 2 % of the measured depth, 0 to 1; NaN
-    without sensor depth."""
+    """Share of the measured pixels whose ray meets the mesh within 2 % of the depth; NaN without depth."""
     within_5pct_share: float = float("nan")
     """The same share within 5 %."""
     guessed_ray_share: float = float("nan")
-    """Share of the cameras' pixel rays that meet a triangle with two or three inferred corners; NaN if the
-    source of the points is unknown."""
+    """Share of the pixel rays that meet a triangle with two or three inferred corners; NaN if unknown."""
     gaps: Gaps | None = None
     """Gaps as groups of pixels; None without cameras."""
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.cli.options import Images, PresetName, Settings
-from app.cli.text import print_json, say, say_progress
+from app.cli.text import print_json, say, say_progress, wrong_use
 from packetmesh.progress import drain
 from packetmesh.settings import config_named, key_of, settings, with_settings
 
@@ -47,6 +47,11 @@ def deliver(
         json: Print the moments as one JSON object.
     """
     named = images.source()
+    if images.recording is not None:
+        wrong_use(
+            "`deliver` does not send recordings: import some of its moments as a rig first "
+            f"(`packetmesh import {images.recording} --out RIG`)"
+        )
     before, network, config, of_network = _settings(preset, chain, set)
 
     from app.cli.reconstruct import imported_notes

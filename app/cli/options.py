@@ -12,7 +12,7 @@ from app.cli.text import wrong_use
 from pipeline.config import PRESETS
 
 if TYPE_CHECKING:
-    from pipeline.sources import Demo, FileSource, ImagePair, RigFolder
+    from pipeline.sources import Demo, FileSource, ImagePair, Recorded, RigFolder
 
 Settings = Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="KEY=VALUE")]
 PresetName = Annotated[str, tyro.conf.arg(metavar="{" + "|".join(PRESETS) + "|FILE.json}")]
@@ -20,19 +20,22 @@ PresetName = Annotated[str, tyro.conf.arg(metavar="{" + "|".join(PRESETS) + "|FI
 
 @dataclass(frozen=True)
 class SourceOptions:
-    """The images: a demo scene, a rig, or a single pair."""
+    """The images: a demo scene, a rig, a recording, or a single pair."""
 
     scene: str | None = None
     """A demo scene (see `packetmesh scenes`)."""
     rig: Path | None = None
     """A folder with node_00/{color.png, depth.png, intrinsics.json, pose.txt}, node_01/...; `reconstruct`
     also takes a recording that `import` can read."""
+    recording: Path | None = None
+    """A recording whose camera walks, of any kind that `import` can read: all its frames are used."""
     color: Path | None = None
     """Colour image of a single RGB-D pair."""
     depth: Path | None = None
     """Its 16-bit depth image."""
     intrinsics: Path | None = None
-    """Intrinsics of its camera: JSON with fx, fy, cx, cy; Open3D JSON; or ROS camera_info."""
+    """Intrinsics of its camera: JSON with fx, fy, cx, cy; Open3D JSON; or ROS camera_info. With a recording:
+    those of its colour camera, instead of its own."""
     depth_scale: float | None = None
     """Depth units per metre in the depth images of a pair or a rig; without it, whole numbers are millimetres
     and floating-point numbers metres."""
@@ -45,6 +48,8 @@ class SourceOptions:
 
     def source(self) -> FileSource:
         """Return the source that the options name; exit if they name none or more than one."""
+        if self.recording is not None:
+            return self._recorded()
         from pipeline.sources import Calibrated
 
         source = self._images()
@@ -55,13 +60,23 @@ class SourceOptions:
         if replace(self, depth_scale=None) != SourceOptions():
             wrong_use(f"{option} takes no other images: leave out --scene, --rig, --color and their options")
 
+    def _recorded(self) -> Recorded:
+        """Return the recording; exit if there are other images."""
+        alone = SourceOptions(intrinsics=self.intrinsics, depth_scale=self.depth_scale)
+        if replace(self, recording=None) != alone:
+            wrong_use("--recording takes no other images: besides it only --intrinsics and --depth-scale")
+        from pipeline.sources import Recorded
+
+        intrinsics = None if self.intrinsics is None else str(self.intrinsics)
+        return Recorded(str(self.recording), self.depth_scale, intrinsics)
+
     def _images(self) -> Demo | RigFolder | ImagePair:
         pair = (self.color, self.depth, self.intrinsics, self.depth_intrinsics, self.extrinsics)
         ways = [self.scene is not None, self.rig is not None, any(part is not None for part in pair)]
         if sum(ways) != 1:
             wrong_use(
-                "give the images to reconstruct: --scene NAME, --rig DIR, or --color C --depth D "
-                "--intrinsics K"
+                "give the images to reconstruct: --scene NAME, --rig DIR, --recording DIR, or --color C "
+                "--depth D --intrinsics K"
             )
         from pipeline.sources import Demo, ImagePair, RigFolder
 

@@ -64,6 +64,8 @@ def reconstruct(
         f"{before['within_2pct_share']:.1%} before, {after['within_2pct_share']:.1%} after; see "
         f"{out / 'report.html'}"
     )
+    for sentence in recording_sentences(metrics):
+        say(sentence)
     if not after["triangles"]:
         say("The ball falls through everywhere; try larger surface.radii_m")
     for note in (*imported_notes(metrics.get("import")), *result.rig.notes):
@@ -71,6 +73,20 @@ def reconstruct(
     if json:
         print_json(metrics)
     say_places(result.placement)
+
+
+def recording_sentences(metrics: dict[str, Any]) -> list[str]:
+    """Return sentences on the frames of a recording; nothing for other images."""
+    if "recording" not in metrics:
+        return []
+    from pipeline.folders.walk import lost_sentences
+
+    recording = metrics["recording"]
+    summary = (
+        f"{recording['frames']} frames over {recording['path_m']:.1f} m: {recording['keyframes']} keyframes, "
+        f"{recording['loops']} loops, {recording['frames_per_s']:.0f} frames a second"
+    )
+    return [summary, *lost_sentences(recording)]
 
 
 def imported_notes(report: dict[str, Any] | None) -> list[str]:

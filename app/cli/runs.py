@@ -28,7 +28,7 @@ from pipeline.importing import ImportReport, is_recording, iterate_import
 from pipeline.io.rigs import is_rig
 from pipeline.placement.outcome import APART
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
-from pipeline.sources import Calibrated, FileSource, RigFolder
+from pipeline.sources import Calibrated, FileSource, Recorded, RigFolder
 from pipeline.spec import Spec
 from pipeline.stages import RunCache, cameras_of, compute, run
 from pipeline.surface.pictures import mesh_picture
@@ -85,7 +85,7 @@ def iterate_run(
     """
     rig, report = yield from iterate_imported(source, out)
     spec, cache = Spec(rig, preset, config), RunCache()
-    drain(run(spec, cache, ["rig"]))
+    yield from run(spec, cache, ["rig"])
     writable_folder(out)
     result = yield from iterate_reconstruction(spec, cache)
     beside = None if baseline is None else (yield from compute(spec, baseline, cache)).value
@@ -109,7 +109,7 @@ def iterate_imported(
     """
     if isinstance(source, Calibrated):
         inner, report = yield from iterate_imported(source.source, out)
-        assert not isinstance(inner, Calibrated)
+        assert not isinstance(inner, Calibrated | Recorded)
         return replace(source, source=inner), report
     if not isinstance(source, RigFolder) or is_rig(Path(source.path)) or not is_recording(Path(source.path)):
         return source, None

@@ -10,12 +10,15 @@ from typing import Any
 from app.drawing.pictures import depth_picture, depth_range_m
 from app.reports.html import picture, pictures, table, write_page
 from app.web.markup import Markup
+from pipeline.folders.walk import lost_sentences
 from pipeline.kernels.rays import Camera
 from pipeline.reconstruct import Reconstruction
 from pipeline.stages import cameras_of, dressed
 from pipeline.surface.pictures import beside, mesh_picture
 from pipeline.types import ByteArray, Surface
 
+MOST_SHOWN = 6
+"""Most nodes of which the report has pictures."""
 QUALITY_ROWS = (
     ("no_hit_ray_share", "camera rays that miss the surface (%)", 100.0),
     ("guessed_ray_share", "camera rays that meet inferred surface (%)", 100.0),
@@ -55,6 +58,7 @@ def _sections(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[Marku
         _use_sentences(metrics["measured"]),
         _agreeing(metrics["measured"]),
     )
+    yield from _recording(metrics)
     yield from _doubts(metrics)
     yield from _surfaces(result, before, after)
     yield from _truth(metrics)
@@ -90,6 +94,20 @@ def _agreeing(measured: dict[str, float]) -> Markup:
     ).format(share)
 
 
+def _recording(metrics: dict[str, Any]) -> Iterator[Markup]:
+    """Yield what became of a recording's frames; nothing for other images."""
+    if "recording" not in metrics:
+        return
+    recording = metrics["recording"]
+    yield Markup(
+        '<p class="lead">A recording of <b>{frames:,}</b> frames: the camera went {path_m:.1f} m; '
+        "{keyframes} keyframes, joined by {loops} loops; {map_points:,} points measured in voxels of "
+        "{voxel_mm:.0f} mm. Tracking and mapping took {frames_per_s:.0f} frames a second.</p>"
+    ).format(voxel_mm=1000.0 * recording["voxel_m"], **recording)
+    for sentence in lost_sentences(recording):
+        yield Markup('<p class="lead"><b>{}.</b></p>').format(sentence)
+
+
 def _doubts(metrics: dict[str, Any]) -> Iterator[Markup]:
     """Yield doubts about the images, and about nodes with no pose or an uncertain one."""
     for note in metrics.get("import", {"notes": ()})["notes"]:
@@ -106,9 +124,8 @@ def _surfaces(result: Reconstruction, before: dict[str, Any], after: dict[str, A
     radii = ", ".join(f"{1000 * radius:.1f}" for radius in before["radii_m"])
     yield Markup(
         '<p class="note">Ball radii {} mm for both. Magenta: a ray that misses the surface. '
-        "First with the photographs' colours, from a place next to the first camera; then from each node's "
-        "camera.</p>"
-    ).format(radii)
+        "First with the photographs' colours, from a place next to the first camera; then from {}.</p>"
+    ).format(radii, _whose(len(result.placement.placed(result.rig.frames))))
     frames, placed = result.placement.placed(result.rig.frames), cameras_of(result.rig, result.placement)
     view = beside(placed[0], result.after)
     yield pictures(
@@ -118,7 +135,7 @@ def _surfaces(result: Reconstruction, before: dict[str, Any], after: dict[str, A
         ),
         columns=2,
     )
-    for frame, camera in zip(frames, placed, strict=True):
+    for frame, camera in zip(frames[:MOST_SHOWN], placed[:MOST_SHOWN], strict=True):
         surfaces = (("before", result.before), ("after", result.after))
         figures = (
             picture(mesh_picture(surface, camera, colored), f"{frame.name}, {when} fusion{how}")
@@ -134,6 +151,11 @@ def _surfaces(result: Reconstruction, before: dict[str, Any], after: dict[str, A
         for key, label, scale in QUALITY_ROWS
     )
     yield table(("", "before", "after"), rows)
+
+
+def _whose(nodes: int) -> str:
+    """Return whose cameras the report's pictures are from."""
+    return "each node's camera" if nodes <= MOST_SHOWN else f"the cameras of the first {MOST_SHOWN} nodes"
 
 
 def _in_photographs(result: Reconstruction, surface: Surface, camera: Camera) -> ByteArray:
@@ -172,7 +194,7 @@ def _in_units(key: str, *records: dict[str, float] | None) -> tuple[float | None
 
 def _nodes(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[Markup]:
     yield Markup("<h2>Measured and inferred depth of the nodes</h2>")
-    for frame, node in zip(result.rig.frames, result.nodes, strict=True):
+    for frame, node in zip(result.rig.frames[:MOST_SHOWN], result.nodes[:MOST_SHOWN], strict=True):
         range_m = depth_range_m(frame.depth)
         sensor = depth_picture(frame.depth, range_m, f"sensor depth ({frame.depth.coverage:.0%} known)")
         inferred = depth_picture(

@@ -12,6 +12,8 @@ from packetmesh.errors import InputError
 from packetmesh.files import delete_unfinished, file_trouble, write_json
 from packetmesh.memory import peak_memory_bytes
 from packetmesh.settings import settings
+from pipeline.folders.walk import FILES as WALK_FILES
+from pipeline.folders.walk import walk_metrics, write_trajectory
 from pipeline.io.clouds import write_cloud
 from pipeline.io.meshes import write_mesh
 from pipeline.merging import MergedClouds
@@ -34,7 +36,7 @@ def clear_run_folder(folder: Path) -> None:
         InputError: the folder cannot be written.
     """
     try:
-        for name in (METRICS, "config.json", "poses.json", *CLOUD_FILES, *MESH_FILES):
+        for name in (METRICS, "config.json", "poses.json", *WALK_FILES, *CLOUD_FILES, *MESH_FILES):
             (folder / name).unlink(missing_ok=True)
         delete_unfinished(folder)
     except OSError as error:
@@ -68,6 +70,8 @@ def write_run_folder(
     files = [folder / "config.json", folder / "poses.json"]
     write_json(files[0], config or config_of(reconstruction.spec))
     write_json(files[1], metrics["poses"])
+    if reconstruction.rig.walk is not None:
+        files += write_trajectory(folder, reconstruction.rig.walk)
     for name, cloud in clouds_of(reconstruction.clouds).items():
         files.append(folder / name)
         write_cloud(files[-1], cloud)
@@ -106,7 +110,9 @@ def metrics_of(reconstruction: Reconstruction) -> dict[str, Any]:
     truth = None
     if reconstruction.truth_before or reconstruction.truth_after:
         truth = {"surface_before": reconstruction.truth_before, "surface_after": reconstruction.truth_after}
-    return {
+    walk = reconstruction.rig.walk
+    recording = {} if walk is None else {"recording": walk_metrics(walk, reconstruction.timings_s["rig"])}
+    return recording | {
         "scene": reconstruction.spec.source.title,
         "preset": reconstruction.spec.preset,
         "nodes": [

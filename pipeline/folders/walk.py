@@ -1,0 +1,99 @@
+"""Files and metrics of a recording's trajectory."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from packetmesh.files import atomic_path, write_json
+from pipeline.types import FloatArray, Walk
+
+FILES = ("trajectory.txt", "trajectory.json")
+
+
+def write_trajectory(folder: Path, walk: Walk) -> list[Path]:
+    """Write the colour camera's poses in TUM's form, and the keyframes with their registrations as JSON.
+
+    Frames without a pose have no line.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    files = [folder / name for name in FILES]
+    lines = [
+        "# time (s), position (m) and quaternion of the colour camera in the world: tx ty tz qx qy qz qw"
+    ]
+    for time_s, T in zip(walk.times_s, walk.T_world_camera, strict=True):
+        if T is not None:
+            values = *T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_quat()
+            lines.append(f"{time_s:.6f} " + " ".join(f"{value:.9f}" for value in values))
+    with atomic_path(files[0]) as temporary:
+        Path(temporary).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    links = [
+        {
+            "source": link.source,
+            "target": link.target,
+            "loop": link.loop,
+            "used": link.used,
+            "overlap_share": link.overlap_share,
+            "agreeing_share": link.agreeing_share,
+            "T_target_source": link.T_target_source,
+            "information": link.information,
+        }
+        for link in walk.links
+    ]
+    write_json(files[1], {"keyframes": walk.keyframes, "links": links})
+    return files
+
+
+def walk_metrics(walk: Walk, elapsed_s: float) -> dict[str, Any]:
+    """Return the numbers of a recording: counts of frames, metres, frames a second.
+
+    Args:
+        walk: the recording.
+        elapsed_s: time that tracking and mapping took.
+    """
+    frames = len(walk.times_s)
+    return {
+        "frames": frames,
+        "keyframes": len(walk.keyframes),
+        "loops": sum(link.loop and link.used for link in walk.links),
+        "lost": lost_spans(walk.T_world_camera),
+        "path_m": path_m(walk.T_world_camera),
+        "voxel_m": walk.voxel_m,
+        "map_points": len(walk.map),
+        "frames_per_s": frames / elapsed_s,
+    }
+
+
+def lost_sentences(recording: dict[str, Any]) -> list[str]:
+    """Return a sentence on the frames without a pose, from ``walk_metrics``; nothing if all have one."""
+    spans = recording["lost"]
+    if not spans:
+        return []
+    count = sum(last - first + 1 for first, last in spans)
+    where = ", ".join(f"{first} to {last}" if last > first else f"{first}" for first, last in spans[:4])
+    more = "" if len(spans) <= 4 else f" and {len(spans) - 4} more times"
+    return [
+        f"The camera was lost in {count} of {recording['frames']} frames ({where}{more}), which are not in "
+        "the surface; turn slowly, and keep what was seen before in view"
+    ]
+
+
+def lost_spans(T_world_camera: tuple[FloatArray | None, ...]) -> list[tuple[int, int]]:
+    """Return first and last frame number of each time without a pose."""
+    spans: list[tuple[int, int]] = []
+    for k, T in enumerate(T_world_camera):
+        if T is None:
+            first = spans.pop()[0] if spans and spans[-1][1] == k - 1 else k
+            spans.append((first, k))
+    return spans
+
+
+def path_m(T_world_camera: tuple[FloatArray | None, ...]) -> float:
+    """Return the length of the way from frame to frame."""
+    at_m = np.array([T[:3, 3] for T in T_world_camera if T is not None]).reshape(-1, 3)
+    return float(np.linalg.norm(np.diff(at_m, axis=0), axis=1).sum())

@@ -1,0 +1,1 @@
+"""Recordings: frames in time, their trajectory, and the map made of them."""

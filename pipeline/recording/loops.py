@@ -1,0 +1,148 @@
+"""Loops and the pose graph of a recording's keyframes (SPEC 10.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from packetmesh.progress import Progress
+from pipeline.kernels.geometry import inverse, rotation_angle_rad
+from pipeline.recording.places import parts_of
+from pipeline.recording.tracking import TRACKING, WITHIN, Track, link, registered
+from pipeline.registration.graph.edges import PoseEdge
+from pipeline.registration.graph.pose_graph import solve_pose_graph
+from pipeline.registration.organised import OrganisedCloud, shared_shares
+from pipeline.types import FloatArray, Link
+
+LOOP_GATE_M = 0.3
+"""Largest distance of a pair at the start pose: drift may have grown."""
+NEAR_M, NEAR_DEG = 0.9, 45.0
+"""Distance and angle of keyframes that may show the same place."""
+LEAST_PREDICTED = 0.4
+"""Least overlap of two keyframes at their tracked poses for a trial."""
+MOST_TRIED = 8
+"""Most loops tried for each keyframe, those of the largest predicted overlap."""
+ROUNDS = 2
+"""Times that loops are looked for: the poses after the first show more of them."""
+GRAPH_POINTS = 200
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    source: int
+    target: int
+    predicted: float
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """The poses of a recording's frames, with the first keyframe's depth camera as the world."""
+
+    T_first_depth: tuple[FloatArray | None, ...]
+    """(4, 4) pose of the depth camera at each frame; None where the camera was lost."""
+    keyframes: dict[int, FloatArray]
+    """(4, 4) poses of the keyframes by frame number."""
+    links: tuple[Link, ...]
+    """Registrations of tracking, then those that close loops."""
+
+
+def iterate_loops(track: Track) -> Generator[Progress, None, Trajectory]:
+    """Close loops between the keyframes of the largest part, and reconcile all links by least squares.
+
+    Frames of other parts have no pose.
+    """
+    poses, clouds = _chain(track), track.clouds
+    links = [one for one in track.links if one.source in poses]
+    first = len(links)
+    tried = {(one.source, one.target) for one in links}
+    for _ in range(ROUNDS):
+        candidates = [c for c in _candidates(poses, clouds) if (c.source, c.target) not in tried]
+        for number, candidate in enumerate(candidates):
+            if number % 10 == 0:
+                yield Progress(f"trying loop {number} of {len(candidates)}", number / len(candidates))
+            tried.add((candidate.source, candidate.target))
+            found = _closed(candidate, poses, clouds)
+            if found is not None:
+                links.append(found)
+        if len(links) == first and not any(one.loop for one in links):
+            break
+        poses, links = _reconciled(poses, links, clouds)
+    return Trajectory(tuple(_frame_poses(track, poses)), poses, tuple(links))
+
+
+def _chain(track: Track) -> dict[int, FloatArray]:
+    """Return (4, 4) poses of the largest part's keyframes in the first one's frame, along the links."""
+    main = parts_of(list(track.clouds), track.links)[0]
+    poses: dict[int, FloatArray] = {main[0]: np.eye(4)}
+    waiting = [main[0]]
+    while waiting:
+        here = waiting.pop(0)
+        for one in track.links:
+            if one.target == here and one.source not in poses:
+                poses[one.source] = poses[here] @ one.T_target_source
+                waiting.append(one.source)
+            elif one.source == here and one.target not in poses:
+                poses[one.target] = poses[here] @ inverse(one.T_target_source)
+                waiting.append(one.target)
+    return dict(sorted(poses.items()))
+
+
+def _candidates(poses: Mapping[int, FloatArray], clouds: Mapping[int, OrganisedCloud]) -> list[_Candidate]:
+    """Return pairs of keyframes that should show the same place, for each the ``MOST_TRIED`` best."""
+    numbers = list(poses)
+    found: list[_Candidate] = []
+    for later, source in enumerate(numbers):
+        own = []
+        for target in numbers[: max(0, later - 1)]:
+            T_target_source = inverse(poses[target]) @ poses[source]
+            if np.linalg.norm(T_target_source[:3, 3]) > NEAR_M:
+                continue
+            if np.degrees(rotation_angle_rad(T_target_source[:3, :3])) > NEAR_DEG:
+                continue
+            predicted, _ = shared_shares(clouds[source], clouds[target], T_target_source, WITHIN)
+            if predicted >= LEAST_PREDICTED:
+                own.append(_Candidate(source, target, predicted))
+        own.sort(key=lambda candidate: -candidate.predicted)
+        found += own[:MOST_TRIED]
+    return found
+
+
+def _closed(
+    candidate: _Candidate, poses: Mapping[int, FloatArray], clouds: Mapping[int, OrganisedCloud]
+) -> Link | None:
+    """Register two keyframes from their poses; None if they do not show the same place."""
+    source, target = candidate.source, candidate.target
+    start = inverse(poses[target]) @ poses[source]
+    found = registered(clouds[source], clouds[target], replace(TRACKING, gate_m=LOOP_GATE_M), start)
+    if found is None or not found.holds:
+        return None
+    return link(source, target, found, loop=True)
+
+
+def _reconciled(
+    poses: Mapping[int, FloatArray], links: Sequence[Link], clouds: Mapping[int, OrganisedCloud]
+) -> tuple[dict[int, FloatArray], list[Link]]:
+    """Return the keyframes' poses by least squares over all links, and the links with those that are used."""
+    numbers = list(poses)
+    places = {number: place for place, number in enumerate(numbers)}
+    edges = [
+        PoseEdge(places[one.source], places[one.target], one.T_target_source, one.information)
+        for one in links
+    ]
+    points_m = [clouds[k].points_m[:: max(1, len(clouds[k]) // GRAPH_POINTS)] for k in numbers]
+    graph = solve_pose_graph(points_m, edges)
+    solved = dict(zip(numbers, graph.T_reference_node, strict=True))
+    used = [replace(one, used=use) for one, use in zip(links, graph.used, strict=True)]
+    return solved, used
+
+
+def _frame_poses(track: Track, poses: Mapping[int, FloatArray]) -> Iterator[FloatArray | None]:
+    """Yield the pose of every frame, which hangs on its keyframe."""
+    for frame in track.frames:
+        yield (
+            None
+            if frame is None or frame.keyframe not in poses
+            else (poses[frame.keyframe] @ frame.T_keyframe_frame)
+        )

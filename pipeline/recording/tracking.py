@@ -1,0 +1,270 @@
+"""Tracking: where the camera was at each frame, from depth alone (SPEC 10.1).
+
+Each frame is registered to the last keyframe; once it shows little of that, it becomes the next keyframe.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterable, Iterator, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from packetmesh.errors import ReconstructionError
+from packetmesh.progress import Progress
+from pipeline.config import RegistrationConfig
+from pipeline.importing.recorded import DepthView
+from pipeline.kernels.geometry import inverse, rigid, rotation_angle_rad, rotation_exp
+from pipeline.kernels.threads import threads
+from pipeline.recording.recording import Recording
+from pipeline.registration.graph.edges import registration_information, small_motion
+from pipeline.registration.organised import (
+    OrganisedCloud,
+    organised,
+    register_organised,
+    shared_shares,
+)
+from pipeline.types import FloatArray, Link
+
+GATE_M = 0.15
+"""Largest distance of a pair, at the start pose."""
+NEW_BELOW = 0.8
+"""Overlap with the keyframe below which a frame becomes the next keyframe."""
+LEAST_OVERLAP, LEAST_AGREEMENT = 0.3, 0.9
+"""Overlap and agreement of a pose that is believed: right ones agree in .99 of what both measured, wrong ones
+in .9 at most (rendered walks in two rooms, with jumps)."""
+LESS_AGREEMENT, STEP_M, STEP_DEG = 0.7, 0.03, 2.0
+"""Agreement that is enough, as where people walk by, at a pose this near to where the motion so far leads."""
+PREDICTED_M, PREDICTED_RAD = 0.02, np.radians(1.5)
+"""Standard error of a predicted pose."""
+WITHIN = 0.03
+"""Largest difference of depths that agree, as a share."""
+LEAST_POINTS = 300
+"""A frame with fewer points cannot be tracked."""
+TRIED_KEYFRAMES = 4
+"""Most keyframes that a frame is compared with when the camera is lost."""
+PATIENCE = 5
+"""Frames after which a lost camera begins anew: what follows is another part of the recording."""
+REPORTED = 10
+"""Frames from one report of progress to the next."""
+TRACKING = RegistrationConfig("ceicp-a", "plane", gate_m=GATE_M)
+
+
+@dataclass(frozen=True, slots=True)
+class Tracked:
+    """A frame's pose relative to a keyframe."""
+
+    keyframe: int
+    """Frame number of the keyframe; a keyframe's own."""
+    T_keyframe_frame: FloatArray
+    """(4, 4) pose of the depth camera in the keyframe's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """Result of tracking, before loops are closed."""
+
+    frames: tuple[Tracked | None, ...]
+    """One for each frame; None where the camera was lost."""
+    clouds: dict[int, OrganisedCloud]
+    """The keyframes' points by frame number, in order of time."""
+    links: tuple[Link, ...]
+    """Registrations of each keyframe to an earlier one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Registered:
+    """Two keyframes' registration, or a frame's to a keyframe."""
+
+    T_target_source: FloatArray
+    information: FloatArray
+    overlap_share: float
+    agreeing_share: float
+    """The smaller of both ways."""
+
+    @property
+    def holds(self) -> bool:
+        """Whether source and target show the same place at this pose."""
+        return self.overlap_share >= LEAST_OVERLAP and self.agreeing_share >= LEAST_AGREEMENT
+
+    def holds_near(self, T_predicted: FloatArray) -> bool:
+        """Whether they do, or nearly so at about the predicted pose."""
+        T = inverse(T_predicted) @ self.T_target_source
+        near = np.linalg.norm(T[:3, 3]) <= STEP_M
+        near &= np.degrees(rotation_angle_rad(T[:3, :3])) <= STEP_DEG
+        some = self.overlap_share >= LEAST_OVERLAP and self.agreeing_share >= LESS_AGREEMENT
+        return self.holds or (bool(near) and some)
+
+
+def iterate_tracking(recording: Recording) -> Generator[Progress, None, Track]:
+    """Find the pose of every frame relative to its keyframe.
+
+    The start is the motion from the frame before, or that of the recording's own poses. A frame that shows
+    too little of its keyframe is compared with earlier keyframes; until one fits, frames have no pose. If
+    none fits for ``PATIENCE`` frames, a new part begins, whose keyframes no link joins to the others.
+    """
+    count, given = len(recording.times_s), recording.T_world_camera
+    if given is not None:
+        T_color_depth = recording.view(0).T_color_depth
+        given = tuple(T @ T_color_depth for T in given)
+    tracker = _Tracker(given)
+    for k, view in read_ahead(recording, range(count)):
+        if k % REPORTED == 0:
+            yield Progress(f"tracking frame {k} of {count}", k / count)
+        tracker.follow(k, organised(view.depth, view.camera))
+    return tracker.track()
+
+
+def read_ahead(recording: Recording, numbers: Iterable[int]) -> Iterator[tuple[int, DepthView]]:
+    """Yield frames' numbers and depth; the next one is read while the caller works."""
+    reader = threads("recording", 1)
+    waiting: Future[DepthView] | None = None
+    before = -1
+    for k in numbers:
+        following = reader.submit(recording.view, k)
+        if waiting is not None:
+            yield before, waiting.result()
+        before, waiting = k, following
+    if waiting is not None:
+        yield before, waiting.result()
+
+
+class _Tracker:
+    """State of tracking: the keyframe, the pose in it, and the last motion."""
+
+    def __init__(self, given: Sequence[FloatArray] | None) -> None:
+        """Begin; ``given`` are poses of the depth camera that came with the recording."""
+        self._given = given
+        self._clouds: dict[int, OrganisedCloud] = {}
+        self._frames: list[Tracked | None] = []
+        self._links: list[Link] = []
+        self._keyframe = -1
+        self._pose: FloatArray = np.eye(4)
+        """Pose of the last tracked frame in its keyframe."""
+        self._motion: FloatArray = np.eye(4)
+        """Pose of the last frame in the one before it."""
+        self._last = -1
+        """Number of the last tracked frame."""
+
+    def follow(self, k: int, cloud: OrganisedCloud) -> None:
+        """Track the next frame."""
+        if len(cloud) < LEAST_POINTS:
+            self._frames.append(None)
+            return
+        if self._keyframe < 0:
+            self._begin(k, cloud)
+            return
+        start, follows = self._predicted(k), k == self._last + 1
+        found = registered(cloud, self._clouds[self._keyframe], TRACKING, start, start if follows else None)
+        if found is None or not (found.holds_near(start) if follows else found.holds):
+            self._search(k, cloud)
+            return
+        self._motion = inverse(self._pose) @ found.T_target_source if follows else np.eye(4)
+        self._pose, self._last = found.T_target_source, k
+        if found.overlap_share < NEW_BELOW:
+            self._renew(k, cloud, self._keyframe, found)
+        else:
+            self._frames.append(Tracked(self._keyframe, found.T_target_source))
+
+    def track(self) -> Track:
+        """Return the result."""
+        return Track(tuple(self._frames), self._clouds, tuple(self._links))
+
+    def _predicted(self, k: int) -> FloatArray:
+        """Return the pose in the keyframe to which the motion leads, the recording's own or that so far."""
+        if self._given is not None:
+            return self._pose @ inverse(self._given[self._last]) @ self._given[k]
+        return self._pose @ self._motion
+
+    def _search(self, k: int, cloud: OrganisedCloud) -> None:
+        """Look for a frame among the keyframes, the last ones first."""
+        self._motion = np.eye(4)
+        for keyframe in list(self._clouds)[::-1][:TRIED_KEYFRAMES]:
+            start = self._pose if keyframe == self._keyframe else np.eye(4)
+            found = registered(cloud, self._clouds[keyframe], TRACKING, start)
+            if found is not None and found.holds:
+                self._keyframe, self._pose, self._last = keyframe, found.T_target_source, k
+                if found.overlap_share < NEW_BELOW:
+                    self._renew(k, cloud, keyframe, found)
+                else:
+                    self._frames.append(Tracked(keyframe, found.T_target_source))
+                return
+        if k - self._last > PATIENCE:
+            self._begin(k, cloud)
+        else:
+            self._frames.append(None)
+
+    def _renew(self, k: int, cloud: OrganisedCloud, keyframe: int, found: Registered) -> None:
+        """Make a frame the keyframe, joined to the one before."""
+        self._links.append(link(k, keyframe, found))
+        self._begin(k, cloud)
+
+    def _begin(self, k: int, cloud: OrganisedCloud) -> None:
+        self._clouds[k] = cloud
+        self._frames.append(Tracked(k, np.eye(4)))
+        self._keyframe, self._pose, self._last = k, np.eye(4), k
+
+
+def registered(
+    source: OrganisedCloud,
+    target: OrganisedCloud,
+    config: RegistrationConfig,
+    T_init: FloatArray,
+    T_predicted: FloatArray | None = None,
+) -> Registered | None:
+    """Register two depth images; None if no points lie near each other at the start or the pose is open.
+
+    Args:
+        source: the image that moves.
+        target: the image that stays.
+        config: settings of the registration.
+        T_init: (4, 4) start pose T_target_source.
+        T_predicted: pose to which the motion so far leads; it decides where the surfaces leave a motion open,
+            as along a bare wall.
+    """
+    try:
+        result = register_organised(source, target, config, T_init)
+    except ReconstructionError:
+        return None
+    if not result.steps:
+        return None
+    T = result.T_target_source
+    T = rigid(Rotation.from_matrix(T[:3, :3]).as_matrix(), T[:3, 3])  # else rounding errors double each frame
+    information = registration_information(result, source.points_m, source.normals, target.normals)
+    if T_predicted is not None:
+        T = steadied(T, information, T_predicted)
+    overlap, agreeing = shared_shares(source, target, T, WITHIN)
+    _, back = shared_shares(target, source, inverse(T), WITHIN)
+    return Registered(T, information, overlap, min(agreeing, back))
+
+
+def steadied(T_target_source: FloatArray, information: FloatArray, T_predicted: FloatArray) -> FloatArray:
+    """Return the most likely pose by a registration and a prediction together.
+
+    A hand changes its motion by about ``PREDICTED_M`` and ``PREDICTED_RAD`` from frame to frame.
+
+    Args:
+        T_target_source: (4, 4) registered pose.
+        information: (6, 6) its inverse covariance, as in ``PoseEdge``.
+        T_predicted: (4, 4) predicted pose.
+    """
+    prior = np.diag([PREDICTED_RAD**-2.0] * 3 + [PREDICTED_M**-2.0] * 3)
+    apart = small_motion(inverse(T_target_source) @ T_predicted)
+    step = np.linalg.solve(information + prior, prior @ apart)
+    moved: FloatArray = T_target_source @ rigid(rotation_exp(step[:3]), step[3:])
+    return moved
+
+
+def link(source: int, target: int, found: Registered, loop: bool = False) -> Link:
+    """Return a registration of two keyframes with their numbers."""
+    return Link(
+        source,
+        target,
+        found.T_target_source,
+        found.information,
+        found.overlap_share,
+        found.agreeing_share,
+        loop,
+    )

@@ -1,0 +1,87 @@
+"""What ``reconstruct --recording`` writes and says."""
+
+import json
+from html import unescape
+
+import cv2
+import numpy as np
+import pytest
+
+from lab.walks.walk import kinect, read_truth, render_walk
+from lab.worlds.rooms import random_room
+from pipeline.importing.tum import poses_at
+from pipeline.io.meshes import read_mesh
+from pipeline.recording.errors import ate_m
+from tests.app.commands import check_one_sentence, run
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory):
+    """A rendered walk in TUM's form, whose poses lie beside it under another name."""
+    folder = tmp_path_factory.mktemp("recordings") / "walk"
+    render_walk(random_room(5_000_001), 12, kinect(160), folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def out(walk, tmp_path_factory):
+    return tmp_path_factory.mktemp("out") / "run"
+
+
+def test_a_recording_becomes_a_surface_a_trajectory_and_a_report(capsys, walk, out):
+    code, printed, said = run(capsys, "reconstruct", "--recording", walk, "--out", out, "--json")
+    assert code == 0, said
+    metrics = json.loads(printed)
+    recording = metrics["recording"]
+    assert recording["frames"] == 12
+    assert recording["lost"] == []
+    assert f"12 frames over {recording['path_m']:.1f} m: {recording['keyframes']} keyframes" in said
+    truth = read_truth(walk)
+    times_s = np.arange(12) / 30.0
+    poses = poses_at(out / "trajectory.txt", times_s)
+    assert ate_m([poses[k] for k in range(12)], truth.T_world_camera) < 0.01
+    written = json.loads((out / "trajectory.json").read_text())
+    assert len(written["keyframes"]) == recording["keyframes"]
+    assert sum(link["loop"] and link["used"] for link in written["links"]) == recording["loops"]
+    assert set(metrics["poses"]) <= {f"frame_{k:05d}" for k in written["keyframes"]}
+    assert len(read_mesh(out / "surface_after.ply").triangles) == metrics["surface_after"]["triangles"] > 1000
+    assert "A recording of <b>12</b> frames" in (out / "report.html").read_text()
+
+
+def test_frames_that_are_lost_are_named(capsys, walk, tmp_path):
+    """A copy of the recording in which some depth images show nothing."""
+    copy = tmp_path / "walk"
+    copy.mkdir()
+    for name in ("rgb", "intrinsics.json", "rgb.txt"):
+        (copy / name).symlink_to(walk / name)
+    (copy / "depth").mkdir()
+
+    lines = (walk / "depth.txt").read_text().splitlines()
+    for k, path in enumerate(sorted((walk / "depth").iterdir())):
+        image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        cv2.imwrite(str(copy / "depth" / path.name), image * (k not in (5, 6)))
+    (copy / "depth.txt").write_text("\n".join(lines))
+    code, _, said = run(capsys, "reconstruct", "--recording", copy, "--out", tmp_path / "out")
+    assert code == 0, said
+    sentence = "The camera was lost in 2 of 12 frames (5 to 6), which are not in the surface"
+    assert sentence in said
+    assert sentence in unescape((tmp_path / "out" / "report.html").read_text())
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--recording", "nowhere"], "nowhere does not exist"),
+        (["--recording", "walk", "--scene", "office"], "--recording takes no other images"),
+        (["--recording", "walk", "--depth-scale", "0"], "The depth scale is 0"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence_and_leaves_no_folder(capsys, tmp_path, words, says):
+    got = run(capsys, "reconstruct", *words, "--out", tmp_path / "out")
+    check_one_sentence(got, 2 if "takes no" in says else 1, says)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_network_is_not_sent_recordings_yet(capsys, walk, tmp_path):
+    got = run(capsys, "deliver", "--recording", walk, "--preset", "office", "--out", tmp_path / "out")
+    check_one_sentence(got, 2, "`deliver` does not send recordings")
