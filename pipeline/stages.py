@@ -27,6 +27,7 @@ from pipeline.config import (
     SurfaceConfig,
 )
 from pipeline.depth import DepthNetwork
+from pipeline.io.textures import Texture
 from pipeline.kernels.rays import Camera
 from pipeline.kernels.threads import threads
 from pipeline.merging import FusedCloud, MergedClouds, merge, merge_fused, merge_map
@@ -49,7 +50,7 @@ from pipeline.surface.quality import measured
 from pipeline.surface.radii import radii
 from pipeline.surface.texture import photographed
 from pipeline.surface.truth import Yardstick, compare_with_truth, yardstick_of
-from pipeline.types import DepthMap, PointCloud, Rig, Surface, SurfaceResult, Texture
+from pipeline.types import DepthMap, PointCloud, Rig, Surface, SurfaceResult
 
 Result = TypeVar("Result")
 _NODES_AT_A_TIME = 3

@@ -8,7 +8,8 @@ from app.compute.records import MeshView
 from app.drawing.colors import LOSS, NEUTRAL
 from app.drawing.glb import lines_glb, mesh_glb, textured_glb
 from pipeline.io.images import jpeg_of
-from pipeline.types import ByteArray, FloatArray, PointSource, Surface, SurfaceResult, Texture
+from pipeline.io.textures import Texture
+from pipeline.types import ByteArray, FloatArray, PointSource, Surface, SurfaceResult
 
 DARKEST = {True: 0.75, False: 0.45}
 """Least brightness, by whether the colours are a camera's: photographs already contain shadows."""

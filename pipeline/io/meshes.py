@@ -17,8 +17,9 @@ from packetmesh.errors import InputError
 from packetmesh.files import MAX_GEOMETRY_BYTES, atomic_path, read_bytes
 from pipeline.io.cloud_precision import middle_m, too_coarse
 from pipeline.io.images import jpeg_of
+from pipeline.io.textures import Texture
 from pipeline.kernels.geometry import rigid
-from pipeline.types import AnyPath, FloatArray, Surface, Texture
+from pipeline.types import AnyPath, FloatArray, Surface
 
 _log = logging.getLogger(__name__)
 

@@ -98,17 +98,23 @@ class Registered:
         return self.holds or (bool(near) and some)
 
 
-def iterate_tracking(recording: Recording) -> Generator[Progress, None, Track]:
+def iterate_tracking(
+    recording: Recording, T_world_camera: Sequence[FloatArray] | None = None
+) -> Generator[Progress, None, Track]:
     """Find the pose of every frame relative to its keyframe.
 
-    The start is the motion from the frame before, or that of the recording's own poses. A frame that shows
+    The start is the motion from the frame before, or that of given poses. A frame that shows
     too little of its keyframe is compared with earlier keyframes; until one fits, frames have no pose. If
     none fits for ``PATIENCE`` frames, a new part begins, whose keyframes no link joins to the others.
+
+    Args:
+        recording: the frames.
+        T_world_camera: (4, 4) given pose of the colour camera at each frame; None if they are unknown.
     """
-    count, given = len(recording.times_s), recording.T_world_camera
-    if given is not None:
+    count, given = len(recording.times_s), None
+    if T_world_camera is not None:
         T_color_depth = recording.view(0).T_color_depth
-        given = tuple(T @ T_color_depth for T in given)
+        given = [T @ T_color_depth for T in T_world_camera]
     tracker = _Tracker(given)
     for k, view in read_ahead(recording, range(count)):
         if k % REPORTED == 0:

@@ -11,6 +11,7 @@ from packetmesh.errors import InputError
 from packetmesh.progress import Progress, part
 from pipeline.importing.upright import upright
 from pipeline.kernels.geometry import LEVEL_POSE, apply, inverse, project
+from pipeline.recording.given import checked_poses
 from pipeline.recording.loops import Trajectory, iterate_loops
 from pipeline.recording.places import iterate_joins
 from pipeline.recording.recording import Recording
@@ -40,12 +41,15 @@ def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
     """
     if len(recording.times_s) < LEAST_FRAMES:
         raise InputError(f"{recording.name} has {len(recording.times_s)} frames; a walk needs {LEAST_FRAMES}")
-    track = yield from part(iterate_tracking(recording), "tracking", 0.0, 0.45, detail=True)
+    yield Progress("reading the first frames", 0.0)
+    given = checked_poses(recording)
+    tracking = iterate_tracking(recording, given.T_world_camera)
+    track = yield from part(tracking, "tracking", 0.0, 0.45, detail=True)
     if not track.clouds:
         raise InputError(f"No frame of {recording.name} has enough depth; check its depth images and scale")
     track = yield from part(iterate_joins(recording, track), "parts", 0.45, 0.47, detail=True)
     trajectory = yield from part(iterate_loops(track), "loops", 0.47, 0.55, detail=True)
-    T_world_first = _world(recording, trajectory)
+    T_world_first = _world(recording, given.T_world_camera, trajectory)
     T_world_depth = [None if T is None else T_world_first @ T for T in trajectory.T_first_depth]
     steps = iterate_map(recording, T_world_depth)
     points, voxel_m = yield from part(steps, "mapping", 0.55, 0.95, detail=True)
@@ -58,7 +62,9 @@ def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
         assert pose is not None
         frames.append(replace(recording.frame(number), T_world_camera=pose, pose_known=True))
     colored = replace(points, colors=colors_of(points, frames))
-    walk = Walk(recording.times_s, poses, tuple(trajectory.keyframes), trajectory.links, colored, voxel_m)
+    notes = (*recording.notes, *given.notes)
+    keyframes, links = tuple(trajectory.keyframes), trajectory.links
+    walk = Walk(recording.times_s, poses, keyframes, links, colored, voxel_m, notes)
     return Rig(recording.name, tuple(frames), walk=walk)
 
 
@@ -95,10 +101,10 @@ def _noise_and_pixel_m(recording: Recording, numbers: Sequence[int]) -> tuple[fl
     return float(noise_m), float(pixel_m)
 
 
-def _world(recording: Recording, trajectory: Trajectory) -> FloatArray:
-    """Return T_world_first: the recording's own world if it has poses, else one with z up."""
+def _world(recording: Recording, given: Sequence[FloatArray] | None, trajectory: Trajectory) -> FloatArray:
+    """Return T_world_first: the world of given poses if there are any, else one with z up."""
     first = next(iter(trajectory.keyframes))
-    view, given = recording.view(first), recording.T_world_camera
+    view = recording.view(first)
     T: FloatArray = (LEVEL_POSE if given is None else given[first]) @ view.T_color_depth
     turn = upright([T @ pose for pose in trajectory.keyframes.values()])
     return T if turn is None else turn @ T

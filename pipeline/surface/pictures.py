@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pipeline.io.textures import Texture
 from pipeline.kernels.geometry import pixel_rays, rigid
 from pipeline.kernels.rays import Camera, camera_hits, triangle_scene
-from pipeline.types import ByteArray, Surface, Texture
+from pipeline.types import ByteArray, Surface
 
 MISSED = (255, 0, 255)
 """Magenta: a ray that hits nothing."""

@@ -12,9 +12,10 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from pipeline.io.textures import WHITE_ROWS, Texture
 from pipeline.kernels.geometry import apply, inverse, project, scaled
 from pipeline.kernels.rays import Camera, hit_depths
-from pipeline.types import WHITE_ROWS, BoolArray, ByteArray, FloatArray, IntArray, Surface, Texture
+from pipeline.types import BoolArray, ByteArray, FloatArray, IntArray, Surface
 
 DEPTH_WIDTH_PX = 320
 """Largest width of the depth images that are used to test occlusion."""

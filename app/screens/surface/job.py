@@ -17,11 +17,12 @@ from app.screens.surface.sweep_job import suggestions_of
 from app.screens.surface.unused import POINT_SHARE, unused_view
 from app.screens.surface.view import SpacingView, SurfaceView, UnusedView, Which
 from packetmesh.progress import Progress
+from pipeline.io.textures import Texture
 from pipeline.merging import FusedCloud
 from pipeline.stages import compute, dressed
 from pipeline.surface.fill import without_seams
 from pipeline.surface.radii import nearest_distances_m
-from pipeline.types import Surface, SurfaceResult, Texture
+from pipeline.types import Surface, SurfaceResult
 
 HISTOGRAM_BINS = 60
 

@@ -11,9 +11,10 @@ from packetmesh.errors import InputError
 from pipeline.io.cloud_precision import middle_m, too_coarse
 from pipeline.io.clouds import read_cloud, write_cloud
 from pipeline.io.meshes import T_GLTF_WORLD, read_mesh, write_mesh
+from pipeline.io.textures import Texture
 from pipeline.kernels.geometry import apply
 from pipeline.kernels.open3d_runtime import o3d
-from pipeline.types import PointCloud, Surface, Texture
+from pipeline.types import PointCloud, Surface
 
 UTM_M = np.array([5e5, 4.65e6, 312.0])
 BALL = trimesh.creation.icosphere(subdivisions=2)

@@ -46,7 +46,7 @@ TURNED = moved([0, 1, 0], 180.0, [0, 0, 0])
 
 
 def tracked(recording: Rendered) -> Track:
-    return drain(iterate_tracking(recording))
+    return drain(iterate_tracking(recording, recording.T_world_camera))
 
 
 def chained(track: Track) -> list[FloatArray | None]:
@@ -299,7 +299,7 @@ def test_the_error_of_a_damaged_frame_comes_at_its_turn():
 
 def test_every_frame_is_read_once_and_progress_grows():
     recording = counting(12, given=True)
-    steps = list(iterate_tracking(recording))
+    steps = list(iterate_tracking(recording, recording.T_world_camera))
     assert sorted(recording.read)[1:] == list(range(12))  # the first one also for the depth camera's pose
     assert [step.fraction for step in steps] == sorted(step.fraction for step in steps)
     assert steps[0].stage == "tracking frame 0 of 12"

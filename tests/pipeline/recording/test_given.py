@@ -1,0 +1,80 @@
+"""Poses that come with a recording, in all the ways that programs write them."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from packetmesh.progress import drain
+from pipeline.kernels.geometry import inverse
+from pipeline.recording.errors import ate_m
+from pipeline.recording.given import CONVENTIONS, checked_poses
+from pipeline.recording.walk import iterate_walk
+from tests.pipeline.recording.rendered import Rendered, around, in_the_living_room, moved
+
+OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
+WRITTEN = {
+    "from camera to world": lambda T: T,
+    "from camera to world with OpenGL's axes": lambda T: T @ OPENGL,
+    "from world to camera": inverse,
+    "from world to camera with OpenGL's axes": lambda T: inverse(T @ OPENGL),
+}
+
+
+@dataclass(frozen=True)
+class Written(Rendered):
+    """A recording with poses as some program has written them."""
+
+    poses: tuple[np.ndarray, ...] = ()
+
+    @property
+    def T_world_camera(self):
+        return self.poses
+
+
+def written(poses, **options):
+    truth = around(40)
+    walk = in_the_living_room(truth, noise_m=0.001)
+    return Written(walk.vertices_m, walk.triangles, truth, noise_m=0.001, poses=tuple(poses), **options)
+
+
+@pytest.mark.parametrize("convention", list(CONVENTIONS))
+@pytest.mark.parametrize("beside", [None, moved([0, 1, 0], 1.0, [0.03, 0.0, 0.0])])
+def test_every_convention_is_found_and_said(convention, beside):
+    truth = around(40)
+    given = checked_poses(written([WRITTEN[convention](T) for T in truth], T_color_depth=beside))
+    for T, true in zip(given.T_world_camera, truth, strict=True):
+        np.testing.assert_allclose(T, true, atol=1e-9)
+    expected = convention == "from camera to world"
+    assert (given.notes == ()) == expected
+    assert expected or convention in given.notes[0]
+
+
+def test_poses_that_drift_are_kept():
+    truth = around(40)
+    drifting = [moved([0, 0, 1], 0.2 * k, [0.003 * k, 0, 0]) @ T for k, T in enumerate(truth)]
+    given = checked_poses(written(drifting))
+    assert given.notes == ()
+    np.testing.assert_array_equal(given.T_world_camera, drifting)
+
+
+def test_poses_of_another_recording_are_not_used_and_the_walk_goes_on():
+    truth = around(40)
+    recording = written([moved([0, 1, 0], 15.0 * k, [0.2 * k, 0, 0]) for k in range(40)])
+    given = checked_poses(recording)
+    assert given.T_world_camera is None
+    assert "contradict its depth" in given.notes[0]
+    rig = drain(iterate_walk(recording))
+    assert ate_m(rig.walk.T_world_camera, truth) < 0.003
+    assert any("contradict its depth" in note for note in rig.notes)
+
+
+def test_a_camera_that_stands_says_nothing_about_its_poses():
+    still = replace(written([np.eye(4)] * 12), T_true=around(40)[:1] * 12)
+    given = checked_poses(still)
+    assert given.notes == ()
+    assert given.T_world_camera == still.poses
+
+
+def test_a_recording_without_poses_has_none():
+    assert checked_poses(in_the_living_room(around(6))).T_world_camera is None
