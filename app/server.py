@@ -46,7 +46,7 @@ from packetmesh.errors import InputError
 from packetmesh.files import file_trouble
 from packetmesh.memory import give_back_memory, share_arenas
 from pipeline.config import PRESETS, PipelineConfig
-from pipeline.sources import Demo, RigFolder
+from pipeline.sources import Demo, Recorded, RigFolder
 
 PANEL_WIDTH_PX = 440
 ANYWHERE = "0.0.0.0"
@@ -255,10 +255,20 @@ def _token_path(token: Token | None) -> str:
 
 
 def start_spec(scene: str, config: PipelineConfig) -> Spec:
-    """Return the start spec: a demo scene by name or a rig folder, with these settings."""
+    """Return the start spec: a demo scene by name, a rig folder or a recording, with these settings."""
     preset = next((name for name, known in PRESETS.items() if known == config), "packetmesh")
-    source = RigFolder(str(Path(scene).resolve())) if Path(scene).is_dir() else Demo(scene)
-    return Spec(source, preset, config)
+    return Spec(_source(scene), preset, config)
+
+
+def _source(scene: str) -> Demo | RigFolder | Recorded:
+    folder = Path(scene)
+    if not folder.is_dir():
+        return Demo(scene)
+    from pipeline.importing import is_recording
+    from pipeline.io.rigs import is_rig
+
+    path = str(folder.resolve())
+    return Recorded(path) if is_recording(folder) and not is_rig(folder) else RigFolder(path)
 
 
 def own_address() -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.cli.options import Images, PresetName, Settings
-from app.cli.text import print_json, say, say_progress, wrong_use
+from app.cli.text import print_json, say, say_progress
 from packetmesh.progress import drain
 from packetmesh.settings import config_named, key_of, settings, with_settings
 
@@ -33,7 +33,7 @@ def deliver(
     """Send a rig's images through a network and rebuild the scene from what has arrived by each moment.
 
     Args:
-        images: Images that the nodes send.
+        images: Images that the nodes send; of a recording each node sends a keyframe.
         out: Folder for the final result (the files of `reconstruct`), moments.csv and delivery.html.
         preset: The network: thesis-link, greenhouse, office, or the config.json of a finished simulation.
         coding: How images are encoded: raw, raw-color-first, raw-rows, raw-tiles, png, jpeg, rvl, tiles or
@@ -47,11 +47,6 @@ def deliver(
         json: Print the moments as one JSON object.
     """
     named = images.source()
-    if images.recording is not None:
-        wrong_use(
-            "`deliver` does not send recordings: import some of its moments as a rig first "
-            f"(`packetmesh import {images.recording} --out RIG`)"
-        )
     before, network, config, of_network = _settings(preset, chain, set)
 
     from app.cli.reconstruct import imported_notes

@@ -86,7 +86,7 @@ def recording_sentences(metrics: dict[str, Any]) -> list[str]:
         f"{recording['frames']} frames over {recording['path_m']:.1f} m: {recording['keyframes']} keyframes, "
         f"{recording['loops']} loops, {recording['frames_per_s']:.0f} frames a second"
     )
-    return [summary, *lost_sentences(recording)]
+    return [summary, *lost_sentences(recording["lost"], recording["frames"])]
 
 
 def imported_notes(report: dict[str, Any] | None) -> list[str]:

@@ -60,7 +60,7 @@ def walk_metrics(walk: Walk, elapsed_s: float) -> dict[str, Any]:
     return {
         "frames": frames,
         "keyframes": len(walk.keyframes),
-        "loops": sum(link.loop and link.used for link in walk.links),
+        "loops": _loops(walk),
         "lost": lost_spans(walk.T_world_camera),
         "path_m": path_m(walk.T_world_camera),
         "voxel_m": walk.voxel_m,
@@ -69,18 +69,30 @@ def walk_metrics(walk: Walk, elapsed_s: float) -> dict[str, Any]:
     }
 
 
-def lost_sentences(recording: dict[str, Any]) -> list[str]:
-    """Return a sentence on the frames without a pose, from ``walk_metrics``; nothing if all have one."""
-    spans = recording["lost"]
+def walk_sentences(walk: Walk, shown: int) -> list[str]:
+    """Return what became of a recording's frames, ``shown`` of whose keyframes are the rig's nodes."""
+    summary = (
+        f"A recording of {len(walk.times_s)} frames over {path_m(walk.T_world_camera):.1f} m, with "
+        f"{len(walk.keyframes)} keyframes and {_loops(walk)} loops; {shown} keyframes give the colours"
+    )
+    return [summary, *lost_sentences(lost_spans(walk.T_world_camera), len(walk.times_s))]
+
+
+def lost_sentences(spans: list[tuple[int, int]], frames: int) -> list[str]:
+    """Return a sentence on the frames without a pose, from ``lost_spans``; nothing if all have one."""
     if not spans:
         return []
     count = sum(last - first + 1 for first, last in spans)
     where = ", ".join(f"{first} to {last}" if last > first else f"{first}" for first, last in spans[:4])
     more = "" if len(spans) <= 4 else f" and {len(spans) - 4} more times"
     return [
-        f"The camera was lost in {count} of {recording['frames']} frames ({where}{more}), which are not in "
-        "the surface; turn slowly, and keep what was seen before in view"
+        f"The camera was lost in {count} of {frames} frames ({where}{more}), which are not in the surface; "
+        "turn slowly, and keep what was seen before in view"
     ]
+
+
+def _loops(walk: Walk) -> int:
+    return sum(link.loop and link.used for link in walk.links)
 
 
 def lost_spans(T_world_camera: tuple[FloatArray | None, ...]) -> list[tuple[int, int]]:

@@ -12,6 +12,7 @@ from app.compute.store import Store
 from app.drawing.pictures import depth_picture, depth_range_m
 from packetmesh.progress import Progress
 from pipeline.acquisition import back_project
+from pipeline.folders.walk import walk_sentences
 from pipeline.types import RgbdFrame
 
 
@@ -20,7 +21,8 @@ def scene_job(store: Store, spec: Spec) -> Generator[Progress, None, SceneView]:
     rig = yield from store.stage(spec, "rig")
     most = SCREEN_POINTS // len(rig.frames)
     nodes = tuple(_scene_node(frame, most) for frame in rig.frames)
-    return SceneView(spec.source.title, nodes, rig.truth is not None, rig.notes)
+    notes = rig.notes if rig.walk is None else (*walk_sentences(rig.walk, len(nodes)), *rig.notes)
+    return SceneView(spec.source.title, nodes, rig.truth is not None, notes)
 
 
 def _scene_node(frame: RgbdFrame, most: int) -> SceneNode:

@@ -82,6 +82,22 @@ def test_what_cannot_be_is_one_sentence_and_leaves_no_folder(capsys, tmp_path, w
     assert not (tmp_path / "out").exists()
 
 
-def test_a_network_is_not_sent_recordings_yet(capsys, walk, tmp_path):
-    got = run(capsys, "deliver", "--recording", walk, "--preset", "office", "--out", tmp_path / "out")
-    check_one_sentence(got, 2, "`deliver` does not send recordings")
+def test_a_network_carries_the_keyframes_of_a_recording(capsys, walk, tmp_path):
+    words = [
+        "deliver",
+        "--recording",
+        walk,
+        "--preset",
+        "thesis-link",
+        "--moments",
+        2,
+        "--out",
+        tmp_path,
+        "--json",
+    ]
+    code, printed, said = run(capsys, *words)
+    assert code == 0, said
+    last = json.loads(printed)["moments"][-1]
+    assert last["delivered_bytes"] > 0
+    assert all(node["name"].startswith("frame_") for node in last["nodes"])
+    assert last["surface"]["triangles"] > 1000
