@@ -264,11 +264,11 @@ def _source(scene: str) -> Demo | RigFolder | Recorded:
     folder = Path(scene)
     if not folder.is_dir():
         return Demo(scene)
-    from pipeline.importing import is_recording
+    from pipeline.importing.kinds import kind_of
     from pipeline.io.rigs import is_rig
 
     path = str(folder.resolve())
-    return Recorded(path) if is_recording(folder) and not is_rig(folder) else RigFolder(path)
+    return Recorded(path) if kind_of(folder) is not None and not is_rig(folder) else RigFolder(path)
 
 
 def own_address() -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from pipeline.config import FusionMode
 from pipeline.kernels import geometry
+from pipeline.kernels.splat import splat_depth
 from pipeline.kernels.threads import threads
 from pipeline.nodes import NodeClouds
 from pipeline.registration import hidden_from
@@ -19,7 +20,6 @@ from pipeline.surface.smooth import smooth
 from pipeline.surface.voxel import in_cubes_of, voxel_average, voxel_for_count
 from pipeline.types import (
     BoolArray,
-    CameraIntrinsics,
     FloatArray,
     IntArray,
     PointCloud,
@@ -35,8 +35,10 @@ NOISE_VOXELS = 2.0
 
 SPLAT = 2.0
 """Side of the square that a point of the map covers, in voxels."""
+IN_FRONT = 0.1
+"""Share of the depth by which a guess is clearly in front of the map."""
 LEAST_GUESSED = 30
-"""Fewer inferred points of a keyframe have no normals and are left out."""
+"""Views with fewer inferred points are left out: too few for normals."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +119,7 @@ def merge_map(
 ) -> FusedCloud:
     """Add the nodes' inferred points to the map of a recording, where no frame measured.
 
-    A view's guess stands only at pixels that the map leaves open: elsewhere other frames have measured there.
+    A view's guess stands only where the view sees nothing of the map, or clearly in front of it.
 
     Args:
         walk: the recording, with its map.
@@ -135,9 +137,9 @@ def merge_map(
         inferred &= np.asarray(cloud.source) == PointSource.INFERRED
         if inferred.any():
             u, v = np.asarray(cloud.pixels).T
-            inferred &= ~covered(walk.map, walk.voxel_m, frames[index].intrinsics, T_world_camera[index])[
-                v, u
-            ]
+            side_m, camera = SPLAT * walk.voxel_m, frames[index].intrinsics
+            nearest_m = splat_depth(walk.map.points_m, side_m, camera, T_world_camera[index])[v, u]
+            inferred &= cloud.points_m[:, 2] < (1.0 - IN_FRONT) * nearest_m
         guessed.append(replace(cloud, pixels=None).select(inferred))
     some = [k for k, cloud in enumerate(guessed) if len(cloud) >= LEAST_GUESSED]
     fused = measured
@@ -146,30 +148,6 @@ def merge_map(
         alone = ~in_cubes_of(measured.points_m, whole.points_m, walk.voxel_m)
         fused = PointCloud.concatenate([measured, smooth(whole, smoothing_passes).select(alone)])
     return FusedCloud(fused, walk.voxel_m, *spacing(fused.points_m), len(measured))
-
-
-def covered(
-    cloud: PointCloud, spacing_m: float, camera: CameraIntrinsics, T_world_camera: FloatArray
-) -> BoolArray:
-    """Return (H, W) True for the pixels whose rays meet a cloud of about this spacing, world frame."""
-    own_m = geometry.apply(geometry.inverse(T_world_camera), cloud.points_m)
-    own_m = own_m[own_m[:, 2] > spacing_m]
-    pixels = geometry.project(camera, own_m)
-    reach = 0.5 * SPLAT * spacing_m * camera.fx_px / own_m[:, 2]
-    size = np.array([camera.width_px, camera.height_px])
-    inside = np.all((pixels > -reach[:, None]) & (pixels < size + reach[:, None]), axis=1)
-    first = np.clip(np.rint(pixels[inside] - reach[inside, None]).astype(int), 0, size)
-    last = np.clip(np.rint(pixels[inside] + reach[inside, None]).astype(int) + 1, 0, size)
-    corners = np.zeros((camera.height_px + 1, camera.width_px + 1), np.int32)  # of squares, summed up below
-    for (u, v), sign in (
-        (first.T, 1),
-        (last.T, 1),
-        ((first[:, 0], last[:, 1]), -1),
-        ((last[:, 0], first[:, 1]), -1),
-    ):
-        np.add.at(corners, (v, u), sign)
-    found: BoolArray = corners.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
-    return found
 
 
 def _joint(nodes: Sequence[NodeClouds], keep: Sequence[BoolArray | None]) -> Iterator[PointCloud]:

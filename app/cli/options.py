@@ -28,7 +28,8 @@ class SourceOptions:
     """A folder with node_00/{color.png, depth.png, intrinsics.json, pose.txt}, node_01/...; `reconstruct`
     also takes a recording that `import` can read."""
     recording: Path | None = None
-    """A recording whose camera walks, of any kind that `import` can read: all its frames are used."""
+    """Folder of a recording of a walking camera, of any kind that `import` can read but bags: all its frames
+    are used."""
     color: Path | None = None
     """Colour image of a single RGB-D pair."""
     depth: Path | None = None
@@ -37,8 +38,8 @@ class SourceOptions:
     """Intrinsics of its camera: JSON with fx, fy, cx, cy; Open3D JSON; or ROS camera_info. With a recording:
     those of its colour camera, instead of its own."""
     depth_scale: float | None = None
-    """Depth units per metre in the depth images of a pair or a rig; without it, whole numbers are millimetres
-    and floating-point numbers metres."""
+    """Depth units per metre in the depth images of a pair, a rig or a recording; without it, whole numbers
+    are millimetres and floating-point numbers metres, or as the kind of recording has them."""
     depth_intrinsics: Path | None = None
     """Intrinsics of the depth camera, if the depth image is not registered to the colour image."""
     extrinsics: Path | None = None

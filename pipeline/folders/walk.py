@@ -54,7 +54,7 @@ def walk_metrics(walk: Walk, elapsed_s: float) -> dict[str, Any]:
 
     Args:
         walk: the recording.
-        elapsed_s: time that tracking and mapping took.
+        elapsed_s: time from opening the recording to the finished map.
     """
     frames = len(walk.times_s)
     return {
@@ -70,10 +70,10 @@ def walk_metrics(walk: Walk, elapsed_s: float) -> dict[str, Any]:
 
 
 def walk_sentences(walk: Walk, shown: int) -> list[str]:
-    """Return what became of a recording's frames, ``shown`` of whose keyframes are the rig's nodes."""
+    """Return a summary and a sentence on lost frames; ``shown`` keyframes are the nodes of the rig."""
     summary = (
-        f"A recording of {len(walk.times_s)} frames over {path_m(walk.T_world_camera):.1f} m, with "
-        f"{len(walk.keyframes)} keyframes and {_loops(walk)} loops; {shown} keyframes give the colours"
+        f"A recording of {len(walk.times_s)} frames over {path_m(walk.T_world_camera):.1f} m; its colours "
+        f"are those of {shown} of {len(walk.keyframes)} keyframes"
     )
     return [summary, *lost_sentences(lost_spans(walk.T_world_camera), len(walk.times_s))]
 
@@ -87,7 +87,7 @@ def lost_sentences(spans: list[tuple[int, int]], frames: int) -> list[str]:
     more = "" if len(spans) <= 4 else f" and {len(spans) - 4} more times"
     return [
         f"The camera was lost in {count} of {frames} frames ({where}{more}), which are not in the surface; "
-        "turn slowly, and keep what was seen before in view"
+        "turn more slowly, and keep in view what was seen before"
     ]
 
 
@@ -96,7 +96,7 @@ def _loops(walk: Walk) -> int:
 
 
 def lost_spans(T_world_camera: tuple[FloatArray | None, ...]) -> list[tuple[int, int]]:
-    """Return first and last frame number of each time without a pose."""
+    """Return first and last frame number of each gap without poses."""
     spans: list[tuple[int, int]] = []
     for k, T in enumerate(T_world_camera):
         if T is None:
@@ -106,6 +106,6 @@ def lost_spans(T_world_camera: tuple[FloatArray | None, ...]) -> list[tuple[int,
 
 
 def path_m(T_world_camera: tuple[FloatArray | None, ...]) -> float:
-    """Return the length of the way from frame to frame."""
+    """Return the path length, metres: from frame to frame, straight across gaps."""
     at_m = np.array([T[:3, 3] for T in T_world_camera if T is not None]).reshape(-1, 3)
     return float(np.linalg.norm(np.diff(at_m, axis=0), axis=1).sum())

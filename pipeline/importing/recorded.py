@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import cv2
@@ -22,15 +22,15 @@ from pipeline.kernels.geometry import LEVEL_POSE, pixel_rays, project
 from pipeline.types import AnyPath, CameraIntrinsics, DepthMap, DepthNoise, FloatArray, RgbdFrame
 
 FRAMES_PER_S = 30.0
-"""Of a recording without times."""
+"""Frame rate that is assumed for a recording without times."""
 KINECT = DepthNoise(s0_m=0.0012, s1_m=0.0015, p=2.0, q=1.0)
-"""Noise of a sensor without calibration: within a tenth of ``acquisition.depth_sigma_m`` from 1.5 to 4 m."""
+"""Noise that is assumed for every sensor: within a tenth of ``acquisition.depth_sigma_m`` from 1.5 to 4 m."""
 REMEDY = "try a recording whose depth shows the view of its colour images"
 
 
 @dataclass(frozen=True, slots=True)
 class DepthView:
-    """A depth image as a camera without distortion sees it."""
+    """A depth image without distortion, with its camera."""
 
     depth: DepthMap
     """(H, W) metric."""
@@ -39,16 +39,19 @@ class DepthView:
     T_color_depth: FloatArray
     """(4, 4) pose of this camera in the colour camera's frame, metres."""
     noise: DepthNoise
+    """Law of the depth's standard deviation."""
 
 
 @dataclass(frozen=True)
 class FolderRecording:
-    """Frames of a recording's folder; has what ``recording.Recording`` has."""
+    """Frames of a recording's folder; implements ``recording.Recording``."""
 
     kind: str
     """Name of the kind of recording."""
     folder: Path
     sequence: Sequence
+    unreadable: dict[int, str] = field(default_factory=dict, compare=False)
+    """Error of each frame whose depth image could not be read, entered when it is read."""
 
     @property
     def name(self) -> str:
@@ -69,33 +72,28 @@ class FolderRecording:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        return self.sequence.notes
+        if not self.unreadable:
+            return self.sequence.notes
+        count, first = len(self.unreadable), self.unreadable[min(self.unreadable)]
+        return (*self.sequence.notes, f"{count} depth images were left out, the first because: {first}")
 
     def view(self, index: int) -> DepthView:
-        """Read the depth of a frame; one without any depth is all NaN.
+        """Read the depth of a frame; it is all NaN without any depth, or if the image cannot be read.
 
-        Raises:
-            InputError: the image cannot be read, or does not fit its camera.
+        ``notes`` says how many cannot be read.
         """
         candidate = self.sequence.candidates[index]
-        camera, T_color_depth = self._depth_camera
-        shape = camera.height_px, camera.width_px
         try:
-            depth = depth_in(candidate, self.sequence).depth
-        except NoDepthError:
-            depth = DepthMap(np.full(shape, np.nan, np.float32))
-        if depth.z_m.shape != shape:
-            raise InputError(
-                f"The depth image {candidate.depth} has {depth.z_m.shape[1]} x {depth.z_m.shape[0]} pixels "
-                f"and the first one {shape[1]} x {shape[0]}; try a recording whose images are all of one size"
-            )
-        if candidate.camera is not None and self.sequence.depth_camera is None:
-            camera = depth_camera_of(candidate.camera, shape, candidate.depth, candidate.color, REMEDY) or (
-                candidate.camera
-            )
-        straight, rows = self._straight
-        z_m = depth.z_m if rows is None else _moved(depth.z_m, rows)
-        return DepthView(DepthMap(z_m), straight if rows is not None else camera, T_color_depth, KINECT)
+            z_m = depth_in(candidate, self.sequence).depth.z_m
+            camera, T_color_depth = self._depth_camera_of(candidate, z_m.shape)
+        except InputError as error:
+            if not isinstance(error, NoDepthError):
+                self.unreadable[index] = str(error)
+            z_m = np.full(self._depth_shape, np.nan, np.float32)
+            camera, T_color_depth = self._depth_camera_of(candidate, self._depth_shape)
+        straight, pixels = _straight(camera)
+        z_m = z_m if pixels is None else _moved(z_m, pixels)
+        return DepthView(DepthMap(z_m), straight, T_color_depth, KINECT)
 
     def frame(self, index: int) -> RgbdFrame:
         """Read colour and depth of a frame; depth of another camera is registered to colour.
@@ -111,41 +109,43 @@ class FolderRecording:
                 f"camera {camera.width_px} x {camera.height_px}; try --intrinsics with the colour camera's"
             )
         depth = depth_in(candidate, self.sequence).depth
-        own, T_color_depth = self._depth_camera
         if self.sequence.depth_camera is not None or depth.z_m.shape != rgb.shape[:2]:
-            depth = register_depth(depth, own, camera, T_color_depth)
+            depth_camera, T_color_depth = self._depth_camera_of(candidate, depth.z_m.shape)
+            depth = register_depth(depth, depth_camera, camera, T_color_depth)
         T = candidate.T_world_camera
         return RgbdFrame(
             f"frame_{index:05d}", rgb, depth, camera, LEVEL_POSE if T is None else T, pose_known=T is not None
         )
 
-    @cached_property
-    def _depth_camera(self) -> tuple[CameraIntrinsics, FloatArray]:
-        """The camera of the depth images, with its distortion, and its pose in the colour camera's frame."""
-        sequence = self.sequence
-        if sequence.depth_camera is not None and sequence.T_color_depth is not None:
-            return sequence.depth_camera, sequence.T_color_depth
-        first = next(_with_depth(sequence))
-        camera = first.camera or sequence.camera
-        shape = depth_in(first, sequence).depth.z_m.shape
-        return depth_camera_of(camera, shape, first.depth, first.color, REMEDY) or camera, np.eye(4)
+    def _depth_camera_of(
+        self, candidate: Candidate, shape: tuple[int, ...]
+    ) -> tuple[CameraIntrinsics, FloatArray]:
+        """Return the camera of a frame's depth, with its distortion, and its pose in the colour camera's.
+
+        Raises:
+            InputError: depth of this height and width is of another camera.
+        """
+        camera, T_color_depth = self.sequence.depth_camera, self.sequence.T_color_depth
+        if camera is None or T_color_depth is None:
+            own = candidate.camera or self.sequence.camera
+            return depth_camera_of(own, shape, candidate.depth, candidate.color, REMEDY) or own, np.eye(4)
+        if shape != (camera.height_px, camera.width_px):
+            raise InputError(
+                f"The depth image {candidate.depth} has {shape[1]} x {shape[0]} pixels and its camera "
+                f"{camera.width_px} x {camera.height_px}; try a recording whose images are all of one size"
+            )
+        return camera, T_color_depth
 
     @cached_property
-    def _straight(self) -> tuple[CameraIntrinsics, FloatArray | None]:
-        """The depth camera without distortion, and (H, W, 2) pixels of the distorted image; None if equal."""
-        camera, _ = self._depth_camera
-        if not camera.fisheye and not np.any(camera.distortion):
-            return camera, None
-        straight = replace(camera, distortion=np.zeros(5), fisheye=False)
-        pixels = project(camera, pixel_rays(straight).reshape(-1, 3))
-        pixels = np.nan_to_num(pixels, nan=-10.0).astype(np.float32)
-        return straight, pixels.reshape(camera.height_px, camera.width_px, 2)
+    def _depth_shape(self) -> tuple[int, ...]:
+        """Height and width of the first depth image that has depth."""
+        return depth_in(next(_with_depth(self.sequence)), self.sequence).depth.z_m.shape
 
 
 def open_recording(
     path: AnyPath, depth_scale: float | None = None, intrinsics: AnyPath | None = None
 ) -> FolderRecording:
-    """Open the recording in a folder; its images are not read yet.
+    """Open the recording in a folder; depth images are read until one has depth.
 
     Args:
         path: the recording's folder, or a folder with only this recording.
@@ -171,13 +171,32 @@ def open_recording(
 
 
 def _with_depth(sequence: Sequence) -> Iterator[Candidate]:
-    """Yield the moments whose depth image has depth."""
+    """Yield the candidates whose depth image has depth."""
     for candidate in sequence.candidates:
         try:
             depth_in(candidate, sequence)
         except NoDepthError:
             continue
         yield candidate
+
+
+def _straight(camera: CameraIntrinsics) -> tuple[CameraIntrinsics, FloatArray | None]:
+    """Return a camera without its distortion, and (H, W, 2) its pixels in the distorted image."""
+    if not camera.fisheye and not np.any(camera.distortion):
+        return camera, None
+    straight = replace(camera, distortion=np.zeros(5), fisheye=False)
+    values = camera.matrix.tobytes(), camera.distortion.tobytes()
+    return straight, _distorted(*values, camera.width_px, camera.height_px, camera.fisheye)
+
+
+@lru_cache(maxsize=2)
+def _distorted(matrix: bytes, distortion: bytes, width_px: int, height_px: int, fisheye: bool) -> FloatArray:
+    """Return (H, W, 2) float32 pixels in the distorted image of the pixels of the straight one."""
+    own = np.frombuffer(matrix).reshape(3, 3)
+    camera = CameraIntrinsics(own, np.frombuffer(distortion), width_px, height_px, fisheye)
+    straight = CameraIntrinsics(own, np.zeros(5), width_px, height_px)
+    pixels = project(camera, pixel_rays(straight).reshape(-1, 3))
+    return np.nan_to_num(pixels, nan=-10.0).astype(np.float32).reshape(height_px, width_px, 2)
 
 
 def _moved(z_m: FloatArray, pixels: FloatArray) -> FloatArray:

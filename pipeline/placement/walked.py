@@ -15,7 +15,7 @@ from pipeline.types import RgbdFrame
 
 
 def place_walked(frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds]) -> Placement:
-    """Return the given poses, with how far the cameras' measurements agree at them.
+    """Return the given poses, and the agreement of each two views' measurements at them.
 
     Args:
         frames: the images, with their final poses.
@@ -40,7 +40,7 @@ def place_walked(frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds]) -> Pl
 def _both_ways(
     frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds], source: int, target: int
 ) -> Agreement:
-    """Return the agreement of two views, counted in the points of both."""
+    """Return the agreement of two views, in the points of both."""
     shared = NOTHING_SHARED
     for one, other in ((source, target), (target, source)):
         T_other_one = inverse(frames[other].T_world_camera) @ frames[one].T_world_camera

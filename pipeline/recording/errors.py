@@ -14,19 +14,18 @@ def ate_m(T_world_camera: Sequence[FloatArray | None], T_reference_camera: Seque
     """Return the absolute trajectory error: the RMSE of the positions after rigid alignment (Umeyama 1991).
 
     Args:
-        T_world_camera: (4, 4) poses; None where there is none, which does not count.
+        T_world_camera: (4, 4) poses; None for frames without a pose, which are skipped.
         T_reference_camera: as many poses in another world.
 
     Returns:
         Metres; NaN for fewer than three positions, or positions on one line.
     """
-    known = [k for k, T in enumerate(T_world_camera) if T is not None]
-    own_m = np.array([T[:3, 3] for T in T_world_camera if T is not None]).reshape(-1, 3)
-    other_m = np.array([T_reference_camera[k][:3, 3] for k in known]).reshape(-1, 3)
-    if len(known) < 3:
+    both = [(T, R) for T, R in zip(T_world_camera, T_reference_camera, strict=True) if T is not None]
+    if len(both) < 3:
         return float("nan")
+    own_m, other_m = (np.array([pair[k][:3, 3] for pair in both]) for k in range(2))
     try:
-        T = weighted_procrustes(own_m, other_m, np.ones(len(known)))
+        T = weighted_procrustes(own_m, other_m, np.ones(len(both)))
     except DegenerateError:
         return float("nan")
     apart_m = own_m @ T[:3, :3].T + T[:3, 3] - other_m

@@ -6,7 +6,7 @@ forward) or of OpenGL (y up, z backward). Files rarely say which.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,10 +20,13 @@ from pipeline.types import FloatArray
 PAIRS, APART = 12, 3
 """Most pairs of frames that are compared, and their distance in frames."""
 LEAST_PAIRS = 3
+"""With fewer pairs, poses are not compared."""
 LEAST_M, LEAST_DEG = 0.01, 1.0
-"""Pairs that moved by less than both say nothing."""
-NEAR_M, NEAR_DEG = 0.03, 2.0
-"""Median differences of poses that agree with the depth."""
+"""Pairs whose motion is below both are ignored."""
+NEAR_M, NEAR_DEG, NEAR_SHARE = 0.01, 0.5, 0.25
+"""Largest median difference of poses that agree with the depth; this share of the motion is added."""
+BETTER = 0.5
+"""Another convention is taken if its differences are below this share of the expected one's."""
 OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 CONVENTIONS: dict[str, Callable[[FloatArray], FloatArray]] = {
     "from camera to world": lambda T: T,
@@ -44,22 +47,31 @@ class Given:
 
 
 def checked_poses(recording: Recording) -> Given:
-    """Return a recording's poses in the convention that fits its depth, or none if no convention fits."""
+    """Return a recording's poses in the convention that agrees with its depth; none if no convention does.
+
+    Where fewer than ``LEAST_PAIRS`` pairs of frames can be compared, the poses are returned as they are.
+    """
     written = recording.T_world_camera
     if written is None:
         return Given(None)
     seen = _motions(recording)
     if len(seen) < LEAST_PAIRS:
-        return Given(written)
-    errors = {name: _error(seen, [read(T) for T in written]) for name, read in CONVENTIONS.items()}
-    best = min(errors, key=lambda name: errors[name][0] / NEAR_M + errors[name][1] / NEAR_DEG)
-    expected, (shift_m, turn_deg) = next(iter(CONVENTIONS)), errors[best]
-    if _agrees(errors[expected]):
-        return Given(written)
-    if _agrees(errors[best]):
-        read = CONVENTIONS[best]
-        note = f"The poses of {recording.name} fit its depth only as transforms {best}: they were taken so"
-        return Given(tuple(read(T) for T in written), (note,))
+        note = (
+            f"The poses of {recording.name} were not compared with its depth: it moves too little from frame "
+            "to frame, or too much"
+        )
+        return Given(written, (note,))
+    apart = {name: _apart(seen, [read(T) for T in written]) for name, read in CONVENTIONS.items()}
+    limit = _limit(seen)
+    size = {name: float(np.sum(one / limit)) for name, one in apart.items()}
+    best, expected = min(size, key=lambda name: size[name]), next(iter(CONVENTIONS))
+    best = best if size[best] < BETTER * size[expected] else expected
+    if (apart[best] <= limit).all():
+        if best == expected:
+            return Given(written)
+        note = f"The poses of {recording.name} agree with its depth only if read as {best}: they were read so"
+        return Given(tuple(CONVENTIONS[best](T) for T in written), (note,))
+    shift_m, turn_deg = apart[best]
     note = (
         f"The poses of {recording.name} contradict its depth, by {100.0 * shift_m:.0f} cm and "
         f"{turn_deg:.0f}° in {APART} frames (median): they were not used"
@@ -67,12 +79,14 @@ def checked_poses(recording: Recording) -> Given:
     return Given(None, (note,))
 
 
-def _agrees(error: tuple[float, float]) -> bool:
-    return error[0] <= NEAR_M and error[1] <= NEAR_DEG
+def _limit(seen: Sequence[tuple[int, int, FloatArray]]) -> FloatArray:
+    """Return (2,) largest median differences, metres and degrees, of poses that agree with motions."""
+    motion = _size([T for _, _, T in seen])
+    return np.array([NEAR_M, NEAR_DEG]) + NEAR_SHARE * motion
 
 
 def _motions(recording: Recording) -> list[tuple[int, int, FloatArray]]:
-    """Return pairs of frames and the colour camera's motion between them, as far as the depth shows one."""
+    """Return (i, j, (4, 4) T_i_j of the colour camera) of frames whose depth images register."""
     found: list[tuple[int, int, FloatArray]] = []
     last = len(recording.times_s) - APART
     for first in np.unique(np.linspace(0, last - 1, PAIRS).round().astype(int)) if last > 0 else ():
@@ -88,11 +102,16 @@ def _motions(recording: Recording) -> list[tuple[int, int, FloatArray]]:
     return found
 
 
-def _error(seen: list[tuple[int, int, FloatArray]], T_world_camera: list[FloatArray]) -> tuple[float, float]:
-    """Return the median difference of poses' motions from those seen, metres and degrees."""
-    apart = [inverse(T) @ inverse(T_world_camera[i]) @ T_world_camera[j] for i, j, T in seen]
-    shifts_m = [float(np.linalg.norm(T[:3, 3])) for T in apart]
-    return float(np.median(shifts_m)), float(np.median([_turn_deg(T) for T in apart]))
+def _apart(seen: Sequence[tuple[int, int, FloatArray]], T_world_camera: Sequence[FloatArray]) -> FloatArray:
+    """Return (2,) median differences of poses' motions from those seen, metres and degrees."""
+    return _size([inverse(T) @ inverse(T_world_camera[i]) @ T_world_camera[j] for i, j, T in seen])
+
+
+def _size(motions: Sequence[FloatArray]) -> FloatArray:
+    """Return (2,) median shift, metres, and turn, degrees, of (4, 4) motions."""
+    sizes = [(np.linalg.norm(T[:3, 3]), _turn_deg(T)) for T in motions]
+    median: FloatArray = np.median(np.array(sizes), axis=0)
+    return median
 
 
 def _turn_deg(T: FloatArray) -> float:

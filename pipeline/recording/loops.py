@@ -17,7 +17,8 @@ from pipeline.registration.organised import OrganisedCloud, shared_shares
 from pipeline.types import FloatArray, Link
 
 LOOP_GATE_M = 0.3
-"""Largest distance of a pair at the start pose: drift may have grown."""
+"""Gate of a loop's registration: larger than in tracking, because drift may have grown."""
+MOVED_M = 0.1
 NEAR_M, NEAR_DEG = 0.9, 45.0
 """Distance and angle of keyframes that may show the same place."""
 LEAST_PREDICTED = 0.4
@@ -25,15 +26,19 @@ LEAST_PREDICTED = 0.4
 MOST_TRIED = 8
 """Most loops tried for each keyframe, those of the largest predicted overlap."""
 ROUNDS = 2
-"""Times that loops are looked for: the poses after the first show more of them."""
+"""Number of rounds: the poses after the first one predict more loops."""
 GRAPH_POINTS = 200
+"""About the number of a keyframe's points at which the pose graph measures errors."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Candidate:
     source: int
     target: int
+    T_target_source: FloatArray
+    """(4, 4) start pose."""
     predicted: float
+    """Overlap at the start pose."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +48,7 @@ class Trajectory:
     T_first_depth: tuple[FloatArray | None, ...]
     """(4, 4) pose of the depth camera at each frame; None where the camera was lost."""
     keyframes: dict[int, FloatArray]
-    """(4, 4) poses of the keyframes by frame number."""
+    """(4, 4) poses of the keyframes' depth cameras by frame number."""
     links: tuple[Link, ...]
     """Registrations of tracking, then those that close loops."""
 
@@ -55,18 +60,19 @@ def iterate_loops(track: Track) -> Generator[Progress, None, Trajectory]:
     """
     poses, clouds = _chain(track), track.clouds
     links = [one for one in track.links if one.source in poses]
-    first = len(links)
-    tried = {(one.source, one.target) for one in links}
+    tried = {(one.source, one.target): one.T_target_source for one in links}
     for _ in range(ROUNDS):
-        candidates = [c for c in _candidates(poses, clouds) if (c.source, c.target) not in tried]
+        candidates = _candidates(poses, clouds, tried)
+        before = len(links)
         for number, candidate in enumerate(candidates):
             if number % 10 == 0:
                 yield Progress(f"trying loop {number} of {len(candidates)}", number / len(candidates))
-            tried.add((candidate.source, candidate.target))
-            found = _closed(candidate, poses, clouds)
+            tried[candidate.source, candidate.target] = candidate.T_target_source
+            found = _closed(candidate, clouds)
             if found is not None:
+                tried[candidate.source, candidate.target] = found.T_target_source
                 links.append(found)
-        if len(links) == first and not any(one.loop for one in links):
+        if len(links) == before and not any(one.loop for one in links):
             break
         poses, links = _reconciled(poses, links, clouds)
     return Trajectory(tuple(_frame_poses(track, poses)), poses, tuple(links))
@@ -89,33 +95,39 @@ def _chain(track: Track) -> dict[int, FloatArray]:
     return dict(sorted(poses.items()))
 
 
-def _candidates(poses: Mapping[int, FloatArray], clouds: Mapping[int, OrganisedCloud]) -> list[_Candidate]:
-    """Return pairs of keyframes that should show the same place, for each the ``MOST_TRIED`` best."""
+def _candidates(
+    poses: Mapping[int, FloatArray],
+    clouds: Mapping[int, OrganisedCloud],
+    tried: Mapping[tuple[int, int], FloatArray],
+) -> list[_Candidate]:
+    """Return pairs of keyframes that should show the same place, for each the ``MOST_TRIED`` best.
+
+    A pair that was tried before is tried again only if its start pose has moved by ``MOVED_M``.
+    """
     numbers = list(poses)
     found: list[_Candidate] = []
     for later, source in enumerate(numbers):
         own = []
         for target in numbers[: max(0, later - 1)]:
-            T_target_source = inverse(poses[target]) @ poses[source]
-            if np.linalg.norm(T_target_source[:3, 3]) > NEAR_M:
+            T = inverse(poses[target]) @ poses[source]
+            if np.linalg.norm(T[:3, 3]) > NEAR_M or np.degrees(rotation_angle_rad(T[:3, :3])) > NEAR_DEG:
                 continue
-            if np.degrees(rotation_angle_rad(T_target_source[:3, :3])) > NEAR_DEG:
+            before = tried.get((source, target))
+            if before is not None and np.linalg.norm(T[:3, 3] - before[:3, 3]) < MOVED_M:
                 continue
-            predicted, _ = shared_shares(clouds[source], clouds[target], T_target_source, WITHIN)
+            predicted, _ = shared_shares(clouds[source], clouds[target], T, WITHIN)
             if predicted >= LEAST_PREDICTED:
-                own.append(_Candidate(source, target, predicted))
+                own.append(_Candidate(source, target, T, predicted))
         own.sort(key=lambda candidate: -candidate.predicted)
         found += own[:MOST_TRIED]
     return found
 
 
-def _closed(
-    candidate: _Candidate, poses: Mapping[int, FloatArray], clouds: Mapping[int, OrganisedCloud]
-) -> Link | None:
+def _closed(candidate: _Candidate, clouds: Mapping[int, OrganisedCloud]) -> Link | None:
     """Register two keyframes from their poses; None if they do not show the same place."""
     source, target = candidate.source, candidate.target
-    start = inverse(poses[target]) @ poses[source]
-    found = registered(clouds[source], clouds[target], replace(TRACKING, gate_m=LOOP_GATE_M), start)
+    config = replace(TRACKING, gate_m=LOOP_GATE_M)
+    found = registered(clouds[source], clouds[target], config, candidate.T_target_source)
     if found is None or not found.holds:
         return None
     return link(source, target, found, loop=True)
@@ -124,7 +136,7 @@ def _closed(
 def _reconciled(
     poses: Mapping[int, FloatArray], links: Sequence[Link], clouds: Mapping[int, OrganisedCloud]
 ) -> tuple[dict[int, FloatArray], list[Link]]:
-    """Return the keyframes' poses by least squares over all links, and the links with those that are used."""
+    """Return the keyframes' poses by least squares over all links, and the links with ``used`` set."""
     numbers = list(poses)
     places = {number: place for place, number in enumerate(numbers)}
     edges = [

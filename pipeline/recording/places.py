@@ -1,4 +1,4 @@
-"""Parts of a recording, between which the camera was lost, joined where their colours show the same place."""
+"""Joining the parts of a recording, between which the camera was lost, by colour features."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ GATE_M = 0.1
 
 
 def parts_of(keyframes: Sequence[int], links: Iterable[Link]) -> list[list[int]]:
-    """Return the keyframes that links join, the part with the most first."""
+    """Return the groups of keyframes that used links connect, the largest first."""
     places = {number: place for place, number in enumerate(keyframes)}
     groups = Groups(len(keyframes), [(places[one.source], places[one.target]) for one in links if one.used])
     parts: dict[int, list[int]] = {}
@@ -39,7 +39,7 @@ def parts_of(keyframes: Sequence[int], links: Iterable[Link]) -> list[list[int]]
 
 
 def iterate_joins(recording: Recording, track: Track) -> Generator[Progress, None, Track]:
-    """Join the parts of a track by features of the colour images, as far as the verdict is sure.
+    """Link the parts of a track whose relative pose has a sure verdict.
 
     Args:
         recording: the frames.
@@ -58,7 +58,7 @@ def iterate_joins(recording: Recording, track: Track) -> Generator[Progress, Non
 
 
 class _Places:
-    """Colour and depth of the keyframes that are looked at."""
+    """Reads keyframes and keeps their colour features."""
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
@@ -88,7 +88,7 @@ class _Places:
 
 
 def _join(places: _Places, track: Track, main: list[int], part: list[int]) -> Link | None:
-    """Return a registration of two keyframes of two parts; None if no verdict is sure."""
+    """Return a registration of two keyframes of two parts; None if no pair has a sure verdict that holds."""
     pairs = [
         (match_score(places.features(source), places.features(target)), source, target)
         for source in _spread(part)

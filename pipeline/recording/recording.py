@@ -1,4 +1,4 @@
-"""What a recording is: frames of one camera in order of time."""
+"""Protocol of a recording: frames of one camera in order of time."""
 
 from __future__ import annotations
 

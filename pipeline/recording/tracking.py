@@ -34,11 +34,13 @@ NEW_BELOW = 0.8
 """Overlap with the keyframe below which a frame becomes the next keyframe."""
 LEAST_OVERLAP, LEAST_AGREEMENT = 0.3, 0.9
 """Overlap and agreement of a pose that is believed: right ones agree in .99 of what both measured, wrong ones
-in .9 at most (rendered walks in two rooms, with jumps)."""
+in .77 to .87 (rendered walks in three rooms, with jumps)."""
 LESS_AGREEMENT, STEP_M, STEP_DEG = 0.7, 0.03, 2.0
-"""Agreement that is enough, as where people walk by, at a pose this near to where the motion so far leads."""
+"""Agreement that is enough this near to the predicted pose: people who walk by lower it."""
 PREDICTED_M, PREDICTED_RAD = 0.02, np.radians(1.5)
 """Standard error of a predicted pose."""
+GIVEN_INFORMATION = np.diag([0.05**-2.0] * 3 + [0.1**-2.0] * 3)
+"""Information of a given pose across frames that show nothing: .05 rad and 10 cm."""
 WITHIN = 0.03
 """Largest difference of depths that agree, as a share."""
 LEAST_POINTS = 300
@@ -46,7 +48,7 @@ LEAST_POINTS = 300
 TRIED_KEYFRAMES = 4
 """Most keyframes that a frame is compared with when the camera is lost."""
 PATIENCE = 5
-"""Frames after which a lost camera begins anew: what follows is another part of the recording."""
+"""After this many frames without a pose, the next one begins a new part of the recording."""
 REPORTED = 10
 """Frames from one report of progress to the next."""
 TRACKING = RegistrationConfig("ceicp-a", "plane", gate_m=GATE_M)
@@ -57,7 +59,7 @@ class Tracked:
     """A frame's pose relative to a keyframe."""
 
     keyframe: int
-    """Frame number of the keyframe; a keyframe's own."""
+    """Frame number of its keyframe; for a keyframe its own."""
     T_keyframe_frame: FloatArray
     """(4, 4) pose of the depth camera in the keyframe's."""
 
@@ -76,13 +78,16 @@ class Track:
 
 @dataclass(frozen=True, slots=True)
 class Registered:
-    """Two keyframes' registration, or a frame's to a keyframe."""
+    """Registration of a frame to a keyframe, with its checks."""
 
     T_target_source: FloatArray
+    """(4, 4)."""
     information: FloatArray
+    """(6, 6) as in ``PoseEdge``."""
     overlap_share: float
+    """Share of the source's points that the target's image judges."""
     agreeing_share: float
-    """The smaller of both ways."""
+    """Share of the judged points whose depths agree; the smaller of source to target and back."""
 
     @property
     def holds(self) -> bool:
@@ -90,7 +95,7 @@ class Registered:
         return self.overlap_share >= LEAST_OVERLAP and self.agreeing_share >= LEAST_AGREEMENT
 
     def holds_near(self, T_predicted: FloatArray) -> bool:
-        """Whether they do, or nearly so at about the predicted pose."""
+        """Whether it holds, or agrees by ``LESS_AGREEMENT`` near the predicted pose."""
         T = inverse(T_predicted) @ self.T_target_source
         near = np.linalg.norm(T[:3, 3]) <= STEP_M
         near &= np.degrees(rotation_angle_rad(T[:3, :3])) <= STEP_DEG
@@ -103,9 +108,9 @@ def iterate_tracking(
 ) -> Generator[Progress, None, Track]:
     """Find the pose of every frame relative to its keyframe.
 
-    The start is the motion from the frame before, or that of given poses. A frame that shows
-    too little of its keyframe is compared with earlier keyframes; until one fits, frames have no pose. If
-    none fits for ``PATIENCE`` frames, a new part begins, whose keyframes no link joins to the others.
+    The start is the motion from the frame before, or that of given poses. A frame that does not register to
+    its keyframe is tried against the last ones; until one fits, frames have no pose. If none fits for
+    ``PATIENCE`` frames, a new part begins. Only given poses join it to the others.
 
     Args:
         recording: the frames.
@@ -179,7 +184,7 @@ class _Tracker:
         return Track(tuple(self._frames), self._clouds, tuple(self._links))
 
     def _predicted(self, k: int) -> FloatArray:
-        """Return the pose in the keyframe to which the motion leads, the recording's own or that so far."""
+        """Predict a frame's pose in the keyframe, from given poses or by constant velocity."""
         if self._given is not None:
             return self._pose @ inverse(self._given[self._last]) @ self._given[k]
         return self._pose @ self._motion
@@ -197,13 +202,16 @@ class _Tracker:
                 else:
                     self._frames.append(Tracked(keyframe, found.T_target_source))
                 return
-        if k - self._last > PATIENCE:
-            self._begin(k, cloud)
-        else:
+        if k - self._last <= PATIENCE:
             self._frames.append(None)
+            return
+        if self._given is not None:  # as good as the poses that came with the recording
+            T = self._predicted(k)
+            self._links.append(Link(k, self._keyframe, T, GIVEN_INFORMATION, 0.0, 0.0))
+        self._begin(k, cloud)
 
     def _renew(self, k: int, cloud: OrganisedCloud, keyframe: int, found: Registered) -> None:
-        """Make a frame the keyframe, joined to the one before."""
+        """Make the frame the current keyframe, and link it to ``keyframe``."""
         self._links.append(link(k, keyframe, found))
         self._begin(k, cloud)
 
@@ -220,7 +228,7 @@ def registered(
     T_init: FloatArray,
     T_predicted: FloatArray | None = None,
 ) -> Registered | None:
-    """Register two depth images; None if no points lie near each other at the start or the pose is open.
+    """Register two depth images; None if too few pairs are within the gate.
 
     Args:
         source: the image that moves.
@@ -230,6 +238,8 @@ def registered(
         T_predicted: pose to which the motion so far leads; it decides where the surfaces leave a motion open,
             as along a bare wall.
     """
+    if not len(source) or not len(target):
+        return None
     try:
         result = register_organised(source, target, config, T_init)
     except ReconstructionError:
@@ -237,7 +247,9 @@ def registered(
     if not result.steps:
         return None
     T = result.T_target_source
-    T = rigid(Rotation.from_matrix(T[:3, :3]).as_matrix(), T[:3, 3])  # else rounding errors double each frame
+    T = rigid(
+        Rotation.from_matrix(T[:3, :3]).as_matrix(), T[:3, 3]
+    )  # orthonormal: else rounding errors double each frame
     information = registration_information(result, source.points_m, source.normals, target.normals)
     if T_predicted is not None:
         T = steadied(T, information, T_predicted)

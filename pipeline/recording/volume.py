@@ -15,7 +15,7 @@ import numpy as np
 
 from pipeline.kernels.geometry import inverse, rigid
 from pipeline.kernels.kdtree import compiled
-from pipeline.types import BoolArray, CameraIntrinsics, DepthMap, DepthNoise, FloatArray, IntArray, PointCloud
+from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise, FloatArray, IntArray, PointCloud
 
 LEAST_VOXEL_M = 0.002
 VOXEL_OF_NOISE = 2.0
@@ -23,15 +23,13 @@ VOXEL_OF_NOISE = 2.0
 LARGEST_SD = 2.5
 """Largest standard deviation, in voxels, of a measurement that is used; a point's own is at most 1."""
 TRUNCATION_VOXELS = 5.0
-EMPTY_FROM = 0.5
-"""Distance in front of the surface, in truncations, from which a voxel counts as empty."""
 LEAST_SD = 0.01
 """Smallest standard deviation of a measurement or a point, in voxels."""
 LEAST_Q = 1.0
 """Least exponent of the cosine in the noise: a ray that grazes an object soon leaves it, and voxels behind it
 seem to be inside. Of a sphere seen from six sides 95 % of the points are then within .1 voxels, not .4."""
 FARTHEST_M, _TABLE = 64.0, 1 << 16
-"""Farther measurements are ignored; intervals of the tables of weights: 1 mm each."""
+"""Farther measurements are ignored; intervals of the tables of weights, of 1 mm or 1/65,536 of cos^2."""
 STEEPEST = 4.0
 """Largest change of distance between neighbours, in voxels; it is larger at the edges of near objects."""
 _SIDE, _VOXELS, _PADDED = 8, 512, 11
@@ -82,7 +80,8 @@ class Volume:
         """Average a depth image into the voxels of all blocks near its surface.
 
         A voxel takes the depth of the nearest pixel; its distance is along the optical axis, as is the noise.
-        The weight is 1 / sd^2 at the angle of incidence; depth whose frontal sd exceeds a voxel is ignored.
+        The weight is 1 / sd^2 at the angle of incidence; depth is ignored
+        whose sd at normal incidence exceeds ``LARGEST_SD`` voxels.
 
         Args:
             depth: (H, W) depth, metres.
@@ -120,19 +119,6 @@ class Volume:
         found = found[found[:, 6] >= 1.0]
         sigma_m = self.voxel_m * np.maximum(LEAST_SD, 1.0 / np.sqrt(found[:, 6]))
         return PointCloud(found[:, :3] * self.voxel_m, normals=found[:, 3:6].copy(), sigma_m=sigma_m)
-
-    def seen_empty(self, points_m: FloatArray) -> BoolArray:
-        """Return (N,) True where the voxel at each of (N, 3) points was seen in front of a surface nearby."""
-        distance, count = self._at(points_m)
-        return (count > 0) & (distance > EMPTY_FROM)
-
-    def observed(self, points_m: FloatArray) -> BoolArray:
-        """Return (N,) True where the voxel at each of (N, 3) points has at least one observation."""
-        return self._at(points_m)[1] > 0
-
-    def _at(self, points_m: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Return (N,) distance and number of observations of the voxels at (N, 3) points."""
-        return _look_up(np.floor(np.asarray(points_m, dtype=np.float64) / self.voxel_m + 0.5), self._store)
 
 
 def _grown(store: _Blocks) -> _Blocks:
@@ -310,19 +296,6 @@ def _project(
         v = (first[1] + i * steps[1, 0] + j * steps[1, 1] + k * steps[1, 2]) * near + half
         inside = (z > 0.0) & (u >= 0.0) & (u < wide) & (v >= 0.0) & (v < high)
         at[voxel], z_m[voxel] = np.int32(v) * columns + np.int32(u) if inside else -1, z
-
-
-@compiled
-def _look_up(voxels: FloatArray, store: _Blocks) -> tuple[FloatArray, IntArray]:
-    """Return (N,) distance and observations of (N, 3) voxels, whole numbers; 0 if unknown."""
-    distance, seen = np.zeros(len(voxels), dtype=np.float32), np.zeros(len(voxels), dtype=np.uint16)
-    for row in range(len(voxels)):
-        x, y, z = voxels[row]
-        block = store.table[_find(store, _key(x, y, z))]
-        if block >= 0:
-            voxel = ((int(x) & 7) << 6) | ((int(y) & 7) << 3) | (int(z) & 7)
-            distance[row], seen[row] = store.means[block, voxel, 0], store.seen[block, voxel]
-    return distance, seen
 
 
 @compiled

@@ -22,13 +22,13 @@ from pipeline.types import FloatArray, PointCloud, RgbdFrame, Rig, Walk
 
 LEAST_FRAMES = 2
 LEAST_OBSERVATIONS = 2
-"""Frames that must have seen a point of the map."""
+"""Least number of observations of a point of the map."""
 FEW_FRAMES = 10
-"""In a recording with fewer frames one observation is enough."""
+"""With fewer frames that have a pose, one observation is enough."""
 SHOWN = 0.7
-"""Share of each keyframe that one of the chosen views sees, at least."""
-MOST_VIEWS = 12
-"""Most keyframes whose colours are used."""
+"""Share of each keyframe that one of the chosen views sees, unless there are too many views."""
+MOST_VIEWS, FARTHEST_VIEW_M = 12, 2.0
+"""Most keyframes whose colours are used; those farther apart are not compared."""
 SAME_DEPTH = 0.02
 """Largest difference of a point's depth from the measured one, as a share, at a view that colours it."""
 
@@ -40,7 +40,7 @@ def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
         InputError: the recording has too few frames, or an image cannot be read.
     """
     if len(recording.times_s) < LEAST_FRAMES:
-        raise InputError(f"{recording.name} has {len(recording.times_s)} frames; a walk needs {LEAST_FRAMES}")
+        raise InputError(f"{recording.name} has too few frames: a recording needs {LEAST_FRAMES}")
     yield Progress("reading the first frames", 0.0)
     given = checked_poses(recording)
     tracking = iterate_tracking(recording, given.T_world_camera)
@@ -49,20 +49,25 @@ def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
         raise InputError(f"No frame of {recording.name} has enough depth; check its depth images and scale")
     track = yield from part(iterate_joins(recording, track), "parts", 0.45, 0.47, detail=True)
     trajectory = yield from part(iterate_loops(track), "loops", 0.47, 0.55, detail=True)
-    T_world_first = _world(recording, given.T_world_camera, trajectory)
+    T_world_first, turned = _world(recording, given.T_world_camera, trajectory)
     T_world_depth = [None if T is None else T_world_first @ T for T in trajectory.T_first_depth]
     steps = iterate_map(recording, T_world_depth)
     points, voxel_m = yield from part(steps, "mapping", 0.55, 0.95, detail=True)
     T_depth_color = inverse(recording.view(0).T_color_depth)
     poses = tuple(None if T is None else T @ T_depth_color for T in T_world_depth)
-    frames = []
+    frames, unreadable = [], []
     for number in views_of(trajectory, track):
         yield Progress(f"reading frame {number}", 0.95)
         pose = poses[number]
         assert pose is not None
-        frames.append(replace(recording.frame(number), T_world_camera=pose, pose_known=True))
+        try:
+            frames.append(replace(recording.frame(number), T_world_camera=pose, pose_known=True))
+        except InputError as error:
+            unreadable.append(f"{error}: frame {number} gives no colours")
+    if not frames:
+        raise InputError(unreadable[0])
     colored = replace(points, colors=colors_of(points, frames))
-    notes = (*recording.notes, *given.notes)
+    notes = (*recording.notes, *given.notes, *turned, *unreadable)
     keyframes, links = tuple(trajectory.keyframes), trajectory.links
     walk = Walk(recording.times_s, poses, keyframes, links, colored, voxel_m, notes)
     return Rig(recording.name, tuple(frames), walk=walk)
@@ -91,7 +96,7 @@ def iterate_map(
 
 
 def _noise_and_pixel_m(recording: Recording, numbers: Sequence[int]) -> tuple[float, float]:
-    """Return the noise and the distance of two pixels on a surface, at the median depth of a few frames."""
+    """Return the median noise and distance of two pixels, metres, at the median depth of a few frames."""
     found = []
     for k in numbers[:: max(1, len(numbers) // 5)]:
         view = recording.view(k)
@@ -101,26 +106,29 @@ def _noise_and_pixel_m(recording: Recording, numbers: Sequence[int]) -> tuple[fl
     return float(noise_m), float(pixel_m)
 
 
-def _world(recording: Recording, given: Sequence[FloatArray] | None, trajectory: Trajectory) -> FloatArray:
-    """Return T_world_first: the world of given poses if there are any, else one with z up."""
+def _world(
+    recording: Recording, given: Sequence[FloatArray] | None, trajectory: Trajectory
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """Return (4, 4) T_world_first in the world of given poses or another, with z up; and a note if turned."""
     first = next(iter(trajectory.keyframes))
-    view = recording.view(first)
-    T: FloatArray = (LEVEL_POSE if given is None else given[first]) @ view.T_color_depth
+    T: FloatArray = (LEVEL_POSE if given is None else given[first]) @ recording.view(first).T_color_depth
     turn = upright([T @ pose for pose in trajectory.keyframes.values()])
-    return T if turn is None else turn @ T
+    if turn is None:
+        return T, ()
+    return turn @ T, () if given is None else ("The world of the given poses was turned so that z is up",)
 
 
 def views_of(trajectory: Trajectory, track: Track) -> list[int]:
-    """Choose keyframes that together see all that the keyframes see, at most ``MOST_VIEWS``.
+    """Choose keyframes until each keyframe shares ``SHOWN`` with one of them, at most ``MOST_VIEWS``.
 
-    Each keyframe not chosen shares ``SHOWN`` with one that is; those that many others share with come first.
+    Those that most others share with come first.
     """
     numbers = list(trajectory.keyframes)
     shown = np.eye(len(numbers), dtype=bool)
     for i, source in enumerate(numbers):
         for j, target in enumerate(numbers):
-            if i != j:
-                T = inverse(trajectory.keyframes[target]) @ trajectory.keyframes[source]
+            T = inverse(trajectory.keyframes[target]) @ trajectory.keyframes[source]
+            if i != j and np.linalg.norm(T[:3, 3]) <= FARTHEST_VIEW_M:
                 shown[i, j] = _looks_there(track.clouds[source], track.clouds[target], T)
     chosen: list[int] = []
     left = np.ones(len(numbers), bool)
@@ -142,7 +150,7 @@ def _looks_there(source: OrganisedCloud, target: OrganisedCloud, T_target_source
 def colors_of(points: PointCloud, frames: Sequence[RgbdFrame]) -> np.ndarray:
     """Return (N, 3) RGB of points, the mean over the views that measured them; grey where none did.
 
-    A view counts by the cosine of incidence over the squared distance.
+    A view's weight is the cosine of incidence over the squared distance.
     """
     total, weights = np.zeros((len(points), 3)), np.zeros(len(points))
     for frame in frames:
@@ -157,8 +165,12 @@ def colors_of(points: PointCloud, frames: Sequence[RgbdFrame]) -> np.ndarray:
         seen = np.abs(frame.depth.z_m[v, u] - z_m) <= SAME_DEPTH * z_m
         rows, u, v = rows[seen], u[seen], v[seen]
         distance_m = np.linalg.norm(own_m[rows], axis=1)
-        normals = np.ones((len(rows), 3)) if points.normals is None else points.normals[rows]
-        facing = -np.einsum("ni,ni->n", normals @ frame.T_world_camera[:3, :3], own_m[rows]) / distance_m
+        facing = (
+            -np.einsum(
+                "ni,ni->n", np.asarray(points.normals)[rows] @ frame.T_world_camera[:3, :3], own_m[rows]
+            )
+            / distance_m
+        )
         weight = np.maximum(facing, 0.05) / distance_m**2
         total[rows] += weight[:, None] * frame.rgb[v, u]
         weights[rows] += weight

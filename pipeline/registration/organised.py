@@ -2,7 +2,7 @@
 
 The source's points are projected into the target's image, and the nearest of the points around is the partner
 (projective association: Blais and Levine, "Registering multiview range data to create 3D computer objects",
-PAMI 1995). As far as the scale of CEICP-A reaches, all are compared, and at its end nine.
+PAMI 1995). Those within the current scale of CEICP-A are compared, at least 3 x 3 and at most 17 x 17.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ from pipeline.types import (
 )
 
 WIDTH = 160
-"""About the number of squares of pixels in a row; each becomes one point."""
+"""Approximate number of squares of pixels across the image; each square becomes one point."""
 SAME_SURFACE = 0.02
-"""Largest difference of depths, as a share, within a square that are averaged."""
+"""Depths within this share of a square's nearest depth are averaged."""
 ARM = 2
 """Distance, in squares, of the neighbours from which a normal is computed."""
 BENT = 0.02
-"""Largest departure of a square's depth, as a share, from the middle of its neighbours: beyond it there is
+"""Largest difference, as a share, of a square's 1/z from the mean of its two neighbours'; beyond it there is
 an edge, and no normal."""
 WIDEST = 8
-"""Most squares on either side of a point's place among which its partner is searched."""
+"""Largest search radius around the projected point, squares."""
 SIGMA_OF_SPACING = 0.6
 """Smallest scale of CEICP-A over the distance of two squares at the median depth."""
 
@@ -65,7 +65,7 @@ class OrganisedCloud:
 
     @property
     def spacing_m(self) -> float:
-        """Distance of two neighbouring squares at the median depth."""
+        """Distance of two neighbouring squares at the median depth, metres."""
         return float(np.median(self.points_m[:, 2])) / self.camera.fx_px
 
     @property
@@ -75,10 +75,12 @@ class OrganisedCloud:
 
 
 def organised(depth: DepthMap, camera: CameraIntrinsics) -> OrganisedCloud:
-    """Average a depth image over squares of pixels, in 1/z, and compute normals.
+    """Average 1/z of a depth image over squares of pixels, and compute normals.
+
+    Rows and columns that remain at the right and at the bottom are not used.
 
     Args:
-        depth: (H, W) metric.
+        depth: (H, W) depth, metres.
         camera: its camera, without distortion.
     """
     step_px = max(1, round(camera.width_px / WIDTH))
@@ -122,7 +124,7 @@ def shared_shares(
 ) -> tuple[float, float]:
     """Return the share of the source's points that the target's image judges, and of these that agree.
 
-    A point is judged where the target measured its square and does not hide it.
+    A point is judged if its square in the target has depth, and it is not well behind that.
 
     Args:
         source: an organised cloud.
@@ -152,7 +154,7 @@ class OrganisedMatcher:
         target_share: float = 1.0,
         gate_m: float = float("inf"),
     ) -> Matching:
-        """Find the pairs of a share of the source's points; the other arguments are those of ``Matcher``."""
+        """Pair a share of the source's points; ``neighbours`` and ``target_share`` are not used."""
         count = min(len(self._order), max(6, round(source_share * len(self._order))))
         found = _partners(self._source.points_m, self._order[:count], T_target_source, *self._image, gate_m)
         normals, cosines = mean_normals(
@@ -250,7 +252,7 @@ def _partners(
     camera: FloatArray,
     gate: float,
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray, FloatArray]:
-    """Build the arrays of a ``Matching``: points with the nearest target around them, within a gate."""
+    """Build the arrays of a ``Matching``: each moved point with the nearest target in its window."""
     height, width = rows.shape
     reach_m = gate / GATE_IN_SIGMAS
     near, partners = np.empty(len(order), np.intp), np.empty(len(order), np.intp)
@@ -263,7 +265,7 @@ def _partners(
             continue
         u = round(camera[0] * place[0] / place[2] + camera[2])
         v = round(camera[1] * place[1] / place[2] + camera[3])
-        reach = min(WIDEST, max(1, round(reach_m * camera[0] / place[2])))
+        reach = max(1, round(min(float(WIDEST), reach_m * camera[0] / place[2])))
         best, partner = gate * gate, -1
         for row in range(max(0, v - reach), min(height, v + reach + 1)):
             for column in range(max(0, u - reach), min(width, u + reach + 1)):

@@ -72,8 +72,14 @@ def test_poses_of_another_recording_are_not_used_and_the_walk_goes_on():
 def test_a_camera_that_stands_says_nothing_about_its_poses():
     still = replace(written([np.eye(4)] * 12), T_true=around(40)[:1] * 12)
     given = checked_poses(still)
-    assert given.notes == ()
+    assert "were not compared with its depth" in given.notes[0]
     assert given.T_world_camera == still.poses
+
+
+def test_poses_that_stand_still_contradict_a_camera_that_moves():
+    given = checked_poses(written([np.eye(4)] * 40))
+    assert given.T_world_camera is None
+    assert "contradict its depth" in given.notes[0]
 
 
 def test_a_recording_without_poses_has_none():

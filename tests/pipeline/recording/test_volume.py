@@ -162,17 +162,6 @@ def test_unknown_and_impossible_depth_changes_nothing():
     assert volume_of((DepthMap(np.full_like(z_m, np.nan)), ORIGIN)).blocks == 0
 
 
-def test_space_is_empty_in_front_of_the_surface_only():
-    """With truncation at 5 cm: 4 cm in front, 1 cm in front, 3 cm behind, 10 cm behind, and far off."""
-    volume = volume_of((wall(1.5), ORIGIN))
-    points_m = np.array(
-        [[0, 0, 1.46], [0, 0, 1.49], [0, 0, 1.53], [0, 0, 1.6], [0, 0, 9.0], [np.nan, 0, 1.46]]
-    )
-    np.testing.assert_array_equal(volume.seen_empty(points_m), [True, False, False, False, False, False])
-    np.testing.assert_array_equal(volume.observed(points_m), [True, True, True, False, False, False])
-    assert not Volume(VOXEL_M).observed(points_m).any()
-
-
 def test_one_observation_gives_no_points_but_the_second_does():
     frame = wall(1.5034), ORIGIN
     assert len(volume_of(frame).points()) == 0

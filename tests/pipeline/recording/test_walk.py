@@ -101,7 +101,7 @@ def test_the_part_with_the_most_keyframes_is_mapped_and_a_part_of_the_same_place
 
 
 def test_too_few_frames_or_no_depth_is_one_sentence(recording):
-    with pytest.raises(InputError, match="has 1 frames; a walk needs 2"):
+    with pytest.raises(InputError, match="rendered has too few frames: a recording needs 2"):
         drain(iterate_walk(replace(recording, T_true=recording.T_true[:1])))
     blind = replace(recording, T_true=recording.T_true[:3], blind=frozenset(range(3)))
     with pytest.raises(InputError, match="No frame of rendered has enough depth"):

@@ -1,0 +1,104 @@
+"""Walks: every program answers on one, and trajectories, maps and summaries are judged as they should be."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from lab.benchmarks.recording import summary
+from lab.walks.held_out import FIRST_ROOM, WalkTask, frames_in_memory, held_out_walks
+from lab.walks.judging import Mesh, map_errors, rpe_m, to_truth, trajectory_errors
+from lab.walks.ours import OURS, OWN, poses_without_loops, solve_own
+from lab.walks.peers import available_walk_peers, solve_peer
+from lab.walks.walk import kinect, read_truth
+from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
+from pipeline.recording.tracking import Track, Tracked
+from pipeline.types import Link
+
+FRAMES, WIDTH_PX = 10, 160
+PEERS = [name for name in available_walk_peers() if name != "open3d-slam, fine voxels"]  # takes long
+ELSEWHERE = rigid(rotation_exp(np.array([0.3, -0.2, 0.9])), np.array([1.0, -2.0, 0.5]))
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory):
+    (folder,) = held_out_walks(1, FRAMES, WIDTH_PX, tmp_path_factory.mktemp("walks"))
+    return folder
+
+
+def test_a_walk_is_rendered_once_and_read_completely(walk):
+    image = walk / "depth" / "000000.png"
+    before = image.stat().st_mtime_ns
+    assert held_out_walks(1, FRAMES, WIDTH_PX, walk.parent) == [walk]
+    assert image.stat().st_mtime_ns == before
+    assert walk.name == f"{FIRST_ROOM}-{FRAMES}-{WIDTH_PX}"
+    frames = frames_in_memory(walk, 5)
+    assert frames.times_s == pytest.approx([0.0, 1.0 / 6.0], abs=1e-5)
+    assert len(frames.frames) == len(frames.views) == 2
+    assert frames.view(1).depth is frames.frame(1).depth
+
+
+@pytest.mark.parametrize("program", [*OWN, *PEERS])
+def test_every_program_follows_a_short_walk(walk, program):
+    row = (solve_own if program in OWN else solve_peer)(WalkTask(program, walk, 1))
+    assert (row["program"], row["walk"], row["frames"]) == (program, walk.name, FRAMES)
+    assert row["without_pose"] == 0
+    assert row["ate_m"] < (0.02 if program in OWN else 0.04)
+    assert np.isnan(row["rpe_m"])  # shorter than a second
+    if program in (OURS, "open3d-slam"):
+        assert row["map_median_m"] < 0.03
+        assert 0.3 < row["within_2cm"] <= row["within_5cm"] <= 1.0
+
+
+def test_the_true_room_and_poses_have_no_errors_in_another_world(walk):
+    truth = read_truth(walk)
+    poses = [ELSEWHERE @ T for T in truth.T_world_camera]
+    np.testing.assert_allclose(to_truth(poses, truth.T_world_camera), inverse(ELSEWHERE), atol=1e-9)
+    mesh = Mesh(apply(ELSEWHERE, truth.vertices_m), truth.triangles)
+    row = map_errors(poses, mesh.vertices_m, mesh, kinect(WIDTH_PX), truth, 1)
+    assert row["map_median_m"] < 1e-5
+    assert (row["within_2cm"], row["within_5cm"]) == (1.0, 1.0)
+    away = Mesh(mesh.vertices_m + 100.0, mesh.triangles)
+    assert map_errors(poses, mesh.vertices_m, away, kinect(WIDTH_PX), truth, 1)["within_5cm"] == 0.0
+    errors = trajectory_errors(poses, np.arange(FRAMES) / 30.0, truth, 1)
+    assert errors["ate_m"] < 1e-9
+    assert not errors["lost"]
+    few = [*poses[:4], *[None] * (FRAMES - 4)]
+    assert trajectory_errors(few, np.arange(FRAMES) / 30.0, truth, 1)["lost"]
+
+
+def test_a_steady_drift_is_the_relative_error_over_a_second():
+    times_s = np.arange(61) / 30.0
+    true = [
+        rigid(rotation_exp(np.array([0.0, 0.02 * k, 0.0])), np.array([0.01 * k, 0.0, 0.0])) for k in range(61)
+    ]
+    assert rpe_m([ELSEWHERE @ T for T in true], true, times_s) == pytest.approx(0.0, abs=1e-12)
+    drifting = [rigid(np.eye(3), np.array([0.001 * k, 0.0, 0.0])) for k in range(61)]
+    still = [np.eye(4)] * 61
+    assert rpe_m(drifting, still, times_s) == pytest.approx(0.03)
+    assert rpe_m(drifting[::5], still[::5], times_s[::5]) == pytest.approx(0.03)
+    assert np.isnan(rpe_m([None] * 61, still, times_s))
+
+
+def test_tracked_poses_follow_the_links_and_other_parts_have_none():
+    step = rigid(np.eye(3), np.array([1.0, 0.0, 0.0]))
+    links = (Link(1, 0, step, np.eye(6), 0.9, 0.9, False), Link(2, 1, step, np.eye(6), 0.9, 0.9, False))
+    frames = (*[Tracked(k, np.eye(4)) for k in range(3)], Tracked(2, step), None, Tracked(5, np.eye(4)))
+    clouds = dict.fromkeys((0, 1, 2, 5), SimpleNamespace())
+    poses = poses_without_loops(Track(frames, clouds, links))
+    assert [None if T is None else T[0, 3] for T in poses] == [0.0, 1.0, 2.0, 3.0, None, None]
+
+
+def test_a_summary_has_medians_and_worst_values_and_a_walk_without_poses_is_the_worst():
+    def row(ate_m, within, lost=False):
+        values = {"rpe_m": 0.01, "without_pose": 0, "map_median_m": 0.002, "within_5cm": 0.9}
+        own = {"program": OURS, "every": 1, "lost": lost, "ate_m": ate_m, "within_2cm": within}
+        share = None if ate_m is None else ate_m / 10.0
+        return values | own | {"ate_share": share, "frames_s": 20.0, "peak_memory_bytes": 5}
+
+    (group,) = summary([row(0.01, 0.8), row(0.03, 0.7), row(0.02, 0.9)])
+    assert (group["walks"], group["lost"]) == (3, 0)
+    assert (group["ate_m"], group["worst_ate_m"]) == (0.02, 0.03)
+    assert (group["within_2cm"], group["worst_within_2cm"]) == (0.8, 0.7)
+    (group,) = summary([row(0.01, 0.8), row(0.03, 0.7), row(None, None, lost=True)])
+    assert (group["ate_m"], group["worst_ate_m"], group["lost"]) == (0.03, None, 1)
