@@ -29,6 +29,8 @@ CASES: dict[str, Callable[[], Benchmark]] = {
     "places: by overlap": partial(_measure, "places"),
     "places: any overlap": partial(_measure, "places", "verdicts"),
     "places: lists of bare clouds": partial(_measure, "place_lists"),
+    "recording: every frame": partial(_measure, "recording"),
+    "recording: every fifth frame": partial(_measure, "recording", every=5),
     "surface": partial(_measure, "surface"),
     "depth": partial(_measure, "depth"),
     "network": partial(_measure, "network"),

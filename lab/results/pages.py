@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from lab.benchmarks.filling import FLAT, OURS
 from lab.claims.claim import VERDICTS, is_beyond
 from lab.claims.registry import CLAIMS
-from lab.results import completion, places, tables, verdicts
+from lab.results import completion, places, recordings, tables, verdicts
 from lab.results.markdown import Row, listed, percent
 from lab.results.record import ROOT, Record, Records, read_records
 from packetmesh.files import atomic_path
@@ -39,6 +39,7 @@ SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "bench_registration": ("Registration: speed", tables.registration_speed),
     "bench_problems": ("Registration: problems in the form of a public benchmark", tables.problems),
     PLACES: ("Registration: views placed without a start", places.places),
+    "bench_recording": ("Recordings: a camera that walks", recordings.recordings),
     "surface_claims": ("Ball pivoting: the thesis's claims", tables.claims),
     "bench_surface": ("Ball pivoting: speed", tables.rolling_speed),
     "network_claims": ("The camera network: the thesis's claims", tables.claims),

@@ -90,9 +90,22 @@ def test_tracked_poses_follow_the_links_and_other_parts_have_none():
 
 
 def test_a_summary_has_medians_and_worst_values_and_a_walk_without_poses_is_the_worst():
-    def row(ate_m, within, lost=False):
-        values = {"rpe_m": 0.01, "without_pose": 0, "map_median_m": 0.002, "within_5cm": 0.9}
-        own = {"program": OURS, "every": 1, "lost": lost, "ate_m": ate_m, "within_2cm": within}
+    def row(ate_m, within, lost=False, without_pose=0):
+        values = {
+            "rpe_m": 0.01,
+            "frames": 10,
+            "without_pose": without_pose,
+            "map_median_m": 0.002,
+            "within_5cm": 0.9,
+        }
+        own = {
+            "program": OURS,
+            "every": 1,
+            "lost": lost,
+            "ate_m": ate_m,
+            "within_2cm": within,
+            "within_5cm": 0.9,
+        }
         share = None if ate_m is None else ate_m / 10.0
         return values | own | {"ate_share": share, "frames_s": 20.0, "peak_memory_bytes": 5}
 
@@ -102,3 +115,5 @@ def test_a_summary_has_medians_and_worst_values_and_a_walk_without_poses_is_the_
     assert (group["within_2cm"], group["worst_within_2cm"]) == (0.8, 0.7)
     (group,) = summary([row(0.01, 0.8), row(0.03, 0.7), row(None, None, lost=True)])
     assert (group["ate_m"], group["worst_ate_m"], group["lost"]) == (0.03, None, 1)
+    (group,) = summary([row(0.01, 0.8), row(0.02, 0.7), row(0.001, 0.1, lost=True, without_pose=6)])
+    assert (group["ate_m"], group["worst_ate_m"], group["worst_without_pose"]) == (0.02, None, 6)

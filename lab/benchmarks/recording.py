@@ -1,0 +1,135 @@
+"""A camera that walks through held-out rooms, followed by PacketMesh and by other programs (SPEC 10.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from lab.benchmarks.benchmark import Benchmark
+from lab.trials import iterate_trials
+from lab.walks.held_out import CACHE, WalkTask, held_out_walks
+from lab.walks.judging import JUDGED_TO_M, LOST_SHARE, Row
+from lab.walks.ours import OURS, OWN, measure_own
+from lab.walks.peers import WALK_PEERS, available_walk_peers, measure_peer
+from packetmesh.progress import drain
+
+WALKS, FRAMES, WIDTH_PX = 10, 600, 320
+"""Rooms, frames of each walk, 30 a second, and width of the images."""
+FAST = 5
+"""Step between the frames of a fast walk."""
+ERRORS = ("ate_m", "ate_share", "rpe_m", "without_pose", "map_median_m")
+"""Values whose largest is the worst."""
+MOSTLY_KNOWN = ("ate_m", "ate_share", "rpe_m")
+"""Errors that say little if most frames have no pose."""
+GAINS = ("frames_s", "within_2cm", "within_5cm")
+"""Values whose smallest is the worst."""
+TIMED = (
+    "Median (worst). Time is from images in memory to poses and map; reading and the surface are not in it."
+)
+
+
+def benchmark(
+    every: int = 1, walks: int = WALKS, frames: int = FRAMES, width_px: int = WIDTH_PX, folder: Path = CACHE
+) -> Benchmark:
+    """Follow the camera of every walk by every program, at every frame or at every so many.
+
+    Walks and answers that are in the folder are not made again.
+    """
+    paths = held_out_walks(walks, frames, width_px, folder)
+    rows = _answers(tuple(OWN), measure_own, paths, every, folder)
+    rows += _answers(available_walk_peers(), measure_peer, paths, every, folder)
+    groups = summary(rows)
+    notes = [_line(group) for group in groups]
+    missing = [name for name in WALK_PEERS if name not in available_walk_peers()]
+    if missing:
+        notes.append(f"Not installed, so not compared: {', '.join(missing)}")
+    seconds = {name: float(np.median([row["elapsed_s"] for row in some])) for name, some in _by_program(rows)}
+    memory = {group["program"]: group["peak_memory_bytes"] for group in groups}
+    ours_s, ours_bytes = seconds.pop(OURS), memory.pop(OURS)
+    errors_m = {group["program"]: group["ate_m"] for group in groups if group["ate_m"] is not None}
+    return Benchmark(ours_s, seconds, ours_bytes, memory, errors_m, tuple(groups), (*notes, TIMED))
+
+
+def summary(rows: Iterable[Row]) -> list[Row]:
+    """Return counts, and median and worst value of each measure, per program.
+
+    A walk without a value counts as worse than all others, as does the trajectory of one that has hardly any
+    poses; if it is the median or the worst, that is None. Programs without a map have None for all that is
+    measured on maps.
+    """
+    groups = []
+    for program, some in _by_program(rows):
+        group: Row = {
+            "program": program,
+            "every": some[0]["every"],
+            "walks": len(some),
+            "lost": sum(row["lost"] for row in some),
+            "peak_memory_bytes": max(row["peak_memory_bytes"] for row in some),
+        }
+        for name in (*ERRORS, *GAINS):
+            values = [None if name in MOSTLY_KNOWN and _hardly_any_pose(row) else row[name] for row in some]
+            group[name], group[f"worst_{name}"] = _median_and_worst(values, name in GAINS)
+        groups.append(group)
+    return groups
+
+
+def _answers(
+    programs: Sequence[str],
+    measure: Callable[[WalkTask], Row],
+    walks: Sequence[Path],
+    every: int,
+    folder: Path,
+) -> list[Row]:
+    """Return every program's rows, one process at a time so that times can be compared."""
+    tasks = [WalkTask(name, walk, every) for walk in walks for name in programs]
+    return drain(iterate_trials("recordings", measure, tasks, folder / "answers", processes=1))
+
+
+def _by_program(rows: Iterable[Row]) -> list[tuple[str, list[Row]]]:
+    """Return rows by program, in the order of appearance."""
+    groups: dict[str, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(row["program"], []).append(row)
+    return list(groups.items())
+
+
+def _hardly_any_pose(row: Row) -> bool:
+    return bool(row["without_pose"] > LOST_SHARE * row["frames"])
+
+
+def _median_and_worst(
+    values: Sequence[float | None], more_is_better: bool
+) -> tuple[float | None, float | None]:
+    sign = -1.0 if more_is_better else 1.0
+    costs = np.array([np.inf if value is None else sign * value for value in values])
+    median, worst = (sign * float(cost) for cost in (np.median(costs), costs.max()))
+    return median if np.isfinite(median) else None, worst if np.isfinite(worst) else None
+
+
+def _line(group: Row) -> str:
+    parts = [
+        f"{group['lost']} of {group['walks']} walks lost",
+        f"ATE {_both(group, 'ate_m', 100, 'cm')}",
+        f"{_both(group, 'ate_share', 100, '%')} of the path",
+        f"RPE {_both(group, 'rpe_m', 100, 'cm')}",
+        f"{_both(group, 'without_pose', 1, 'frames')} without a pose",
+        f"{_both(group, 'frames_s', 1, 'frames/s')}",
+        f"{group['peak_memory_bytes'] / 1e6:.0f} MB",
+    ]
+    if group["map_median_m"] is not None:
+        parts += [
+            f"map {_both(group, 'map_median_m', 1000, 'mm')} off",
+            f"of the depth to {JUDGED_TO_M:.0f} m {_both(group, 'within_2cm', 100, '%')} within 2 cm",
+            f"{_both(group, 'within_5cm', 100, '%')} within 5 cm",
+        ]
+    return f"{group['program']}: {', '.join(parts)}"
+
+
+def _both(group: Row, name: str, factor: float, unit: str) -> str:
+    """Return median and worst of a measure, for example "1.2 (3.4) cm"."""
+    median, worst = (
+        "–" if value is None else f"{factor * value:.3g}" for value in (group[name], group[f"worst_{name}"])
+    )
+    return f"{median} ({worst}) {unit}"

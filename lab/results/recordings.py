@@ -1,0 +1,66 @@
+"""The table of docs/results.md about recordings."""
+
+from __future__ import annotations
+
+from lab.results.markdown import Cell, Row, percent, table
+
+COLUMNS = (
+    "program",
+    "walks lost",
+    "ATE, cm",
+    "of the path",
+    "RPE over 1 s, cm",
+    "frames without a pose",
+    "frames a second",
+    "MB",
+    "map, mm off",
+    "depth within 2 cm",
+    "within 5 cm",
+)
+
+
+def recordings(numbers: Row) -> str:
+    """Return a table for each case of the record."""
+    parts = [
+        "Rendered walks through rooms on which nothing was fitted, with a Kinect's noise; each closes one "
+        "loop. Median (worst) of the walks, whose images are in memory; every program has one core "
+        "(OMP_NUM_THREADS=1, NUMBA_NUM_THREADS=1). A walk is lost if its ATE is over 20 cm or half of its "
+        "frames have no pose."
+    ]
+    for case, result in numbers.items():
+        rows = [_row(run) for run in result["runs"]]
+        parts += [f"{case.removeprefix('recording: ').capitalize()}:", table(COLUMNS, rows)]
+    return "\n\n".join(parts)
+
+
+def _row(run: Row) -> tuple[Cell, ...]:
+    return (
+        run["program"],
+        f"{run['lost']} of {run['walks']}",
+        _both(run, "ate_m", 100.0, 2),
+        _shares(run, "ate_share", 2),
+        _both(run, "rpe_m", 100.0, 2),
+        _both(run, "without_pose", 1.0, 0),
+        _both(run, "frames_s", 1.0, 0),
+        f"{run['peak_memory_bytes'] / 1e6:.0f}",
+        _both(run, "map_median_m", 1000.0, 1),
+        _shares(run, "within_2cm", 0),
+        _shares(run, "within_5cm", 0),
+    )
+
+
+def _both(run: Row, name: str, factor: float, digits: int) -> str | None:
+    """Return median and worst of a measure; None if it was not measured."""
+    if run[name] is None and run[f"worst_{name}"] is None:
+        return None
+    values = (run[name], run[f"worst_{name}"])
+    median, worst = ("–" if value is None else f"{factor * value:.{digits}f}" for value in values)
+    return f"{median} ({worst})"
+
+
+def _shares(run: Row, name: str, digits: int) -> str | None:
+    if run[name] is None and run[f"worst_{name}"] is None:
+        return None
+    values = (run[name], run[f"worst_{name}"])
+    median, worst = ("–" if value is None else percent(value, digits) for value in values)
+    return f"{median} ({worst})"

@@ -1,0 +1,196 @@
+"""A program's answer on a walk, judged by the truth: trajectory, map and surface (SPEC 10.5)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from lab.walks.held_out import FramesInMemory, WalkTask, frames_in_memory
+from lab.walks.walk import WalkTruth, read_truth
+from packetmesh.errors import PacketMeshError
+from packetmesh.memory import peak_memory_bytes
+from pipeline.kernels.geometry import apply, inverse, rigid
+from pipeline.kernels.rays import Camera, hit_depths, tensor, triangle_scene
+from pipeline.recording.errors import ate_m
+from pipeline.types import CameraIntrinsics, FloatArray, IntArray
+
+LOST_M, LOST_SHARE = 0.2, 0.5
+"""A walk is lost if the ATE is larger, or if more of its frames have no pose."""
+RPE_S = 1.0
+JUDGED_EVERY = 20
+"""Step between the frames of a walk whose rays judge the surface."""
+JUDGED_TO_M = 4.0
+"""Largest true depth of these rays."""
+NEAR_M = (0.02, 0.05)
+"""Largest differences of depth at which a ray counts as met by the surface."""
+MOST_POINTS = 200_000
+"""Most points of a map whose distance to the true surface is measured, evenly drawn."""
+WARM_FRAMES = 5
+"""Frames that a program processes before the clock starts, to load its code."""
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """Triangles in a program's world frame."""
+
+    vertices_m: FloatArray
+    """(V, 3)."""
+    triangles: IntArray
+    """(F, 3)."""
+
+
+@dataclass(frozen=True, slots=True)
+class WalkAnswer:
+    """A program's answer on a walk."""
+
+    T_world_camera: tuple[FloatArray | None, ...]
+    """(4, 4) pose of each frame in any world; None where the program has none."""
+    points_m: FloatArray | None = None
+    """(N, 3) points of the map in the same world; None from programs without a map."""
+    surface: Callable[[], Mesh] | None = None
+    """Makes the map's surface, which is timed apart."""
+
+
+Program = Callable[[FramesInMemory], WalkAnswer]
+
+
+def measured(task: WalkTask, program: Program) -> Row:
+    """Run a program on a walk and judge its answer.
+
+    The time is that from images in memory to poses and map; reading, imports and the surface do not count.
+    The peak memory includes the images and all libraries, so it needs a process of its own.
+    """
+    frames = frames_in_memory(task.folder, task.every)
+    with suppress(PacketMeshError):
+        program(frames.first(WARM_FRAMES))
+    started = time.perf_counter()
+    try:
+        answer = program(frames)
+    except PacketMeshError:
+        answer = WalkAnswer((None,) * len(frames.times_s))
+    elapsed_s = time.perf_counter() - started
+    poses = tuple(None if T is None or not np.all(np.isfinite(T)) else T for T in answer.T_world_camera)
+    started = time.perf_counter()
+    mesh = None if answer.surface is None else answer.surface()
+    surface_s = None if mesh is None else time.perf_counter() - started
+    peak_bytes = peak_memory_bytes()
+    truth = read_truth(task.folder)
+    return {
+        "program": task.program,
+        "walk": task.folder.name,
+        "every": task.every,
+        "frames": len(frames.times_s),
+        **trajectory_errors(poses, frames.times_s, truth, task.every),
+        "elapsed_s": elapsed_s,
+        "frames_s": len(frames.times_s) / elapsed_s,
+        "surface_s": surface_s,
+        "peak_memory_bytes": peak_bytes,
+        **map_errors(poses, answer.points_m, mesh, frames.frames[0].intrinsics, truth, task.every),
+    }
+
+
+def trajectory_errors(
+    T_world_camera: Sequence[FloatArray | None], times_s: FloatArray, truth: WalkTruth, every: int
+) -> Row:
+    """Return ATE, also as a share of the true path, RPE, frames without a pose, and whether it is lost."""
+    T_true = list(truth.T_world_camera[::every])
+    path_m = float(np.linalg.norm(np.diff(truth.T_world_camera[:, :3, 3], axis=0), axis=1).sum())
+    error_m = ate_m(T_world_camera, T_true)
+    without = sum(T is None for T in T_world_camera)
+    return {
+        "path_m": path_m,
+        "ate_m": error_m,
+        "ate_share": error_m / path_m,
+        "rpe_m": rpe_m(T_world_camera, T_true, times_s),
+        "without_pose": without,
+        "lost": not error_m <= LOST_M or without > LOST_SHARE * len(T_world_camera),
+    }
+
+
+def rpe_m(
+    T_world_camera: Sequence[FloatArray | None],
+    T_reference_camera: Sequence[FloatArray],
+    times_s: FloatArray,
+    apart_s: float = RPE_S,
+) -> float:
+    """Return the relative pose error: the RMSE of the motions' translation over ``apart_s``.
+
+    Args:
+        T_world_camera: (4, 4) poses; None where there is none, which does not count.
+        T_reference_camera: as many poses in another world.
+        times_s: (N,) their times.
+        apart_s: time from a pose to the one that it is compared with.
+
+    Returns:
+        Metres; NaN if no two poses are so far apart.
+    """
+    apart_m = []
+    for k, later in enumerate(np.searchsorted(times_s, times_s + apart_s - 1e-3)):
+        if later >= len(times_s):
+            break
+        a, b = T_world_camera[k], T_world_camera[later]
+        if a is not None and b is not None:
+            motion = inverse(T_reference_camera[k]) @ T_reference_camera[later]
+            apart_m.append((inverse(motion) @ inverse(a) @ b)[:3, 3])
+    return float(np.sqrt(np.mean(np.sum(np.square(apart_m), axis=1)))) if apart_m else float("nan")
+
+
+def map_errors(
+    T_world_camera: Sequence[FloatArray | None],
+    points_m: FloatArray | None,
+    mesh: Mesh | None,
+    camera: CameraIntrinsics,
+    truth: WalkTruth,
+    every: int,
+) -> Row:
+    """Return the median distance of the map's points to the true surface, and shares of true depth met.
+
+    The map is moved by the mean difference of true and estimated poses. Rays are those of the true poses of
+    every ``JUDGED_EVERY``-th frame of the walk. All values are None without a map or without poses.
+    """
+    shares: dict[str, float | None] = {f"within_{near_m * 100:.0f}cm": None for near_m in NEAR_M}
+    T = to_truth(T_world_camera, list(truth.T_world_camera[::every]))
+    if T is None or points_m is None or mesh is None or not len(points_m):
+        return {"map_points": None, "map_median_m": None, "triangles": None, **shares}
+    some_m = points_m[:: max(1, -(-len(points_m) // MOST_POINTS))]
+    room = triangle_scene(truth.vertices_m, truth.triangles)
+    distances_m = room.compute_distance(tensor(apply(T, some_m), np.float32)).numpy()
+    apart_m = np.concatenate(list(_ray_errors_m(apply(T, mesh.vertices_m), mesh.triangles, camera, truth)))
+    for name, near_m in zip(shares, NEAR_M, strict=True):
+        shares[name] = float(np.mean(apart_m <= near_m))
+    return {
+        "map_points": len(points_m),
+        "map_median_m": float(np.median(distances_m)),
+        "triangles": len(mesh.triangles),
+        **shares,
+    }
+
+
+def _ray_errors_m(
+    vertices_m: FloatArray, triangles: IntArray, camera: CameraIntrinsics, truth: WalkTruth
+) -> Iterator[FloatArray]:
+    """Yield the (N,) differences of true and found depth of each judged frame; inf where nothing is hit."""
+    cameras = [Camera(camera, T) for T in truth.T_world_camera[::JUDGED_EVERY]]
+    own = hit_depths(vertices_m, triangles, cameras)
+    for right, found in zip(hit_depths(truth.vertices_m, truth.triangles, cameras), own, strict=True):
+        z_m = right.z_m[right.z_m < JUDGED_TO_M]
+        yield np.nan_to_num(np.abs(found.z_m[right.z_m < JUDGED_TO_M] - z_m), nan=np.inf)
+
+
+def to_truth(
+    T_world_camera: Sequence[FloatArray | None], T_true_camera: Sequence[FloatArray]
+) -> FloatArray | None:
+    """Return T_true_world, the mean over all poses: chordal of the rotations, then of the positions."""
+    known = [(T, T_true_camera[k]) for k, T in enumerate(T_world_camera) if T is not None]
+    if not known:
+        return None
+    turn = Rotation.from_matrix([true[:3, :3] @ own[:3, :3].T for own, true in known]).mean().as_matrix()
+    shift_m = np.mean([true[:3, 3] - turn @ own[:3, 3] for own, true in known], axis=0)
+    return rigid(turn, shift_m)
