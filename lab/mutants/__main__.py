@@ -80,11 +80,20 @@ def _test(copy: Path, mutation: Mutation) -> bool:
     everything = [str(copy / path) for path in GROUPS[mutation.group][1]]
     module.write_text(mutation.applied(code), encoding="utf-8")
     try:
+        _forget_compiled(copy, code)
         return any(_fails(copy, paths) for paths in (own, everything) if paths)
     finally:
         module.write_text(code, encoding="utf-8")
-        for compiled in (copy / ".numba").glob(f"{module.parent.name}_*"):
-            shutil.rmtree(compiled)  # numba notices changes of a function, but not of those that it calls
+        _forget_compiled(copy, code)
+
+
+def _forget_compiled(copy: Path, code: str) -> None:
+    """Delete all compiled functions, before and after a module that has some is changed.
+
+    Numba notices changes of a function, but not of those that it calls, which may be of any module.
+    """
+    if "compiled" in code or "njit" in code:
+        shutil.rmtree(copy / ".numba", ignore_errors=True)
 
 
 def _fails(copy: Path, paths: list[str]) -> bool:

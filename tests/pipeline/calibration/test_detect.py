@@ -180,3 +180,18 @@ def test_an_even_number_of_shifted_rows_without_its_mark_may_be_upside_down_and_
     assert not found.oriented
     truth = seen(board, T)
     assert min(np.abs(found.points_px - one).max() for one in (truth, truth[::-1])) < 0.5
+
+
+def test_more_circles_than_the_board_has_are_not_called_some_of_them():
+    """Dots in no rows: all are counted, and none is said to be missing."""
+    rng = np.random.default_rng(3)
+    gray = np.full((480, 640), 235, np.uint8)
+    grid = np.stack(np.meshgrid(np.arange(30, 610, 48), np.arange(30, 460, 44)), axis=-1).reshape(-1, 2)
+    for x, y in (grid + rng.uniform(-14.0, 14.0, grid.shape)).astype(int).tolist():
+        cv2.circle(gray, (x, y), 8, 20, -1, cv2.LINE_AA)
+    found = detect(gray, BOARDS["thesis"])
+    assert not found.found
+    assert len(found.blobs_px) > 99
+    assert (
+        f"{len(found.blobs_px)} circles are seen, but no straight rows of 11 x 9 among them" in found.reason
+    )

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.depth.fillers import PEERS
+from pipeline.depth.fillers import COLOR_SIGMA, LEAST_WEIGHT, PEERS, SPACE_SIGMA_PX, WINDOW_PX, weighted_means
 from pipeline.types import DepthMap
 
 HEIGHT_PX, WIDTH_PX = 60, 80
@@ -65,3 +65,19 @@ def test_joint_bilateral_follows_the_colours_across_a_hole():
 def test_a_frame_without_depth_is_refused(name):
     with pytest.raises(InputError, match="no valid pixel"):
         PEERS[name](DepthMap(np.full((HEIGHT_PX, WIDTH_PX), np.nan, np.float32)), grey())
+
+
+def test_a_bilateral_mean_weighs_distance_in_the_image_and_in_colour():
+    """Two known pixels around an unknown one: 2 m at (2, -3) in its colour, 3 m at (1, 0) in another."""
+    size = 2 * WINDOW_PX + 1
+    z_m, colors = np.zeros((size, size), np.float32), np.zeros((size, size, 3), np.float32)
+    known, at = np.zeros((size, size), bool), WINDOW_PX
+    for down, right, depth_m, levels in ((2, -3, 2.0, 0.0), (1, 0, 3.0, 30.0)):
+        z_m[at + down, at + right], known[at + down, at + right] = depth_m, True
+        colors[at + down, at + right] = levels
+    near = np.exp(-13.0 / (2.0 * SPACE_SIGMA_PX**2)) * (1.0 + LEAST_WEIGHT)
+    other = np.exp(-1.0 / (2.0 * SPACE_SIGMA_PX**2)) * (
+        np.exp(-900.0 / (2.0 * COLOR_SIGMA**2)) + LEAST_WEIGHT
+    )
+    mean_m = weighted_means(z_m, known, colors, np.array([at]), np.array([at]))
+    assert mean_m == pytest.approx((2.0 * near + 3.0 * other) / (near + other), rel=1e-5)

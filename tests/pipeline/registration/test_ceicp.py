@@ -124,3 +124,14 @@ def test_normals_that_agree_alike_leave_the_weights_of_the_distances():
     method = CeicpA(0.05, 0.05, 0.05, 0.85)
     with_normals = method.weigh(facing(distances_m, np.full(50, 0.8)))
     np.testing.assert_allclose(with_normals.weights, method.weigh(pairs_at(distances_m)).weights, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("direction", "shares"), [("q2p", (0.4, 1.0)), ("p2q", (1.0, 0.25)), ("both", (1.0, 1.0))]
+)
+def test_a_wide_kernel_matches_2000_points_of_the_cloud_that_looks_for_partners(direction, shares):
+    rng = np.random.default_rng(0)
+    source, target = (PointCloud(rng.uniform(0.0, 1.0, (count, 3))) for count in (5000, 8000))
+    config = RegistrationConfig("ceicp-a", direction=direction)
+    method = CeicpA.starting(config, source, target)
+    assert (method.least_source_share, method.least_target_share) == shares
