@@ -55,22 +55,34 @@ def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
     points, voxel_m = yield from part(steps, "mapping", 0.55, 0.95, detail=True)
     T_depth_color = inverse(recording.view(0).T_color_depth)
     poses = tuple(None if T is None else T @ T_depth_color for T in T_world_depth)
-    frames, unreadable = [], []
-    for number in views_of(trajectory, track):
-        yield Progress(f"reading frame {number}", 0.95)
-        pose = poses[number]
-        assert pose is not None
-        try:
-            frames.append(replace(recording.frame(number), T_world_camera=pose, pose_known=True))
-        except InputError as error:
-            unreadable.append(f"{error}: frame {number} gives no colours")
-    if not frames:
-        raise InputError(unreadable[0])
+    frames, unreadable = yield from _photographed(recording, poses, views_of(trajectory, track))
     colored = replace(points, colors=colors_of(points, frames))
     notes = (*recording.notes, *given.notes, *turned, *unreadable)
     keyframes, links = tuple(trajectory.keyframes), trajectory.links
     walk = Walk(recording.times_s, poses, keyframes, links, colored, voxel_m, notes)
     return Rig(recording.name, tuple(frames), walk=walk)
+
+
+def _photographed(
+    recording: Recording, T_world_camera: Sequence[FloatArray | None], numbers: Sequence[int]
+) -> Generator[Progress, None, tuple[list[RgbdFrame], list[str]]]:
+    """Read some frames, which get their poses; returns them, and a sentence on each that cannot be read.
+
+    Raises:
+        InputError: none can be read.
+    """
+    frames, unreadable = [], []
+    for number in numbers:
+        yield Progress(f"reading frame {number}", 0.95)
+        T = T_world_camera[number]
+        assert T is not None
+        try:
+            frames.append(replace(recording.frame(number), T_world_camera=T, pose_known=True))
+        except InputError as error:
+            unreadable.append(f"{error}: frame {number} gives no colours")
+    if not frames:
+        raise InputError(unreadable[0])
+    return frames, unreadable
 
 
 def iterate_map(

@@ -108,6 +108,23 @@ def test_too_few_frames_or_no_depth_is_one_sentence(recording):
         drain(iterate_walk(blind))
 
 
+def test_a_photograph_that_cannot_be_read_is_named_and_the_others_give_the_colours(
+    recording, rig, monkeypatch
+):
+    first = int(rig.frames[0].name.removeprefix("frame_"))
+    read = type(recording).frame
+
+    def damaged(self, index):
+        if index == first:
+            raise InputError("color.png is no image")
+        return read(self, index)
+
+    monkeypatch.setattr(type(recording), "frame", damaged)
+    again = drain(iterate_walk(recording))
+    assert [frame.name for frame in again.frames] == [frame.name for frame in rig.frames[1:]]
+    assert again.notes == (f"color.png is no image: frame {first} gives no colours",)
+
+
 def test_points_that_no_view_measured_are_grey(recording):
     frame = replace(recording.frame(0), T_world_camera=recording.T_true[0])
     ahead = recording.T_true[0][:3, 3] + 0.3 * recording.T_true[0][:3, 2]  # in free space
