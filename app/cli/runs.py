@@ -85,7 +85,11 @@ def iterate_run(
     """
     rig, report = yield from iterate_imported(source, out)
     spec, cache = Spec(rig, preset, config), RunCache()
-    yield from run(spec, cache, ["rig"])
+    loading = run(spec, cache, ["rig"])
+    if isinstance(rig, Recorded):
+        yield from loading
+    else:
+        drain(loading)
     writable_folder(out)
     result = yield from iterate_reconstruction(spec, cache)
     beside = None if baseline is None else (yield from compute(spec, baseline, cache)).value
