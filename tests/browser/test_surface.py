@@ -46,16 +46,25 @@ def numbers(page, row):
     return [float(value) for value in re.findall(r"\d+(?:\.\d+)?", text)]
 
 
-def text_beside(page, row, shown):
-    """The text of a row at the moment when another text is shown: a moment later both may be others."""
-    found = page.wait_for_function(
+def watch(page, row, shown):
+    """Have the page keep the text of a row as it is when another text is first shown, however shortly."""
+    page.evaluate(
         """([row, shown]) => {
-          const rows = [...document.querySelectorAll("tr")].map((one) => one.innerText);
-          return new RegExp(shown).test(document.body.innerText) && rows.find((text) => text.includes(row));
+          window.beside = null;
+          const watching = setInterval(() => {
+            if (!new RegExp(shown).test(document.body.innerText)) return;
+            const rows = [...document.querySelectorAll("tr")].map((one) => one.innerText);
+            window.beside = rows.find((text) => text.includes(row));
+            if (window.beside) clearInterval(watching);
+          }, 20);
         }""",
-        arg=[row, shown],
+        [row, shown],
     )
-    return found.json_value()
+
+
+def watched(page):
+    """The text of the row that ``watch`` was given, once the other text was shown."""
+    return page.wait_for_function("() => window.beside").json_value()
 
 
 def invented_px(png):
@@ -65,13 +74,16 @@ def invented_px(png):
 
 
 def test_a_dragged_radius_is_shown_at_once_and_measured_when_it_rests(surface):
-    before, triangles = canvas(surface), text_beside(surface, "Triangles", "Up to date")
+    before = canvas(surface)
+    watch(surface, "Triangles", "Up to date")
+    triangles = watched(surface)
     handle = slider(surface, "Radius (mm)")
     handle.focus()
     quick = r"triangles over [\d,]+ points"
+    watch(surface, "Triangles", quick)
     for _ in range(40):
         handle.press("ArrowLeft")
-    assert text_beside(surface, "Triangles", quick) == triangles
+    assert watched(surface) == triangles
     expect(surface.get_by_text(re.compile(quick))).to_have_count(0)
     row = surface.get_by_role("row", name="Triangles")
     expect(row).not_to_have_text(triangles, use_inner_text=True)
