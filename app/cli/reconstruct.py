@@ -83,8 +83,9 @@ def recording_sentences(metrics: dict[str, Any]) -> list[str]:
 
     recording = metrics["recording"]
     summary = (
-        f"{recording['frames']} frames over {recording['path_m']:.1f} m: {recording['keyframes']} keyframes, "
-        f"{recording['loops']} loops, {recording['frames_per_s']:.0f} frames a second"
+        f"Tracked {recording['frames']} frames over {recording['path_m']:.1f} m at "
+        f"{recording['frames_per_s']:.0f} frames a second; keyframes: {recording['keyframes']}, loops: "
+        f"{recording['loops']}"
     )
     return [summary, *lost_sentences(recording["lost"], recording["frames"])]
 

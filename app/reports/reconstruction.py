@@ -101,8 +101,8 @@ def _recording(metrics: dict[str, Any]) -> Iterator[Markup]:
     recording = metrics["recording"]
     yield Markup(
         '<p class="lead">A recording of <b>{frames:,}</b> frames: the camera went {path_m:.1f} m; '
-        "{keyframes} keyframes, joined by {loops} loops; {map_points:,} points measured in voxels of "
-        "{voxel_mm:.0f} mm. Tracking and mapping took {frames_per_s:.0f} frames a second.</p>"
+        "keyframes: {keyframes}, loops: {loops}; {map_points:,} points measured in voxels of "
+        "{voxel_mm:.0f} mm. Tracking and mapping: {frames_per_s:.0f} frames a second.</p>"
     ).format(voxel_mm=1000.0 * recording["voxel_m"], **recording)
     for sentence in lost_sentences(recording["lost"], recording["frames"]):
         yield Markup('<p class="lead"><b>{}.</b></p>').format(sentence)

@@ -11,14 +11,13 @@ from lab.walks.held_out import FramesInMemory, WalkTask
 from lab.walks.judging import Mesh, Program, Row, WalkAnswer, measured
 from packetmesh.progress import drain
 from pipeline.config import PRESETS
-from pipeline.kernels.geometry import inverse
-from pipeline.recording.loops import iterate_loops
-from pipeline.recording.places import iterate_joins, parts_of
-from pipeline.recording.tracking import Track, iterate_tracking
+from pipeline.recording.loops import iterate_loops, poses_by_tracking
+from pipeline.recording.places import iterate_joins
+from pipeline.recording.tracking import iterate_tracking
 from pipeline.recording.walk import iterate_walk
 from pipeline.surface.ball_pivoting import roll_or_nothing
 from pipeline.surface.radii import radii, spacing
-from pipeline.types import FloatArray, PointCloud, PointSource
+from pipeline.types import PointCloud, PointSource
 
 OURS = "packetmesh"
 OURS_TRACKING = "packetmesh, tracking"
@@ -36,7 +35,8 @@ def solve_own(task: WalkTask) -> Row:
 
 
 def _tracked(frames: FramesInMemory) -> WalkAnswer:
-    return WalkAnswer(poses_without_loops(drain(iterate_tracking(frames))))
+    track = drain(iterate_tracking(frames))
+    return WalkAnswer(poses_by_tracking(track) if track.clouds else (None,) * len(frames.times_s))
 
 
 def _looped(frames: FramesInMemory) -> WalkAnswer:
@@ -57,30 +57,6 @@ def _rolled(points: PointCloud) -> Mesh:
     cloud = replace(points, source=np.full(len(points), PointSource.SENSOR, np.uint8))
     found = roll_or_nothing(cloud, radii(PRESETS["packetmesh"].surface, *spacing(cloud.points_m)))
     return Mesh(found.vertices_m, found.triangles)
-
-
-def poses_without_loops(track: Track) -> tuple[FloatArray | None, ...]:
-    """Return (4, 4) poses along the links of tracking, in the first keyframe's frame.
-
-    Frames outside the largest part have no pose, as at the end.
-    """
-    if not track.clouds:
-        return (None,) * len(track.frames)
-    poses: dict[int, FloatArray] = {parts_of(list(track.clouds), track.links)[0][0]: np.eye(4)}
-    for _ in track.links:  # a keyframe that was found again may hang on a later one
-        for one in track.links:
-            if one.target in poses and one.source not in poses:
-                poses[one.source] = poses[one.target] @ one.T_target_source
-            elif one.source in poses and one.target not in poses:
-                poses[one.target] = poses[one.source] @ inverse(one.T_target_source)
-        if all(one.source in poses for one in track.links):
-            break
-    return tuple(
-        None
-        if frame is None or frame.keyframe not in poses
-        else poses[frame.keyframe] @ frame.T_keyframe_frame
-        for frame in track.frames
-    )
 
 
 OWN: dict[str, Program] = {OURS: _mapped, OURS_LOOPS: _looped, OURS_TRACKING: _tracked}

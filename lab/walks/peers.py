@@ -14,15 +14,14 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from lab.benchmarks.benchmark import run_alone
 from lab.walks.held_out import FramesInMemory, WalkTask
 from lab.walks.judging import Mesh, Program, Row, WalkAnswer, measured
-from pipeline.kernels.geometry import inverse, pixel_rays, rigid
+from pipeline.kernels.geometry import inverse, orthonormal, pixel_rays
 from pipeline.kernels.open3d_runtime import o3d
 from pipeline.kernels.rays import tensor
-from pipeline.recording.volume import voxel_for
+from pipeline.recording.walk import voxel_edge_m
 from pipeline.types import FloatArray
 
 odometry: Any = o3d.t.pipelines.odometry
@@ -71,21 +70,12 @@ def solve_peer(task: WalkTask) -> Row:
     return measured(task, peer.program)
 
 
-def voxel_like_ours(frames: FramesInMemory) -> float:
-    """Return the edge of our map's voxels, metres, at the median depth of a few frames."""
-    found = []
-    for view in frames.views[:: max(1, len(frames.views) // 5)]:
-        z_m = np.median(view.depth.z_m[view.depth.valid], keepdims=True)
-        found.append((view.noise.sd_m(z_m)[0], z_m[0] / view.camera.fx_px))
-    noise_m, pixel_m = np.median(found, axis=0)
-    return voxel_for(float(noise_m), float(pixel_m))
-
-
 def _open3d_slam(frames: FramesInMemory, voxel_m: float | None = None) -> WalkAnswer:
     """Run Open3D's dense SLAM, frame to model by ray casting, on the CPU; by default with our voxels."""
     slam, device = o3d.t.pipelines.slam, o3d.core.Device("CPU:0")
     camera = frames.frames[0].intrinsics
-    model = slam.Model(voxel_m or voxel_like_ours(frames), 16, 10_000, tensor(np.eye(4), np.float64), device)
+    edge_m = voxel_m or voxel_edge_m(frames, range(len(frames.views)))
+    model = slam.Model(edge_m, 16, 10_000, tensor(np.eye(4), np.float64), device)
     matrix = tensor(camera.matrix, np.float64)
     seen, cast = (slam.Frame(camera.height_px, camera.width_px, matrix, device) for _ in range(2))
     T: FloatArray = np.eye(4)
@@ -96,7 +86,7 @@ def _open3d_slam(frames: FramesInMemory, voxel_m: float | None = None) -> WalkAn
         step = np.eye(4) if k == 0 else _slam_step(model, seen, cast)
         poses.append(None if step is None else T @ step)
         if step is not None:
-            T = _rigid(T @ step)
+            T = orthonormal(T @ step)
         model.update_frame_pose(k, tensor(T, np.float64))
         if step is not None:
             model.integrate(seen, UNITS_PER_METRE, FARTHEST_M)
@@ -146,7 +136,7 @@ def _open3d_odometry(frames: FramesInMemory) -> WalkAnswer:
             except RuntimeError:  # too few inliers to solve for a motion
                 poses.append(None)
                 continue
-            T = _rigid(T @ found.transformation.numpy())
+            T = orthonormal(T @ found.transformation.numpy())
         before = image
         poses.append(T)
     return WalkAnswer(tuple(poses))
@@ -168,7 +158,7 @@ def _small_gicp(frames: FramesInMemory) -> WalkAnswer:
         thin, _ = small_gicp.preprocess_points(points_m, GICP_THIN_M)
         if k:
             found = small_gicp.align(model, thin, T @ motion, GICP_GATE_M)
-            T_new = _rigid(found.T_target_source)
+            T_new = orthonormal(found.T_target_source)
             motion, T = inverse(T) @ T_new, T_new
         model.insert(thin, T)
         poses.append(T)
@@ -191,11 +181,6 @@ def _kiss_icp(frames: FramesInMemory) -> WalkAnswer:
         tracker.register_frame(points_m, np.empty(0))
         poses.append(np.array(tracker.last_pose))
     return WalkAnswer(tuple(poses))
-
-
-def _rigid(T: FloatArray) -> FloatArray:
-    """Return a (4, 4) pose without the rounding errors of its rotation, which grow from frame to frame."""
-    return rigid(Rotation.from_matrix(T[:3, :3]).as_matrix(), T[:3, 3])
 
 
 def _images(frames: FramesInMemory) -> Iterator[tuple[Any, Any]]:

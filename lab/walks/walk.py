@@ -9,7 +9,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from lab.places.pairs import FOV_DEG
 from lab.walks.path import RATE_HZ, walk_poses
@@ -20,6 +19,7 @@ from lab.worlds.scene import Rng, Scene
 from lab.worlds.sensor import sense_depth
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, writable_folder
+from pipeline.folders.walk import write_tum
 from pipeline.importing.tum import UNITS_PER_METRE
 from pipeline.io.images import write_color
 from pipeline.io.intrinsics import write_intrinsics
@@ -115,10 +115,7 @@ def _write_lists(folder: Path, poses: Sequence[FloatArray]) -> None:
         ]
         for kind in ("rgb", "depth")
     }
-    lines[TRUE_POSES] = ["# camera to world: time in seconds, tx ty tz in metres, qx qy qz qw"]
-    for time, T in zip(times, poses, strict=True):
-        numbers = (*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_quat())
-        lines[TRUE_POSES].append(" ".join([time, *(f"{number:.9f}" for number in numbers)]))
+    write_tum(folder / TRUE_POSES, np.arange(len(poses)) / RATE_HZ, poses)
     for name, text in lines.items():
         with atomic_path(folder / name) as temporary:
             temporary.write_text("\n".join(text) + "\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,17 @@ def write_trajectory(folder: Path, walk: Walk) -> list[Path]:
     return files
 
 
+def write_tum(file: Path, times_s: FloatArray, T_world_camera: Sequence[FloatArray | None]) -> None:
+    """Write (4, 4) poses and their (N,) times in TUM's form; those that are None have no line."""
+    lines = ["# time (s), then the camera in the world: tx ty tz (m) qx qy qz qw"]
+    for time_s, T in zip(times_s, T_world_camera, strict=True):
+        if T is not None:
+            values = *T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_quat()
+            lines.append(f"{time_s:.6f} " + " ".join(f"{value:.9f}" for value in values))
+    with atomic_path(file) as temporary:
+        Path(temporary).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
 def walk_metrics(walk: Walk, elapsed_s: float) -> dict[str, Any]:
     """Return the numbers of a recording: counts of frames, metres, frames a second.
 
@@ -73,7 +85,7 @@ def walk_sentences(walk: Walk, shown: int) -> list[str]:
     """Return a summary and a sentence on lost frames; ``shown`` keyframes are the nodes of the rig."""
     summary = (
         f"A recording of {len(walk.times_s)} frames over {path_m(walk.T_world_camera):.1f} m; its colours "
-        f"are those of {shown} of {len(walk.keyframes)} keyframes"
+        f"are those of {shown} of its {len(walk.keyframes)} keyframe{'s' * (len(walk.keyframes) != 1)}"
     )
     return [summary, *lost_sentences(lost_spans(walk.T_world_camera), len(walk.times_s))]
 

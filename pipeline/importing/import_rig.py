@@ -13,9 +13,10 @@ from packetmesh.progress import Progress, part
 from pipeline.importing.bag import is_bag, iterate_bag
 from pipeline.importing.choosing import choose
 from pipeline.importing.depth_units import depth_in
-from pipeline.importing.kinds import kind_of, recognise
+from pipeline.importing.kinds import kind_of
+from pipeline.importing.reading import check_scale, read_sequence
 from pipeline.importing.rig_folder import NodeImages, new_folder, write_node
-from pipeline.importing.sequence import Candidate, Sequence, distinct
+from pipeline.importing.sequence import SAME_VIEW_REMEDY, Candidate, Sequence
 from pipeline.importing.upright import upright
 from pipeline.io.images import NoDepthError, ReadDepth, read_color
 from pipeline.io.same_view import depth_camera_of, same_view_note
@@ -80,8 +81,7 @@ def iterate_import(
     """
     if not 1 <= frames <= MAX_NODES:
         raise InputError(f"A rig of {frames} frames cannot be; try 1 to {MAX_NODES}")
-    if depth_scale is not None and not (np.isfinite(depth_scale) and depth_scale > 0):
-        raise InputError(f"The depth scale is {depth_scale}; try 1000 for images in millimetres")
+    check_scale(depth_scale)
     out = Path(out)
     if out.exists() and not (out.is_dir() and not any(out.iterdir())):
         raise InputError(f"{out} is there already; try another name for the rig")
@@ -91,13 +91,8 @@ def iterate_import(
                 f"The cameras of the bag {path} are read from its camera_info; try without intrinsics"
             )
         return (yield from _from_bag(Path(path), out, frames, depth_scale))
-    kind, folder = recognise(Path(path))
     yield Progress("files", 0.0)
-    sequence = kind.read(folder, None if intrinsics is None else Path(intrinsics))
-    if depth_scale is not None:
-        sequence = sequence.with_scale(depth_scale)
-    candidates, repeated = distinct(sequence.candidates)
-    sequence = replace(sequence, candidates=candidates, notes=(*sequence.notes, *repeated))
+    kind, folder, sequence = read_sequence(Path(path), depth_scale, intrinsics)
     yield Progress("choice of frames", 0.2)
     sequence, chosen, middle = _chosen(sequence, frames)
     written = []
@@ -185,8 +180,8 @@ def _node_of(candidate: Candidate, sequence: Sequence, T_up_world: FloatArray | 
     rgb, depth = read_color(candidate.color), depth_in(candidate, sequence).depth
     depth_camera, T_color_depth = sequence.depth_camera, sequence.T_color_depth
     if depth_camera is None and rgb.shape[:2] == (camera.height_px, camera.width_px):
-        remedy = "try a recording whose depth shows the view of its colour images"
-        depth_camera = depth_camera_of(camera, depth.z_m.shape, candidate.depth, candidate.color, remedy)
+        shape = depth.z_m.shape
+        depth_camera = depth_camera_of(camera, shape, candidate.depth, candidate.color, SAME_VIEW_REMEDY)
         T_color_depth = None if depth_camera is None else np.eye(4)
     return NodeImages(
         str(candidate.color),

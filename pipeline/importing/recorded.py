@@ -13,8 +13,9 @@ import numpy as np
 from packetmesh.errors import InputError
 from pipeline.importing.bag import is_bag
 from pipeline.importing.depth_units import depth_in
-from pipeline.importing.kinds import recognise
-from pipeline.importing.sequence import Candidate, Sequence, distinct
+from pipeline.importing.kinds import kind_of
+from pipeline.importing.reading import check_scale, read_sequence
+from pipeline.importing.sequence import SAME_VIEW_REMEDY, Candidate, Sequence
 from pipeline.io.depth_to_color import register_depth
 from pipeline.io.images import NoDepthError, read_color
 from pipeline.io.same_view import depth_camera_of
@@ -25,7 +26,6 @@ FRAMES_PER_S = 30.0
 """Frame rate that is assumed for a recording without times."""
 KINECT = DepthNoise(s0_m=0.0012, s1_m=0.0015, p=2.0, q=1.0)
 """Noise that is assumed for every sensor: within a tenth of ``acquisition.depth_sigma_m`` from 1.5 to 4 m."""
-REMEDY = "try a recording whose depth shows the view of its colour images"
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +128,8 @@ class FolderRecording:
         camera, T_color_depth = self.sequence.depth_camera, self.sequence.T_color_depth
         if camera is None or T_color_depth is None:
             own = candidate.camera or self.sequence.camera
-            return depth_camera_of(own, shape, candidate.depth, candidate.color, REMEDY) or own, np.eye(4)
+            files = candidate.depth, candidate.color
+            return depth_camera_of(own, shape, *files, SAME_VIEW_REMEDY) or own, np.eye(4)
         if shape != (camera.height_px, camera.width_px):
             raise InputError(
                 f"The depth image {candidate.depth} has {shape[1]} x {shape[0]} pixels and its camera "
@@ -155,16 +156,15 @@ def open_recording(
     Raises:
         InputError: the path is no usable recording, or no frame has depth.
     """
-    if is_bag(Path(path)):
-        raise InputError(f"{path} is a bag; try `packetmesh import {path} --out RIG` for some of its moments")
-    if depth_scale is not None and not (np.isfinite(depth_scale) and depth_scale > 0):
-        raise InputError(f"The depth scale is {depth_scale}; try 1000 for images in millimetres")
-    kind, folder = recognise(Path(path))
-    sequence = kind.read(folder, None if intrinsics is None else Path(intrinsics))
-    if depth_scale is not None:
-        sequence = sequence.with_scale(depth_scale)
-    candidates, repeated = distinct(sequence.candidates)
-    sequence = replace(sequence, candidates=candidates, notes=(*sequence.notes, *repeated))
+    place = Path(path)
+    bags = [place] if is_bag(place) else [file for file in sorted(place.glob("*")) if is_bag(file)]
+    if bags and (place in bags or kind_of(place) is None):
+        raise InputError(
+            f"{bags[0]} is a bag, which is not read frame by frame; try `packetmesh import {bags[0]} --out "
+            "RIG` for some of its moments"
+        )
+    check_scale(depth_scale)
+    kind, folder, sequence = read_sequence(place, depth_scale, intrinsics)
     if next(_with_depth(sequence), None) is None:
         raise NoDepthError(f"No frame of {folder} has depth; check the depth images and the depth scale")
     return FolderRecording(kind.name, folder, sequence)

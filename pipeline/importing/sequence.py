@@ -15,6 +15,8 @@ from pipeline.types import CameraIntrinsics, FloatArray
 
 DEPTH_SUFFIXES = (".png", ".tif", ".tiff", ".npy", ".pfm", ".exr", ".pgm")
 """File name suffixes of depth images."""
+SAME_VIEW_REMEDY = "try a recording whose depth shows the view of its colour images"
+"""What to try where depth is not in proportion to colour."""
 
 
 @dataclass(frozen=True, slots=True)

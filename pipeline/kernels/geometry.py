@@ -26,6 +26,12 @@ def inverse(T_a_b: FloatArray) -> FloatArray:
     return rigid(rotation, -rotation @ T_a_b[:3, 3])
 
 
+def orthonormal(T_a_b: FloatArray) -> FloatArray:
+    """Return a (4, 4) pose without the rounding errors of its rotation, which grow with each product."""
+    left, _, right = np.linalg.svd(T_a_b[:3, :3])
+    return rigid(left @ right, T_a_b[:3, 3])
+
+
 def apply(T_a_b: FloatArray, points_m: FloatArray) -> FloatArray:
     """Transform (N, 3) points from frame b to frame a."""
     moved_m = points_m @ T_a_b[:3, :3].T

@@ -150,6 +150,11 @@ def _reconciled(
     return solved, used
 
 
+def poses_by_tracking(track: Track) -> tuple[FloatArray | None, ...]:
+    """Return (4, 4) poses of all frames along the links of tracking alone, as in ``Trajectory``."""
+    return tuple(_frame_poses(track, _chain(track)))
+
+
 def _frame_poses(track: Track, poses: Mapping[int, FloatArray]) -> Iterator[FloatArray | None]:
     """Yield the pose of every frame, which hangs on its keyframe."""
     for frame in track.frames:

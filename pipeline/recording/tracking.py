@@ -10,13 +10,12 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import Progress
 from pipeline.config import RegistrationConfig
 from pipeline.importing.recorded import DepthView
-from pipeline.kernels.geometry import inverse, rigid, rotation_angle_rad, rotation_exp
+from pipeline.kernels.geometry import inverse, orthonormal, rigid, rotation_angle_rad, rotation_exp
 from pipeline.kernels.threads import threads
 from pipeline.recording.recording import Recording
 from pipeline.registration.graph.edges import registration_information, small_motion
@@ -246,10 +245,7 @@ def registered(
         return None
     if not result.steps:
         return None
-    T = result.T_target_source
-    T = rigid(
-        Rotation.from_matrix(T[:3, :3]).as_matrix(), T[:3, 3]
-    )  # orthonormal: else rounding errors double each frame
+    T = orthonormal(result.T_target_source)  # rounding errors double with each predicted frame
     information = registration_information(result, source.points_m, source.normals, target.normals)
     if T_predicted is not None:
         T = steadied(T, information, T_predicted)

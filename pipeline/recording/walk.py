@@ -11,6 +11,7 @@ from packetmesh.errors import InputError
 from packetmesh.progress import Progress, part
 from pipeline.importing.upright import upright
 from pipeline.kernels.geometry import LEVEL_POSE, apply, inverse, project
+from pipeline.recording.errors import ate_m
 from pipeline.recording.given import checked_poses
 from pipeline.recording.loops import Trajectory, iterate_loops
 from pipeline.recording.places import iterate_joins
@@ -57,7 +58,7 @@ def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
     poses = tuple(None if T is None else T @ T_depth_color for T in T_world_depth)
     frames, unreadable = yield from _photographed(recording, poses, views_of(trajectory, track))
     colored = replace(points, colors=colors_of(points, frames))
-    notes = (*recording.notes, *given.notes, *turned, *unreadable)
+    notes = (*recording.notes, *given.notes, *_corrected(poses, given.T_world_camera), *turned, *unreadable)
     keyframes, links = tuple(trajectory.keyframes), trajectory.links
     walk = Walk(recording.times_s, poses, keyframes, links, colored, voxel_m, notes)
     return Rig(recording.name, tuple(frames), walk=walk)
@@ -95,7 +96,7 @@ def iterate_map(
         T_world_depth: (4, 4) pose of the depth camera at each frame; None where it is unknown.
     """
     numbers = [k for k, T in enumerate(T_world_depth) if T is not None]
-    voxel_m = voxel_for(*_noise_and_pixel_m(recording, numbers))
+    voxel_m = voxel_edge_m(recording, numbers)
     volume = Volume(voxel_m)
     for count, (k, view) in enumerate(read_ahead(recording, numbers)):
         if count % REPORTED == 0:
@@ -107,15 +108,27 @@ def iterate_map(
     return volume.points(least), voxel_m
 
 
-def _noise_and_pixel_m(recording: Recording, numbers: Sequence[int]) -> tuple[float, float]:
-    """Return the median noise and distance of two pixels, metres, at the median depth of a few frames."""
+def _corrected(
+    T_world_camera: Sequence[FloatArray | None], given: Sequence[FloatArray] | None
+) -> tuple[str, ...]:
+    """Return a sentence on how far the camera's path is from that of the given poses."""
+    if given is None:
+        return ()
+    apart_m = ate_m(T_world_camera, given)
+    if np.isnan(apart_m):
+        return ()
+    return (f"The path differs from that of the given poses by {100.0 * apart_m:.1f} cm (RMSE, aligned)",)
+
+
+def voxel_edge_m(recording: Recording, numbers: Sequence[int]) -> float:
+    """Return the edge of the map's voxels, by noise and pixels at the median depth of a few frames."""
     found = []
     for k in numbers[:: max(1, len(numbers) // 5)]:
         view = recording.view(k)
         z_m = np.median(view.depth.z_m[view.depth.valid], keepdims=True)
         found.append((view.noise.sd_m(z_m)[0], z_m[0] / view.camera.fx_px))
     noise_m, pixel_m = np.median(found, axis=0)
-    return float(noise_m), float(pixel_m)
+    return voxel_for(float(noise_m), float(pixel_m))
 
 
 def _world(

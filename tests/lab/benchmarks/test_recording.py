@@ -8,10 +8,11 @@ import pytest
 from lab.benchmarks.recording import summary
 from lab.walks.held_out import FIRST_ROOM, WalkTask, frames_in_memory, held_out_walks
 from lab.walks.judging import Mesh, map_errors, rpe_m, to_truth, trajectory_errors
-from lab.walks.ours import OURS, OWN, poses_without_loops, solve_own
+from lab.walks.ours import OURS, OWN, solve_own
 from lab.walks.peers import available_walk_peers, solve_peer
 from lab.walks.walk import kinect, read_truth
 from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
+from pipeline.recording.loops import poses_by_tracking
 from pipeline.recording.tracking import Track, Tracked
 from pipeline.types import Link
 
@@ -85,7 +86,7 @@ def test_tracked_poses_follow_the_links_and_other_parts_have_none():
     links = (Link(1, 0, step, np.eye(6), 0.9, 0.9, False), Link(2, 1, step, np.eye(6), 0.9, 0.9, False))
     frames = (*[Tracked(k, np.eye(4)) for k in range(3)], Tracked(2, step), None, Tracked(5, np.eye(4)))
     clouds = dict.fromkeys((0, 1, 2, 5), SimpleNamespace())
-    poses = poses_without_loops(Track(frames, clouds, links))
+    poses = poses_by_tracking(Track(frames, clouds, links))
     assert [None if T is None else T[0, 3] for T in poses] == [0.0, 1.0, 2.0, 3.0, None, None]
 
 

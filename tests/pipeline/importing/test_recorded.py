@@ -321,8 +321,14 @@ def test_what_cannot_be_used_gets_one_sentence(tmp_path, spoil, says):
 def test_a_bag_is_sent_to_import(tmp_path):
     bag = tmp_path / "room.bag"
     bag.write_bytes(b"#ROSBAG V2.0\n")
-    with pytest.raises(InputError, match=r"room.bag is a bag; try `packetmesh import .*room.bag --out RIG`"):
+    with pytest.raises(
+        InputError, match=r"room.bag is a bag, .*; try `packetmesh import .*room.bag --out RIG`"
+    ):
         open_recording(bag)
+    with pytest.raises(
+        InputError, match=r"room.bag is a bag, .*; try `packetmesh import .*room.bag --out RIG`"
+    ):
+        open_recording(tmp_path)
 
 
 @pytest.mark.parametrize("scale", [0.0, -1.0, np.nan, np.inf])

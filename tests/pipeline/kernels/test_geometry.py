@@ -98,3 +98,13 @@ def test_the_camera_of_a_resized_image_sees_each_direction_at_the_same_place_of_
 )
 def test_an_image_of_other_proportions_is_of_another_camera(size_px, fits):
     assert (geometry.scaled_to(DISTORTED, *size_px) is not None) == fits
+
+
+def test_rounding_errors_of_a_rotation_go_and_its_position_stays():
+    T = geometry.rigid(geometry.rotation_exp(np.array([0.3, -0.2, 0.9])), np.array([1.0, 2.0, 3.0]))
+    spoilt = T.copy()
+    spoilt[:3, :3] += 1e-6 * np.arange(9.0).reshape(3, 3)
+    found = geometry.orthonormal(spoilt)
+    np.testing.assert_allclose(found[:3, :3] @ found[:3, :3].T, np.eye(3), atol=1e-14)
+    np.testing.assert_allclose(found, T, atol=2e-5)
+    np.testing.assert_array_equal(found[:, 3], T[:, 3])

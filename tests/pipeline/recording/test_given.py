@@ -84,3 +84,11 @@ def test_poses_that_stand_still_contradict_a_camera_that_moves():
 
 def test_a_recording_without_poses_has_none():
     assert checked_poses(in_the_living_room(around(6))).T_world_camera is None
+
+
+def test_a_path_says_how_far_it_is_from_the_given_poses():
+    """Every other pose is 1 cm up and every other one 1 cm down."""
+    truth = around(40)
+    shaken = [moved([0, 0, 1], 0.0, [0, 0, 0.01 * (-1) ** k]) @ T for k, T in enumerate(truth)]
+    rig = drain(iterate_walk(written(shaken)))
+    assert any("differs from that of the given poses by 1.0 cm" in note for note in rig.notes)
