@@ -249,6 +249,10 @@ class Walk:
     map: PointCloud
     """Measured points of all frames, with normals and ``sigma_m``, in the world frame."""
     voxel_m: float
+    first_frames: IntArray
+    """(N,) frame that measured each point of the map first."""
+    T_world_tracked: tuple[FloatArray | None, ...]
+    """Pose of the colour camera at each frame by tracking alone, without loops; equal at the first keyframe."""
     notes: tuple[str, ...] = ()
     """Assumptions and doubts, one sentence each."""
 

@@ -34,6 +34,7 @@ STEEPEST = 4.0
 """Largest change of distance between neighbours, in voxels; it is larger at the edges of near objects."""
 _SIDE, _VOXELS, _PADDED = 8, 512, 11
 """Side and size of a block; side with the voxels for its crossings and slopes: 1 before, 2 after."""
+_MOST = 65535
 _FIRST_BLOCKS, _RANGE, _NEAR_PX, _ONE = 1024, 1 << 20, 3, np.float32(1.0)
 """Room for blocks at first; bound of their coordinates, 21 bits each; pixels for the slope of the depth."""
 
@@ -57,6 +58,8 @@ class _Blocks(NamedTuple):
     the sum of (voxel / standard deviation)^2."""
     seen: IntArray
     """(B, 512) uint16 number of observations; it stops at its maximum."""
+    first: IntArray
+    """(B, 512) uint16 number of the image that observed a voxel first; it stops at its maximum."""
 
 
 class Volume:
@@ -72,7 +75,8 @@ class Volume:
         table, keys, stamps = (np.full(count * _FIRST_BLOCKS, -1) for count in (2, 1, 1))
         means = np.zeros((_FIRST_BLOCKS, _VOXELS, 2), np.float32)
         seen = np.zeros((_FIRST_BLOCKS, _VOXELS), np.uint16)
-        self._store = _Blocks(table, keys, stamps, means, seen)
+        self._images = 0
+        self._store = _Blocks(table, keys, stamps, means, seen, np.zeros_like(seen))
 
     def integrate(
         self, depth: DepthMap, intrinsics: CameraIntrinsics, T_world_camera: FloatArray, noise: DepthNoise
@@ -105,20 +109,30 @@ class Volume:
             if self.blocks < len(self._store.keys):
                 break
             self._store = _grown(self._store)
-        _update(touched, self._store, pixels, to_pixels, self.truncation_m)
+        _update(touched, self._store, pixels, to_pixels, self.truncation_m, min(self._images, _MOST))
+        self._images += 1
 
     def points(self, least_observations: int = 2) -> PointCloud:
+        """Return the points of ``dated_points``."""
+        return self.dated_points(least_observations)[0]
+
+    def dated_points(self, least_observations: int = 2) -> tuple[PointCloud, IntArray]:
         """Find where the distance crosses zero between neighbours along x, y or z; ordered by voxel.
 
         The unit normals are towards the observing cameras (the gradient of the distance), and ``sigma_m`` is
         1 / sqrt(sum of 1 / sd^2), at least ``LEAST_SD`` voxels.
+
+        Returns:
+            The N points, and (N,) the number of the integrated image, from 0, by which both voxels of a point
+            had been observed.
         """
         order = np.argsort(self._store.keys[: self.blocks])
         steepest = STEEPEST * self.voxel_m / self.truncation_m
         found = _crossings(order, self._store, least_observations, steepest)
         found = found[found[:, 6] >= 1.0]
         sigma_m = self.voxel_m * np.maximum(LEAST_SD, 1.0 / np.sqrt(found[:, 6]))
-        return PointCloud(found[:, :3] * self.voxel_m, normals=found[:, 3:6].copy(), sigma_m=sigma_m)
+        points = PointCloud(found[:, :3] * self.voxel_m, normals=found[:, 3:6].copy(), sigma_m=sigma_m)
+        return points, found[:, 7].astype(np.int64)
 
 
 def _grown(store: _Blocks) -> _Blocks:
@@ -252,14 +266,19 @@ def _enter(store: _Blocks, count: int) -> None:
 
 @compiled
 def _update(
-    touched: IntArray, store: _Blocks, pixels: FloatArray, to_pixels: FloatArray, truncation_m: float
+    touched: IntArray,
+    store: _Blocks,
+    pixels: FloatArray,
+    to_pixels: FloatArray,
+    truncation_m: float,
+    image: int,
 ) -> None:
-    """Average a frame into the voxels of its blocks, except behind the truncation."""
+    """Average image number ``image`` into the voxels of its blocks, except behind the truncation."""
     flat, scale = pixels.reshape(-1, 2), np.float32(1.0 / truncation_m)
     at, z_m = np.empty(_VOXELS, dtype=np.int32), np.empty(_VOXELS, dtype=np.float32)
     for block in touched:
         _project(_corner(store.keys[block]), to_pixels, pixels.shape[1], pixels.shape[0], at, z_m)
-        means, seen = store.means[block], store.seen[block]
+        means, seen, first = store.means[block], store.seen[block], store.first[block]
         for voxel in range(_VOXELS):
             if at[voxel] < 0:
                 continue
@@ -267,7 +286,9 @@ def _update(
             if weight > 0.0 and ahead >= -_ONE:
                 means[voxel, 1] += weight
                 means[voxel, 0] += (min(ahead, _ONE) - means[voxel, 0]) * np.divide(weight, means[voxel, 1])
-                seen[voxel] += seen[voxel] < 65535
+                if seen[voxel] == 0:
+                    first[voxel] = image
+                seen[voxel] += seen[voxel] < _MOST
 
 
 @compiled
@@ -300,9 +321,9 @@ def _project(
 
 @compiled
 def _crossings(order: IntArray, store: _Blocks, least: int, steepest: float) -> FloatArray:
-    """Return (N, 7) points, in voxels, normals and weights at zero crossings, block by block in order."""
-    found, many = np.empty((6 * _VOXELS, 7)), 0
-    means = np.empty((_PADDED**3, 2), dtype=np.float32)
+    """Return (N, 8) points, in voxels, normals, weights and first images at zero crossings, by block."""
+    found, many = np.empty((6 * _VOXELS, 8)), 0
+    means = np.empty((_PADDED**3, 3), dtype=np.float32)
     for block in order:
         corner = _corner(store.keys[block])
         _surround(corner, store, least, means)
@@ -323,7 +344,7 @@ def _crossings(order: IntArray, store: _Blocks, least: int, steepest: float) -> 
 
 @compiled
 def _surround(corner: tuple[int, int, int], store: _Blocks, least: int, means: FloatArray) -> None:
-    """Copy the means of the voxels -1 to 9 of a block along each axis, from it and its neighbours.
+    """Copy means and first images of the voxels -1 to 9 of a block along each axis, and of its neighbours.
 
     The distance is NaN where nothing was observed, the weight 0 where there are too few observations.
     """
@@ -339,13 +360,14 @@ def _surround(corner: tuple[int, int, int], store: _Blocks, least: int, means: F
         seen = store.seen[block, voxel] if block >= 0 else 0
         means[here, 0] = store.means[block, voxel, 0] if seen > 0 else np.nan
         means[here, 1] = store.means[block, voxel, 1] if seen > 0 and seen >= least else 0.0
+        means[here, 2] = store.first[block, voxel] if seen > 0 else 0.0
 
 
 @compiled
 def _crossing(means: FloatArray, here: int, axis: int, steepest: float, row: FloatArray) -> float:
     """Return where the distance crosses zero between a voxel and the next along an axis, 0 to 1; -1 if not.
 
-    Both must be closer than the truncation. ``row[3:]`` receives the normal and the weight.
+    Both must be closer than the truncation. ``row[3:]`` receives the normal, the weight and the first image.
     """
     steps = (_PADDED * _PADDED, _PADDED, 1)
     there = here + steps[axis]
@@ -361,6 +383,7 @@ def _crossing(means: FloatArray, here: int, axis: int, steepest: float, row: Flo
         return -1.0
     row[3:6] /= math.sqrt(row[3] ** 2 + row[4] ** 2 + row[5] ** 2)
     row[6] = (1.0 - share) * means[here, 1] + share * means[there, 1]
+    row[7] = max(means[here, 2], means[there, 2])
     return share
 
 

@@ -13,13 +13,13 @@ from pipeline.importing.upright import upright
 from pipeline.kernels.geometry import LEVEL_POSE, apply, inverse, project
 from pipeline.recording.errors import ate_m
 from pipeline.recording.given import checked_poses
-from pipeline.recording.loops import Trajectory, iterate_loops
+from pipeline.recording.loops import Trajectory, iterate_loops, poses_by_tracking
 from pipeline.recording.places import iterate_joins
 from pipeline.recording.recording import Recording
 from pipeline.recording.tracking import REPORTED, WITHIN, Track, iterate_tracking, read_ahead
 from pipeline.recording.volume import Volume, voxel_for
 from pipeline.registration.organised import OrganisedCloud, shared_shares
-from pipeline.types import FloatArray, PointCloud, RgbdFrame, Rig, Walk
+from pipeline.types import FloatArray, IntArray, PointCloud, RgbdFrame, Rig, Walk
 
 LEAST_FRAMES = 2
 LEAST_OBSERVATIONS = 2
@@ -53,14 +53,17 @@ def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
     T_world_first, turned = _world(recording, given.T_world_camera, trajectory)
     T_world_depth = [None if T is None else T_world_first @ T for T in trajectory.T_first_depth]
     steps = iterate_map(recording, T_world_depth)
-    points, voxel_m = yield from part(steps, "mapping", 0.55, 0.95, detail=True)
+    points, first, voxel_m = yield from part(steps, "mapping", 0.55, 0.95, detail=True)
     T_depth_color = inverse(recording.view(0).T_color_depth)
     poses = tuple(None if T is None else T @ T_depth_color for T in T_world_depth)
+    tracked = tuple(
+        None if T is None else T_world_first @ T @ T_depth_color for T in poses_by_tracking(track)
+    )
     frames, unreadable = yield from _photographed(recording, poses, views_of(trajectory, track))
     colored = replace(points, colors=colors_of(points, frames))
     notes = (*recording.notes, *given.notes, *_corrected(poses, given.T_world_camera), *turned, *unreadable)
     keyframes, links = tuple(trajectory.keyframes), trajectory.links
-    walk = Walk(recording.times_s, poses, keyframes, links, colored, voxel_m, notes)
+    walk = Walk(recording.times_s, poses, keyframes, links, colored, voxel_m, first, tracked, notes)
     return Rig(recording.name, tuple(frames), walk=walk)
 
 
@@ -88,8 +91,10 @@ def _photographed(
 
 def iterate_map(
     recording: Recording, T_world_depth: Sequence[FloatArray | None]
-) -> Generator[Progress, None, tuple[PointCloud, float]]:
-    """Integrate all frames with a pose; returns the map's points and the edge of its voxels.
+) -> Generator[Progress, None, tuple[PointCloud, IntArray, float]]:
+    """Integrate all frames with a pose.
+
+    Returns the map's N points, (N,) the frame that measured each first, and the edge of the voxels.
 
     Args:
         recording: the frames.
@@ -105,7 +110,8 @@ def iterate_map(
         assert T is not None
         volume.integrate(view.depth, view.camera, T, view.noise)
     least = LEAST_OBSERVATIONS if len(numbers) >= FEW_FRAMES else 1
-    return volume.points(least), voxel_m
+    points, first = volume.dated_points(least)
+    return points, np.array(numbers)[first], voxel_m
 
 
 def _corrected(

@@ -63,6 +63,16 @@ def test_a_wall_becomes_a_grid_of_points_that_face_the_camera():
     assert len(np.unique(cloud.points_m.round(6), axis=0)) == len(cloud)
 
 
+def test_each_point_knows_the_image_that_measured_it_first():
+    left = wall(1.5034).z_m.copy()
+    left[:, 160:] = np.nan
+    cloud, first = volume_of((DepthMap(left), ORIGIN), (wall(1.5034), ORIGIN)).dated_points(1)
+    x_m = cloud.points_m[:, 0]
+    assert set(first[x_m < -0.01]) == {0}
+    assert set(first[x_m > 0.01]) == {1}
+    assert min(np.sum(x_m < -0.01), np.sum(x_m > 0.01)) > 1000
+
+
 @pytest.mark.parametrize("angle_deg", [20.0, 50.0])
 def test_a_tilted_plane_stays_where_it_is(angle_deg):
     """Of one view with nearest pixels: within half a pixel's slope, and in the mean exact."""

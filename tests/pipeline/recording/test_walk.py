@@ -56,6 +56,23 @@ def test_the_map_lies_on_the_surfaces_and_looks_at_the_cameras(rig, recording):
     np.testing.assert_allclose(np.linalg.norm(points.normals, axis=1), 1.0, atol=1e-6)
 
 
+def test_the_map_grows_with_the_frames_that_measured_it(rig, recording):
+    first = rig.walk.first_frames
+    assert first.shape == (len(rig.walk.map),)
+    assert first.min() == 0
+    assert first.max() > 20
+    for number in (0, 10):
+        own_m = apply(inverse(rig.walk.T_world_camera[number]), rig.walk.map.points_m[first == number])
+        pixels = project(recording.frame(number).intrinsics, own_m)
+        inside = np.all((pixels > -3.0) & (pixels < [322.0, 242.0]), axis=1)
+        assert inside.mean() > 0.98
+
+
+def test_the_tracked_path_begins_where_the_final_one_does(rig, recording):
+    np.testing.assert_allclose(rig.walk.T_world_tracked[0], rig.walk.T_world_camera[0], atol=1e-9)
+    assert 0.0 < ate_m(rig.walk.T_world_tracked, recording.T_true) < 0.01
+
+
 def test_the_map_has_the_colours_of_the_photographs(rig, recording):
     own_m = in_the_true_world(rig, recording, rig.walk.map.points_m)
     apart = np.abs(color_at(own_m).astype(int) - rig.walk.map.colors.astype(int)).max(axis=1)
