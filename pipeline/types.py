@@ -252,7 +252,7 @@ class Walk:
     first_frames: IntArray
     """(N,) frame that measured each point of the map first."""
     T_world_tracked: tuple[FloatArray | None, ...]
-    """Pose of the colour camera at each frame by tracking alone, without loops; equal at the first keyframe."""
+    """Pose of the colour camera at each frame by tracking alone; the same at the first keyframe."""
     notes: tuple[str, ...] = ()
     """Assumptions and doubts, one sentence each."""
 

@@ -21,29 +21,76 @@ _LEAST_GAP = 1e-2
 """Least gap between the two smallest eigenvalues, relative to the whole range, for the closed form."""
 
 
-def patch_normals(tree: KdTree, neighbours: int, places: IntArray | None = None) -> FloatArray:
+def patch_normals(tree: KdTree, neighbours: int) -> FloatArray:
     """Return unit normals, of either sign, of the planes fitted to the nearest neighbours of a tree's points.
 
     Args:
         tree: tree of N points.
         neighbours: points per plane, including the point itself.
-        places: (M,) indices in the tree's order, best ascending, as consecutive points are then close; None
-            for all points.
 
     Returns:
-        (M, 3) normals; for all points (N, 3) in the order of the original points.
+        (N, 3) normals, in the order of the original points.
     """
-    queries = np.arange(len(tree)) if places is None else places
-    normals = np.empty((len(queries), 3))
-    count = min(neighbours, len(tree))
+    normals = np.empty((len(tree), 3))
+    count, queries = min(neighbours, len(tree)), np.arange(len(tree))
+    unused = np.empty((0, 0), np.int64), np.empty((0, 0))
 
     def work(first: int, last: int) -> None:
-        _normals(*tree.parts, queries, first, last, count, normals)
+        _normals(*tree.parts, queries, first, last, count, normals, *unused)
+
+    in_parts(work, len(tree))
+    normals[tree.order] = normals.copy()
+    return normals
+
+
+def shared_normals(tree: KdTree, neighbours: int, rows: IntArray) -> FloatArray:
+    """Return (N, 3) unit normals like ``patch_normals``, by the planes around some of the points only.
+
+    A point takes the normal of the nearest of these that counts it among its neighbours; the few points that
+    none does get their own plane.
+
+    Args:
+        tree: tree of N points.
+        neighbours: points per plane.
+        rows: (M,) rows of the points that get planes.
+    """
+    normals, squared = np.empty((len(tree), 3)), np.full(len(tree), np.inf)
+    place = np.empty(len(tree), np.int64)
+    place[tree.order] = np.arange(len(tree))
+    queries = np.sort(place[rows])
+    while len(queries):
+        axes, near, apart = _planes(tree, min(neighbours, len(tree)), queries)
+        _give(axes, near, apart, squared, normals)
+        queries = np.flatnonzero(np.isinf(squared))
+    ordered = np.empty_like(normals)
+    ordered[tree.order] = normals
+    return ordered
+
+
+def _planes(tree: KdTree, count: int, queries: IntArray) -> tuple[FloatArray, IntArray, FloatArray]:
+    """Return the (M, 3) normals around points of the tree, (M, count) neighbours, squared distances."""
+    normals, near = np.empty((len(queries), 3)), np.empty((len(queries), count), np.int64)
+    squared = np.empty((len(queries), count))
+
+    def work(first: int, last: int) -> None:
+        _normals(*tree.parts, queries, first, last, count, normals, near, squared)
 
     in_parts(work, len(queries))
-    if places is None:
-        normals[tree.order] = normals.copy()
-    return normals
+    return normals, near, squared
+
+
+@compiled
+def _give(
+    axes: FloatArray, near: IntArray, apart: FloatArray, squared: FloatArray, normals: FloatArray
+) -> None:
+    """Write each of (M, 3) normals to the neighbours that are closer to it than to those before."""
+    for m in range(len(near)):
+        for k in range(near.shape[1]):
+            i = near[m, k]
+            if apart[m, k] < squared[i]:
+                squared[i] = apart[m, k]
+                for a in range(3):
+                    normals[i, a] = axes[m, a]
 
 
 def onto_patches(
@@ -84,7 +131,10 @@ def _normals(
     last: int,
     count: int,
     normals: FloatArray,
+    neighbours: IntArray,
+    apart: FloatArray,
 ) -> None:
+    """Write the normals around the points ``queries``, and their neighbours if there is room for them."""
     stack, bounds = working_space()
     squared, rows = np.empty(room_for(count)), np.zeros(room_for(count), dtype=np.intp)
     near, weights, center, spread = rows[:count], np.ones(count), np.empty(3), np.empty((3, 3))
@@ -95,6 +145,8 @@ def _normals(
         farthest = search_many(
             points, axes, splits, levels, place, count, limit, squared, rows, stack, bounds
         )
+        if len(neighbours):
+            neighbours[i], apart[i] = near, squared[:count]
         _scatter(points, near, weights, place, center, spread)
         _thinnest(spread, normals[i])
 

@@ -199,9 +199,8 @@ def _edge(
     """Return the evidence of a registration of two nodes' clouds; None if it degenerated."""
     if not _usable(result):
         return None
-    sides = zip((source.cloud, target.cloud), result.steps[-1].pairs.T, strict=True)
-    normals = [Normals(cloud.points_m, cloud.normals).at(rows) for cloud, rows in sides]
-    information = registration_information(result, source.cloud.points_m, normals[0], normals[1])
+    normals = [Normals(cloud.points_m, cloud.normals).all for cloud in (source.cloud, target.cloud)]
+    information = registration_information(result, source.cloud.points_m, *normals)
     return PoseEdge(*link, result.T_target_source, information, strength, agrees)
 
 

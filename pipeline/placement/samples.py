@@ -10,7 +10,7 @@ from pipeline.config import NodePoints, RegistrationConfig
 from pipeline.kernels import geometry
 from pipeline.nodes import NodeClouds
 from pipeline.placement.agreement import Agreement, agreement, asked
-from pipeline.registration.neighbourhood import pca_normals
+from pipeline.registration.neighbourhood import Normals
 from pipeline.registration.sample import draw
 from pipeline.types import FloatArray, PointCloud, RgbdFrame
 
@@ -59,7 +59,7 @@ def sample_of(
     """
     cloud = draw(getattr(node, align_with), config.max_points, config.seed, node.name).cloud
     if cloud.normals is None:
-        cloud = replace(cloud, normals=pca_normals(cloud.points_m))
+        cloud = replace(cloud, normals=Normals(cloud.points_m).all)
     return NodeSample(frame, cloud, PointCloud(asked(node.sensor).points_m.copy()))
 
 

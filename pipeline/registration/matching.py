@@ -146,7 +146,7 @@ class Matcher:
         """Return the pairs with their normals."""
         assert self._source_normals is not None
         rows = pairs.source_rows, pairs.target_rows
-        moving, fixed = self._source_normals.at(rows[0]), self.target_normals.at(rows[1])
+        moving, fixed = self._source_normals.all, self.target_normals.all
         normals, cosines = mean_normals(T_target_source, moving, fixed, *rows)
         return replace(pairs, normals=normals, cosines=cosines)
 

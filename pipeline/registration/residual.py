@@ -72,7 +72,7 @@ class PlaneResidual:
         """Return (N, 3) normals, and each pair's row among them."""
         if pairs.normals is not None:
             return pairs.normals, np.arange(len(pairs.normals))
-        return self.target_normals.at(pairs.target_rows), pairs.target_rows
+        return self.target_normals.all, pairs.target_rows
 
 
 def residual_for(

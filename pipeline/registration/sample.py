@@ -56,11 +56,16 @@ def draw(cloud: PointCloud, max_points: int, seed: int, name: str) -> Sample:
         raise InputError(
             f"The {name} cloud has {bad} points with NaN or infinite coordinates; remove them first."
         )
-    rows = np.arange(len(cloud))
-    if len(cloud) > max_points:
-        rows = np.sort(np.argpartition(random_keys(cloud.points_m, seed), max_points)[:max_points])
+    rows = drawn_rows(cloud.points_m, max_points, seed)
     chosen = cloud.select(rows)
     return Sample(replace(chosen, points_m=chosen.points_m.astype(np.float64)), rows)
+
+
+def drawn_rows(points_m: FloatArray, count: int, seed: int = 0) -> IntArray:
+    """Return (count,) ascending rows of a random choice of (N, 3) points, by ``random_keys``; at most N."""
+    if len(points_m) <= count:
+        return np.arange(len(points_m))
+    return np.sort(np.argpartition(random_keys(points_m, seed), count)[:count])
 
 
 def random_keys(points_m: FloatArray, seed: int) -> FloatArray:

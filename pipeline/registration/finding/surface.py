@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.kernels.geometry import apply
 from pipeline.kernels.kdtree import KdTree, tree_of
 from pipeline.registration.finding.viewpoint import RangeImage, range_image
-from pipeline.registration.neighbourhood import Normals
+from pipeline.registration.neighbourhood import pca_normals
 from pipeline.registration.sample import draw
 from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud
 
@@ -54,7 +54,7 @@ class Surface:
         sample = draw(cloud, REFERENCE_POINTS, seed, "cloud").cloud
         self.points_m = sample.points_m
         self.tree: KdTree = tree_of(self.points_m)
-        self.normals = Normals(self.points_m, sample.normals, lambda: self.tree).at(np.arange(len(sample)))
+        self.normals = pca_normals(self.points_m, sample.normals, self.tree)
         distances_m, rows = self.tree.nearest(self.points_m, min(len(sample), 1 + NOISE_NEIGHBOURS))
         self.spacing_m: FloatArray = distances_m[:, 1 : 1 + SPACING_NEIGHBOURS].mean(axis=1)
         arms_m = self.points_m[rows] - self.points_m[:, None]

@@ -22,12 +22,3 @@ def test_a_normal_is_the_direction_of_least_spread(widths):
         np.testing.assert_allclose(
             along, np.linalg.eigvalsh(spread)[0], atol=1e-13 * max(1.0, np.trace(spread))
         )
-
-
-def test_normals_of_some_points_are_theirs_among_all():
-    tree = KdTree(np.random.default_rng(1).uniform(size=(3000, 3)))
-    places = np.array([5, 17, 900, 2999])
-    of_all = patch_normals(tree, 20)[tree.order[places]]
-    np.testing.assert_allclose(
-        np.abs(np.sum(patch_normals(tree, 20, places) * of_all, axis=1)), 1.0, atol=1e-9
-    )

@@ -2,7 +2,16 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from pipeline.registration.neighbourhood import Normals, local_spacing_m, median_spacing_m, pca_normals
+from pipeline.kernels.geometry import rotation_exp
+from pipeline.registration.neighbourhood import (
+    SHARED_NEIGHBOURS,
+    SHARING,
+    Normals,
+    local_spacing_m,
+    median_spacing_m,
+    pca_normals,
+)
+from pipeline.registration.sample import drawn_rows
 
 
 def test_normals_of_a_sphere_point_along_its_radius_towards_the_camera():
@@ -29,18 +38,58 @@ def test_spacing_of_a_grid():
     assert local_spacing_m(grid[:1]).tolist() == [0.0]
 
 
-def test_normals_are_the_thinnest_axes_of_patches_and_found_once_asked_for():
+def test_normals_are_the_thinnest_axes_of_patches():
     rng = np.random.default_rng(3)
     x, y = rng.uniform(-1.0, 1.0, (2, 3000))
     points = np.stack([x, y, 3.0 + 0.3 * np.sin(3.0 * x) * y + rng.normal(0.0, 0.01, 3000)], axis=1)
     _, near = cKDTree(points).query(points, k=20)
     arms = points[near] - points[near].mean(axis=1, keepdims=True)
     thinnest = np.linalg.eigh(np.einsum("nki,nkj->nij", arms, arms))[1][:, :, 0]
-    few = Normals(points)
-    rows = np.array([7, 7, 2999, 0])
-    for normals, at in ((pca_normals(points), np.arange(3000)), (few.at(rows), rows)):
-        np.testing.assert_allclose(np.abs(np.sum(normals[at] * thinnest[at], axis=1)), 1.0, atol=1e-9)
-        assert (np.sum(normals[at] * points[at], axis=1) <= 0.0).all()
+    normals = pca_normals(points)
+    np.testing.assert_allclose(np.abs(np.sum(normals * thinnest, axis=1)), 1.0, atol=1e-9)
+    assert (np.sum(normals * points, axis=1) <= 0.0).all()
+
+
+def test_shared_normals_are_those_of_the_nearest_drawn_point():
+    points = np.random.default_rng(5).uniform(-1.0, 1.0, (1000, 3)) * [1.0, 1.0, 0.05] + [0.0, 0.0, 3.0]
+    shared, drawn = Normals(points).all, drawn_rows(points, 1000 // SHARING)
+    _, near = cKDTree(points).query(points[drawn], k=SHARED_NEIGHBOURS)
+    for row in range(0, 1000, 50):
+        givers = np.where(
+            (near == row).any(axis=1), np.linalg.norm(points[drawn] - points[row], axis=1), np.inf
+        )
+        if np.isfinite(givers.min()):
+            patch = points[near[givers.argmin()]]
+            thinnest = np.linalg.eigh(np.cov(patch.T))[1][:, 0]
+            assert abs(shared[row] @ thinnest) == pytest.approx(1.0, abs=1e-9)
+    assert len(np.unique(np.abs(shared).round(9), axis=0)) < 200
+    assert (np.sum(shared * points, axis=1) <= 0.0).all()
+
+
+def test_a_point_far_from_all_others_has_a_normal_of_its_own():
+    points = np.random.default_rng(5).uniform(-1.0, 1.0, (1000, 3)) * [1.0, 1.0, 0.05] + [0.0, 0.0, 3.0]
+    for far in range(1000, 1012):
+        points = np.vstack([points, [far, 0.0, 0.0]])
+    np.testing.assert_allclose(np.linalg.norm(Normals(points).all, axis=1), 1.0, atol=1e-9)
+
+
+def test_shared_normals_do_not_depend_on_the_order_of_the_points():
+    points = np.random.default_rng(6).normal(size=(3000, 3)) * [1.0, 0.7, 0.1] + [0.0, 0.0, 4.0]
+    order = np.random.default_rng(7).permutation(3000)
+    np.testing.assert_allclose(Normals(points[order]).all, Normals(points).all[order], atol=1e-9)
+
+
+def test_shared_normals_turn_with_the_points():
+    points = np.random.default_rng(6).normal(size=(3000, 3)) * [1.0, 0.7, 0.1] + [0.0, 0.0, 4.0]
+    R = rotation_exp(np.array([0.3, -0.8, 0.5]))
+    turned = np.abs(np.sum(Normals(points @ R.T).all * (Normals(points).all @ R.T), axis=1))
+    assert np.mean(turned > 1.0 - 1e-6) > 0.99
+
+
+def test_the_spacing_of_many_points_is_that_of_some_of_them():
+    points = np.random.default_rng(8).uniform(0.0, 1.0, (40_000, 3))
+    exact = np.median(cKDTree(points).query(points, k=2)[0][:, 1])
+    assert median_spacing_m(points) == pytest.approx(exact, rel=0.02)
 
 
 @pytest.mark.parametrize("width", [1e-6, 1.0, 1e6])
@@ -65,4 +114,5 @@ def test_given_normals_that_are_unknown_are_computed_and_others_kept(value, bad)
     known[bad] = value
     expected = np.tile([0.0, 0.0, 1.0], (300, 1))
     expected[bad] = [0.0, 0.0, -1.0]
-    np.testing.assert_allclose(Normals(points, known).at(np.arange(300)), expected, atol=1e-9)
+    np.testing.assert_allclose(Normals(points, known).all, expected, atol=1e-9)
+    np.testing.assert_allclose(pca_normals(points, known), expected, atol=1e-9)
