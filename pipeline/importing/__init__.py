@@ -1,5 +1,6 @@
-"""Import of recordings from other programs and data sets as rig folders."""
+"""Import of recordings from other programs and data sets, as rig folders or in TUM's form."""
 
 from pipeline.importing.import_rig import ImportReport, is_recording, iterate_import
+from pipeline.importing.kept import KeptReport, iterate_keep
 
-__all__ = ["ImportReport", "is_recording", "iterate_import"]
+__all__ = ["ImportReport", "KeptReport", "is_recording", "iterate_import", "iterate_keep"]

@@ -1,6 +1,6 @@
-"""Import of captures of Polycam and Record3D: photographs and LiDAR depth of a telephone, placed by ARKit.
+"""Import of captures of Polycam and 3D Scanner App: photographs and LiDAR depth, placed by ARKit.
 
-Polycam: https://github.com/PolyCam/polyform; Record3D: its export as EXR and JPG images.
+Polycam: https://github.com/PolyCam/polyform; 3D Scanner App: its export "All Data".
 """
 
 from __future__ import annotations
@@ -10,21 +10,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
-from packetmesh.files import MAX_TEXT_BYTES, json_object, read_json, read_text
+from packetmesh.files import read_json
 from pipeline.importing.cameras import camera_of
 from pipeline.importing.found_poses import found_poses
-from pipeline.importing.pairing import color_folder, paired, pose_indices, require, thinned, visible
+from pipeline.importing.pairing import require, thinned, visible
 from pipeline.importing.sequence import DEPTH_SUFFIXES, Candidate, Sequence, posed
 from pipeline.importing.stray import CONFIDENCE_NOTE
+from pipeline.io.images import read_color
 from pipeline.io.intrinsics import check_camera
 from pipeline.types import CameraIntrinsics, FloatArray
 
-_Y_DOWN = np.diag([1.0, -1.0, -1.0, 1.0])
+Y_DOWN = np.diag([1.0, -1.0, -1.0, 1.0])
 """From camera axes with z forward and y down to ARKit's, with z backward and y up."""
-_METADATA = ("metadata.json", "metadata")
 
 
 def is_polycam(folder: Path) -> bool:
@@ -76,80 +75,6 @@ def _polycam_images(frames: Path, prefix: str, stem: str) -> tuple[Path, Path] |
     return (colors[0], depths[0]) if colors and depths else None
 
 
-def is_record3d(folder: Path) -> bool:
-    """Return whether a folder contains metadata with a camera and poses, and images or rgbd/."""
-    file = _metadata_in(folder)
-    if file is None or not (_has_images(folder) or (folder / "rgbd").is_dir()):
-        return False
-    try:
-        return json_object(read_text(file, "metadata", 100 * MAX_TEXT_BYTES), file, "metadata").keys() >= {
-            "K",
-            "w",
-            "h",
-        }
-    except InputError:
-        return False
-
-
-def read_record3d(folder: Path, intrinsics: Path | None) -> Sequence:
-    """Read a Record3D export as images: rgb/, depth/ in metres, and metadata with the camera and poses.
-
-    Raises:
-        InputError: depth is compressed, or the metadata have another form.
-    """
-    file, colors = _metadata_in(folder), color_folder(folder)
-    assert file is not None
-    if colors is None or not _has_images(folder):
-        raise InputError(
-            f"{folder} holds Record3D's own compressed depth in rgbd/, which is not read; try Record3D's "
-            "export as EXR and JPG images"
-        )
-    every, unpaired = paired(colors, folder / "depth")
-    camera, each, matrices = _record3d_metadata(file)
-    frames = pose_indices(every, max(len(each), max(matrices, default=-1) + 1))
-    pairs, rare = thinned(list(zip(frames, every, strict=True)))
-    poses = found_poses(matrices)
-    own = {} if intrinsics else dict(enumerate(each))
-    candidates, notes = posed(
-        [
-            Candidate(pair.color, pair.depth, poses.T_world_camera.get(k), camera=own.get(k))
-            for k, pair in pairs
-        ],
-        f"poses in {file.name}",
-        poses,
-    )
-    if intrinsics:
-        camera, _ = camera_of(folder, candidates[0].color, intrinsics, None, "")
-    return Sequence(candidates, camera, notes=(*unpaired, *rare, *notes))
-
-
-def _record3d_metadata(file: Path) -> tuple[CameraIntrinsics, list[CameraIntrinsics], dict[int, FloatArray]]:
-    """Read the camera, the cameras of the frames if they are given, and (4, 4) T_world_camera by frame."""
-    values = json_object(read_text(file, "metadata", 100 * MAX_TEXT_BYTES), file, "metadata")
-    try:
-        size_px = int(values["w"]), int(values["h"])
-        matrix = np.array(values["K"], dtype=np.float64).reshape(3, 3).T
-        fx, fy, cx, cy = (float(matrix[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
-        camera = CameraIntrinsics.pinhole(fx, fy, cx, cy, *size_px)
-        rows = np.array(values.get("perFrameIntrinsicCoeffs") or [], dtype=np.float64).reshape(-1, 4)
-        each = [CameraIntrinsics.pinhole(fx, fy, cx, cy, *size_px) for fx, fy, cx, cy in rows.tolist()]
-        poses = np.array(values.get("poses") or [], dtype=np.float64).reshape(-1, 7)
-    except (KeyError, TypeError, ValueError, OverflowError):
-        raise InputError(
-            f"The metadata {file} are not in Record3D's format; try w, h, K of 9 numbers and poses of 7"
-        ) from None
-    for one in (camera, *each):
-        check_camera(f"The metadata {file}", one)
-    return camera, each, {k: _from_arkit(row) for k, row in enumerate(poses) if np.linalg.norm(row[:4]) > 0.5}
-
-
-def _from_arkit(row: FloatArray) -> FloatArray:
-    """Return the (4, 4) T_world_camera of a quaternion, its scalar last, and a position in ARKit's axes."""
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = Rotation.from_quat(row[:4]).as_matrix(), row[4:]
-    return T @ _Y_DOWN
-
-
 def _polycam_camera(file: Path) -> tuple[CameraIntrinsics, FloatArray]:
     """Read the camera of a keyframe, and its (4, 4) T_world_camera, metres."""
     values: Mapping[str, Any] = read_json(file, "camera of Polycam")
@@ -162,7 +87,76 @@ def _polycam_camera(file: Path) -> tuple[CameraIntrinsics, FloatArray]:
             f"The camera {file} is not in Polycam's format; try fx, fy, cx, cy, width, height, t_00 to t_23"
         ) from None
     check_camera(f"The camera {file}", camera)
-    return camera, np.array([*rows, [0.0, 0.0, 0.0, 1.0]]) @ _Y_DOWN
+    return camera, np.array([*rows, [0.0, 0.0, 0.0, 1.0]]) @ Y_DOWN
+
+
+def is_scanner_app(folder: Path) -> bool:
+    """Return whether a folder contains frame_00000.json and depth_00000.png or similar files."""
+    return all(next(folder.glob(pattern), None) is not None for pattern in ("frame_*.json", "depth_*.png"))
+
+
+def read_scanner_app(folder: Path, intrinsics: Path | None) -> Sequence:
+    """Read the frames of 3D Scanner App that have a photograph and depth, which is in millimetres.
+
+    Raises:
+        InputError: no frame has both, or a file of a frame has another form.
+    """
+    every = [
+        (color, depth)
+        for color in visible(folder.glob("frame_*.jpg"))
+        if (depth := folder / f"depth_{color.stem.partition('_')[2]}.png").is_file()
+        and color.with_suffix(".json").is_file()
+    ]
+    require(every, folder, "frame_00000.jpg, frame_00000.json and depth_00000.png of one number")
+    found, rare = thinned(every)
+    height_px, width_px = read_color(found[0][0]).shape[:2]
+    read = {
+        color: _scanner_app_camera(color.with_suffix(".json"), (width_px, height_px)) for color, _ in found
+    }
+    poses = found_poses({color: T for color, (_, T, _) in read.items()})
+    times = [time_s for _, _, time_s in read.values() if time_s is not None]
+    timed = len(times) == len(found) and bool((np.diff(times) > 0.0).all())
+    candidates, notes = posed(
+        [
+            Candidate(
+                color,
+                depth,
+                poses.T_world_camera.get(color),
+                time_s=read[color][2] if timed else None,
+                camera=None if intrinsics else read[color][0],
+                confidence=_if_file(folder / depth.name.replace("depth_", "conf_")),
+            )
+            for color, depth in found
+        ],
+        "cameraPoseARFrame",
+        poses,
+    )
+    if any(candidate.confidence for candidate in candidates):
+        notes += (CONFIDENCE_NOTE,)
+    camera = read[found[0][0]][0]
+    if intrinsics:
+        camera, _ = camera_of(folder, candidates[0].color, intrinsics, None, "")
+    return Sequence(candidates, camera, notes=(*rare, *notes))
+
+
+def _scanner_app_camera(
+    file: Path, size_px: tuple[int, int]
+) -> tuple[CameraIntrinsics, FloatArray, float | None]:
+    """Read the camera of a frame, its (4, 4) T_world_camera in metres, and its time if it has one."""
+    values: Mapping[str, Any] = read_json(file, "frame of 3D Scanner App")
+    try:
+        matrix = np.array(values["intrinsics"], np.float64).reshape(3, 3)
+        T = np.array(values["cameraPoseARFrame"], np.float64).reshape(4, 4)
+        time_s = None if values.get("time") is None else float(values["time"])
+    except (KeyError, TypeError, ValueError, OverflowError):
+        raise InputError(
+            f"The frame {file} is not in 3D Scanner App's format; try intrinsics of 9 numbers and "
+            "cameraPoseARFrame of 16, by rows"
+        ) from None
+    fx, fy, cx, cy = (float(matrix[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    camera = CameraIntrinsics.pinhole(fx, fy, cx, cy, *size_px)
+    check_camera(f"The frame {file}", camera)
+    return camera, T @ Y_DOWN, time_s
 
 
 def _keyframes(folder: Path) -> Path | None:
@@ -181,11 +175,3 @@ def _if_file(path: Path) -> Path | None:
 
 def _filled(folder: Path) -> bool:
     return folder.is_dir() and any(folder.iterdir())
-
-
-def _metadata_in(folder: Path) -> Path | None:
-    return next((folder / name for name in _METADATA if (folder / name).is_file()), None)
-
-
-def _has_images(folder: Path) -> bool:
-    return color_folder(folder) is not None and (folder / "depth").is_dir()

@@ -153,7 +153,7 @@ def _names(topic: str) -> list[str]:
     if stream is not None:
         return [f"{stream}/info/camera_info", f"{stream}/camera_info"]
     parts = [part for part in topic.split("/") if part not in TRANSPORTS]
-    return ["/".join([*parts[:-1], "camera_info"])]
+    return ["/".join([*parts[:-1], name]) for name in ("camera_info", "calibration")]
 
 
 def _of_images(

@@ -26,7 +26,7 @@ class Timed(Protocol):
         ...
 
     @property
-    def recorded_ns(self) -> Sequence[int]:
+    def recorded_ns(self) -> IntArray:
         """(N,) times at which the messages came into the bag."""
         ...
 
@@ -67,6 +67,38 @@ def moments_of(path: Path, times_s: Sequence[FloatArray], frames: int, one_camer
     Raises:
         InputError: the topics have no messages of one time.
     """
+    nearest, chosen_s, together = _together(path, times_s)
+    if not one_camera:
+        middle = together[np.abs(together - len(nearest) / 2).argmin()]
+        return nearest[[middle]]
+    apart = _apart(chosen_s, together)
+    spread = np.linspace(0, len(apart) - 1, min(frames, len(apart))).round().astype(int)
+    found: IntArray = nearest[apart[spread]]
+    return found
+
+
+def all_moments(path: Path, times_s: Sequence[FloatArray]) -> IntArray:
+    """Return (moments, topics) indices of the messages of every moment, in order of the first topic's time.
+
+    Args:
+        path: the bag.
+        times_s: (N,) times of each topic's messages; the first topic gives the moments.
+
+    Raises:
+        InputError: the topics have no messages of one time.
+    """
+    nearest, chosen_s, together = _together(path, times_s)
+    apart = _apart(chosen_s, together)
+    found: IntArray = nearest[apart[np.argsort(chosen_s[apart, 0], kind="stable")]]
+    return found
+
+
+def _together(path: Path, times_s: Sequence[FloatArray]) -> tuple[IntArray, FloatArray, IntArray]:
+    """Return (N, topics) indices of each topic's nearest messages, their times, and which are of one moment.
+
+    Raises:
+        InputError: none are.
+    """
     nearest = np.stack([_nearest(own_s, times_s[0]) for own_s in times_s], axis=1)
     chosen_s = np.stack([own_s[at] for own_s, at in zip(times_s, nearest.T, strict=True)], axis=1)
     gaps_s = np.ptp(chosen_s, axis=1)
@@ -76,20 +108,14 @@ def moments_of(path: Path, times_s: Sequence[FloatArray], frames: int, one_camer
             f"The images of the bag {path} are never less than {gaps_s.min():.3g} s apart, more than the "
             f"{LARGEST_GAP_S:g} s of one moment; try to record with the cameras' clocks set alike"
         )
-    if not one_camera:
-        middle = together[np.abs(together - len(gaps_s) / 2).argmin()]
-        return nearest[[middle]]
-    apart = _apart(chosen_s, gaps_s, together)
-    spread = np.linspace(0, len(apart) - 1, min(frames, len(apart))).round().astype(int)
-    found: IntArray = nearest[apart[spread]]
-    return found
+    return nearest, chosen_s, together
 
 
-def _apart(chosen_s: FloatArray, gaps_s: FloatArray, together: IntArray) -> IntArray:
+def _apart(chosen_s: FloatArray, together: IntArray) -> IntArray:
     """Return the moments that share no time of any topic, the closest messages first kept, in order."""
     taken: set[tuple[int, float]] = set()
     kept = []
-    for moment in together[np.argsort(gaps_s[together], kind="stable")]:
+    for moment in together[np.argsort(np.ptp(chosen_s[together], axis=1), kind="stable")]:
         times = set(enumerate(chosen_s[moment].tolist()))
         if not taken & times:
             taken |= times

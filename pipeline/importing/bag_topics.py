@@ -1,9 +1,10 @@
-"""Image topics of a bag: their cameras and times, and which depth belongs to which colour."""
+"""Image topics of a bag: their cameras and times, and which depth belongs to which colour; transforms."""
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from dataclasses import dataclass
+from array import array
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,16 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.importing.bag_cameras import FoundCamera, camera_of_topic, common_parts, sdk_stream
-from pipeline.importing.bag_messages import is_brightness, is_depth, size_of, stamp_s
+from pipeline.importing.bag_links import ODOMETRY, TRANSFORMS, Links
+from pipeline.importing.bag_messages import is_brightness, is_depth, size_of
+from pipeline.importing.bag_reader import BagReader
+from pipeline.importing.bag_transforms import Transforms, transforms_of
 from pipeline.io.same_view import alike
 from pipeline.kernels.geometry import scaled_to
-from pipeline.types import MAX_NODES, CameraIntrinsics, FloatArray
+from pipeline.types import MAX_NODES, CameraIntrinsics, FloatArray, IntArray
 
-PROGRESS_EVERY = 20
-"""Number of images between progress reports."""
+PROGRESS_EVERY, REPORTS = 20, 100
+"""Least number of messages between progress reports, and most reports."""
 _RESIZED_WITHIN_PX = 1.0
 """Drivers do not agree on where the first pixel's centre goes."""
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
@@ -28,17 +32,13 @@ _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 class Topic:
     """An image topic with its camera and the times of its images."""
 
-    connection: Any
+    name: str
     frame: str
     found: FoundCamera
     stamps_s: FloatArray
     """(N,) time of each image, from its header."""
-    recorded_ns: list[int]
+    recorded_ns: IntArray
     """(N,) time at which each image came into the bag, which locates it there."""
-
-    @property
-    def name(self) -> str:
-        return str(self.connection.topic)
 
     @property
     def camera(self) -> CameraIntrinsics:
@@ -47,35 +47,63 @@ class Topic:
         return self.found.camera
 
 
-def image_topics(reader: Any) -> Generator[Progress, None, tuple[list[Topic], list[Topic], list[str]]]:
-    """Return the colour topics and the depth topics, sorted by name, and a note for each other one."""
+@dataclass(frozen=True, slots=True)
+class Scanned:
+    """Image topics and transforms of a bag."""
+
+    colors: list[Topic]
+    """Colour topics, sorted by name."""
+    depths: list[Topic]
+    """Depth topics, sorted by name."""
+    transforms: Transforms
+    notes: list[str]
+    """A sentence on each other image topic."""
+
+
+@dataclass(slots=True)
+class _Seen:
+    """Messages of one image topic."""
+
+    first: Any
+    stamps_s: array[float] = field(default_factory=lambda: array("d"))
+    recorded_ns: array[int] = field(default_factory=lambda: array("q"))
+
+
+def iterate_scan(reader: BagReader) -> Generator[Progress, None, Scanned]:
+    """Read a bag once: times of all images, their cameras, and transforms. No image is kept."""
+    wanted = [own for own in reader.connections if own.msgtype in (*_IMAGES, TRANSFORMS, ODOMETRY)]
+    images: dict[str, _Seen] = {}
+    links = Links()
+    total = max(1, sum(own.msgcount for own in wanted))
+    every = max(PROGRESS_EVERY, total // REPORTS)
+    for number, (own, at_ns, raw) in enumerate(reader.messages(wanted) if wanted else ()):
+        if number % every == 0:
+            yield Progress(f"message {number} of {total}", min(1.0, number / total))
+        if own.msgtype in _IMAGES:
+            if own.topic not in images:
+                images[own.topic] = _Seen(reader.deserialize(raw, own.msgtype))
+            images[own.topic].stamps_s.append(reader.stamp_s(raw))
+            images[own.topic].recorded_ns.append(at_ns)
+        else:
+            links.add(reader.deserialize(raw, own.msgtype), own.msgtype, own.topic, at_ns)
     found: tuple[list[Topic], list[Topic]] = ([], [])
     notes = []
-    connections = [own for own in reader.connections if own.msgtype in _IMAGES]
-    images, seen = max(1, sum(connection.msgcount for connection in connections)), 0
-    for connection in sorted(connections, key=lambda connection: connection.topic):
-        first, stamps_s, recorded_ns = None, [], []
-        for _, at_ns, raw in reader.messages([connection]):
-            if seen % PROGRESS_EVERY == 0:
-                yield Progress(f"images of {connection.topic}", min(1.0, seen / images))
-            seen += 1
-            first = reader.deserialize(raw, connection.msgtype) if first is None else first
-            stamps_s.append(stamp_s(raw, reader.is2))
-            recorded_ns.append(at_ns)
-        if first is not None and is_brightness(first, connection.topic):
-            notes.append(
-                f"{connection.topic} is left out: by its name, its 16 bits are brightness and not depth"
-            )
-        elif first is not None:
-            frame = first.header.frame_id.lstrip("/")
-            camera = camera_of_topic(reader, connection.topic, frame, size_of(first, connection.topic))
-            topic = Topic(connection, frame, camera, np.array(stamps_s), recorded_ns)
-            found[is_depth(first, connection.topic)].append(topic)
-    return *found, notes
+    for name, seen in sorted(images.items()):
+        if is_brightness(seen.first, name):
+            notes.append(f"{name} is left out: by its name, its 16 bits are brightness and not depth")
+        else:
+            found[is_depth(seen.first, name)].append(_topic(reader, name, seen))
+    return Scanned(*found, transforms_of(reader, links), notes)
+
+
+def _topic(reader: BagReader, name: str, seen: _Seen) -> Topic:
+    frame = seen.first.header.frame_id.lstrip("/")
+    camera = camera_of_topic(reader, name, frame, size_of(seen.first, name))
+    return Topic(name, frame, camera, np.array(seen.stamps_s), np.array(seen.recorded_ns, np.int64))
 
 
 def pairs_of(
-    path: Path, reader: Any, colors: list[Topic], depths: list[Topic]
+    path: Path, reader: BagReader, colors: list[Topic], depths: list[Topic]
 ) -> tuple[list[tuple[Topic, Topic]], list[str]]:
     """Pair each depth topic with the colour topic of its frame, or else of the most similar name.
 
@@ -142,15 +170,20 @@ def _is_resized(small: Topic, large: Topic) -> bool:
     return resized is not None and alike(resized, small.camera, within_px=_RESIZED_WITHIN_PX)
 
 
-def message_of(reader: Any, topic: Topic, index: int) -> Any:
-    """Return the message of a topic with an index, in the order of recording."""
-    at_ns = topic.recorded_ns[index]
-    before = topic.recorded_ns[:index].count(at_ns)
-    for connection, _, raw in reader.messages([topic.connection], start=at_ns, stop=at_ns + 1):
+def message_of(reader: BagReader, name: str, recorded_ns: IntArray, index: int) -> Any:
+    """Return the message of an image topic with an index, in the order of recording."""
+    at_ns = int(recorded_ns[index])
+    before = int((recorded_ns[:index] == at_ns).sum())
+    for connection, _, raw in reader.messages(connections_of(reader, name), at_ns, at_ns + 1):
         if not before:
             return reader.deserialize(raw, connection.msgtype)
         before -= 1
-    raise InputError(f"The bag has lost an image of {topic.name}; try to record again")
+    raise InputError(f"The bag has lost an image of {name}; try to record again")
+
+
+def connections_of(reader: BagReader, name: str) -> Sequence[Any]:
+    """Return the connections of an image topic."""
+    return [own for own in reader.connections if own.topic == name and own.msgtype in _IMAGES]
 
 
 def _fit(color: Topic, depth: Topic) -> tuple[bool, bool, int]:

@@ -1,4 +1,4 @@
-"""Static transforms of a bag, and what the RealSense SDK records in place of them.
+"""Transforms between the frames of a bag, and what the RealSense SDK records in place of them.
 
 The SDK's topics are those of librealsense's ``src/media/ros/ros_file_format.h``.
 """
@@ -12,29 +12,71 @@ from typing import Any
 import numpy as np
 
 from pipeline.importing.bag_cameras import sdk_stream
+from pipeline.importing.bag_links import Links
 from pipeline.importing.bag_messages import transform_in
+from pipeline.importing.bag_reader import BagReader
 from pipeline.kernels.geometry import inverse
-from pipeline.types import FloatArray
+from pipeline.types import BoolArray, FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class PosesOverTime:
+    """Poses of a frame in the world."""
+
+    T_world_frame: FloatArray
+    """(N, 4, 4), metres."""
+    known: BoolArray
+    """(N,) whether each is known."""
+    source: str
+    """Where they are from."""
 
 
 @dataclass(frozen=True, slots=True)
 class Transforms:
-    """Static transforms between frames."""
+    """Transforms between frames."""
 
-    by_frame: Mapping[str, Mapping[str, FloatArray]]
-    """(4, 4) T_a_b, metres, by the frames a and b that are linked."""
+    links: Links
+    """All of them, over time."""
+    constant: Mapping[str, Mapping[str, FloatArray]]
+    """(4, 4) T_a_b, metres, by the frames a and b that constant transforms link."""
     parents: Mapping[str, str]
+    """Parents by constant transforms."""
     streams: Mapping[str, FloatArray]
     """(4, 4) T_stream_reference, metres, by streams of the RealSense SDK."""
 
     def between(self, frame: str, other: str) -> FloatArray | None:
-        """Return the (4, 4) T_frame_other, metres; None if nothing links the two."""
-        return self.by_frame.get(frame, {}).get(other)
+        """Return the (4, 4) T_frame_other, metres; None if no constant transforms link the two."""
+        return np.eye(4) if frame == other else self.constant.get(frame, {}).get(other)
 
     def poses(self, frames: Sequence[str]) -> list[FloatArray | None]:
         """Return the (4, 4) T_world_frame of frames; the world is the topmost ancestor of the first."""
         root = _root(frames[0], self.parents)
-        return [self.between(root, frame) for frame in frames]
+        return [self.constant.get(root, {}).get(frame) for frame in frames]
+
+    def over_time(self, frame: str, times_s: FloatArray, in_bag: bool) -> PosesOverTime | None:
+        """Return a frame's poses in the world; None if nothing moves it.
+
+        The world is the frame's topmost ancestor, or else that of odometry.
+
+        Args:
+            frame: name of the frame.
+            times_s: (N,) times, seconds.
+            in_bag: whether these are times in the bag, rather than those in headers.
+        """
+        chain = list(self.links.chain(frame))
+        if any(not link.is_constant for link in chain):
+            T: FloatArray = np.tile(np.eye(4), (len(times_s), 1, 1))
+            known = np.ones(len(times_s), bool)
+            for link in chain:
+                T_link, known_link = link.at(times_s, in_bag)
+                T, known = T_link @ T, known & known_link
+            return PosesOverTime(T, known, f"the transforms from {chain[-1].parent} to {frame}")
+        for topic, link in sorted(self.links.odometry.items()):
+            T_child_frame = self.between(link.child, frame)
+            if T_child_frame is not None and len(link.samples) and not link.is_constant:
+                T, known = link.at(times_s, in_bag)
+                return PosesOverTime(T @ T_child_frame, known, f"the odometry {topic}")
+        return None
 
     def between_streams(self, color: str, depth: str) -> tuple[FloatArray, tuple[str, ...]]:
         """Return the (4, 4) T_color_depth of two image topics of the RealSense SDK, and a note if assumed."""
@@ -50,47 +92,37 @@ class Transforms:
         return T_color_reference @ inverse(T_depth_reference), ()
 
 
-def static_transforms(reader: Any) -> Transforms:
-    """Read all static transforms of a bag."""
-    parents: dict[str, str] = {}
-    links: dict[str, dict[str, FloatArray]] = {}
-    for message in _messages(reader, [own for own in _connections(reader) if _is_static(own.topic)]):
-        for link in message.transforms:
-            parent, child = link.header.frame_id.lstrip("/"), link.child_frame_id.lstrip("/")
-            T_parent_child, parents[child] = transform_in(link.transform), parent
-            links.setdefault(parent, {})[child] = T_parent_child
-            links.setdefault(child, {})[parent] = inverse(T_parent_child)
+def transforms_of(reader: BagReader, links: Links) -> Transforms:
+    """Return the transforms of a bag, from its links and what the RealSense SDK recorded."""
+    fixed = [link for link in links.of_frames.values() if link.is_constant]
+    neighbours: dict[str, dict[str, FloatArray]] = {}
+    for link in fixed:
+        neighbours.setdefault(link.parent, {})[link.child] = link.last
+        neighbours.setdefault(link.child, {})[link.parent] = inverse(link.last)
     streams = {}
-    for connection in _connections(reader):
+    for connection in reader.connections:
         stream, _, end = connection.topic.rpartition("/tf/")
         if stream.startswith("/device_") and end.isdigit():
             for message in _messages(reader, [connection]):
                 streams[stream] = transform_in(message)
-    return Transforms({start: _reached(start, links) for start in links}, parents, streams)
+    constant = {start: _reached(start, neighbours) for start in neighbours}
+    return Transforms(links, constant, {link.child: link.parent for link in fixed}, streams)
 
 
-def sdk_units_per_metre(reader: Any, topic: str) -> float | None:
+def sdk_units_per_metre(reader: BagReader, topic: str) -> float | None:
     """Return the depth units per metre that the RealSense SDK recorded for a depth topic, else None."""
     stream = sdk_stream(topic)
     name = f"{stream.rpartition('/')[0]}/option/Depth_Units/value" if stream else ""
-    for message in _messages(reader, [own for own in _connections(reader) if own.topic == name]):
+    for message in _messages(reader, [own for own in reader.connections if own.topic == name]):
         if np.isfinite(message.data) and message.data > 0:
             return float(f"{1.0 / message.data:.6g}")  # 0.001 m is recorded as 0.0010000000475
     return None
 
 
-def _connections(reader: Any) -> Sequence[Any]:
-    return list(reader.connections)
-
-
-def _messages(reader: Any, connections: list[Any]) -> list[Any]:
+def _messages(reader: BagReader, connections: list[Any]) -> list[Any]:
     if not connections:
         return []
     return [reader.deserialize(raw, own.msgtype) for own, _, raw in reader.messages(connections)]
-
-
-def _is_static(topic: str) -> bool:
-    return topic.lstrip("/") == "tf_static"
 
 
 def _root(frame: str, parents: Mapping[str, str]) -> str:
@@ -101,12 +133,12 @@ def _root(frame: str, parents: Mapping[str, str]) -> str:
     return above[-1]
 
 
-def _reached(start: str, links: Mapping[str, Mapping[str, FloatArray]]) -> dict[str, FloatArray]:
+def _reached(start: str, neighbours: Mapping[str, Mapping[str, FloatArray]]) -> dict[str, FloatArray]:
     found: dict[str, FloatArray] = {start: np.eye(4)}
     waiting = [start]
     while waiting:
         frame = waiting.pop()
-        for neighbour, T in links[frame].items():
+        for neighbour, T in neighbours[frame].items():
             if neighbour not in found:
                 found[neighbour] = found[frame] @ T
                 waiting.append(neighbour)

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from packetmesh.errors import InputError
-from pipeline.io.images import read_color
+from pipeline.importing.stored import AnyImage, read_color_of
 from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.same_view import alike
 from pipeline.types import CameraIntrinsics
@@ -26,7 +26,7 @@ _OTHER_CAMERA = re.compile(r"(?<![a-z])(depth|ir|infra\d?|infrared)(?![a-z])", r
 
 
 def camera_of(
-    folder: Path, color: Path, given: Path | None, default: CameraIntrinsics | None, default_name: str
+    folder: Path, color: AnyImage, given: Path | None, default: CameraIntrinsics | None, default_name: str
 ) -> tuple[CameraIntrinsics, tuple[str, ...]]:
     """Return the camera of a recording, and a note if it had to be assumed.
 
@@ -41,7 +41,7 @@ def camera_of(
     Raises:
         InputError: no camera is found, or it is for images of another size.
     """
-    height_px, width_px = read_color(color).shape[:2]
+    height_px, width_px = read_color_of(color).shape[:2]
     size_px = width_px, height_px
     found, others = (given, []) if given else _file_in(folder, size_px)
     if found is not None:

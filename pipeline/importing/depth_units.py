@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from packetmesh.errors import InputError
 from pipeline.importing.colmap import read_depth_map
 from pipeline.importing.sequence import Candidate, Sequence
+from pipeline.importing.stored import AnyImage, read_depth_of, read_levels_of
 from pipeline.io.depth_scale import (
     FARTHEST_M,
     MILLIMETRES,
@@ -20,7 +21,7 @@ from pipeline.io.depth_scale import (
     likely_depth_scale,
     usual_scale,
 )
-from pipeline.io.images import NoDepthError, ReadDepth, read_color, read_depth_values
+from pipeline.io.images import NoDepthError, ReadDepth
 from pipeline.types import BoolArray, DepthMap
 
 _ROTATED_SHARE = 0.95
@@ -45,28 +46,28 @@ def depth_in(candidate: Candidate, sequence: Sequence) -> ReadDepth:
     return replace(read, depth=DepthMap(z_m))
 
 
-def _low_confidence(path: Path, shape: tuple[int, ...]) -> BoolArray:
+def _low_confidence(image: AnyImage, shape: tuple[int, ...]) -> BoolArray:
     """Return (H, W) True where a confidence image is 0."""
-    levels = read_color(path)[..., 0]
+    levels = read_levels_of(image)
     if levels.shape != shape:
         raise InputError(
-            f"The confidence image {path} has {levels.shape[1]} x {levels.shape[0]} pixels and its depth "
+            f"The confidence image {image} has {levels.shape[1]} x {levels.shape[0]} pixels and its depth "
             f"image {shape[1]} x {shape[0]}; try to remove the confidence images, so that all depth is kept"
         )
     low: BoolArray = levels == 0
     return low
 
 
-def _depth_in(path: Path, sequence: Sequence) -> ReadDepth:
-    if path.suffix == ".bin":
-        return depth_of(str(path), read_depth_map(path), sequence.units_per_metre, sequence.scale_stated)
-    values = read_depth_values(path)
+def _depth_in(image: AnyImage, sequence: Sequence) -> ReadDepth:
+    if isinstance(image, Path) and image.suffix == ".bin":
+        return depth_of(str(image), read_depth_map(image), sequence.units_per_metre, sequence.scale_stated)
+    values = read_depth_of(image)
     if sequence.rotated_bits and has_rotated_bits(values):
-        read = depth_of(str(path), unrotated(values), MILLIMETRES, stated=True)
+        read = depth_of(str(image), unrotated(values), MILLIMETRES, stated=True)
         return ReadDepth(read.depth, MILLIMETRES, ("The bits of the depth were turned back by three",))
     whole = values.dtype.kind in "iu"
     scale = sequence.units_per_metre if whole or sequence.scale_stated else usual_scale(values)
-    return depth_of(str(path), values, scale, sequence.scale_stated)
+    return depth_of(str(image), values, scale, sequence.scale_stated)
 
 
 def depth_of(name: str, values: NDArray[Any], units_per_metre: float, stated: bool) -> ReadDepth:

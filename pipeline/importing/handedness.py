@@ -36,7 +36,8 @@ def y_points_up(sequence: Sequence) -> bool:
                 own, seen = (depth_in(candidate, sequence).depth.z_m for candidate in pair)
             except InputError:  # one frame without depth does not decide
                 continue
-            T = _relative(*pair)
+            if (T := _relative(*pair)) is None:
+                continue
             plain += _agreeing(own, seen, T, sequence.camera)
             mirrored += _agreeing(own, seen, _MIRROR @ T @ _MIRROR, sequence.camera)
     return mirrored > _CLEARLY * plain
@@ -53,10 +54,10 @@ def mirrored_poses(sequence: Sequence, note: str) -> Sequence:
     return replace(sequence, candidates=candidates, notes=(*sequence.notes, note))
 
 
-def _relative(one: Candidate, other: Candidate) -> FloatArray:
-    """Return the (4, 4) T_other_one; the identity if a pose is unknown."""
+def _relative(one: Candidate, other: Candidate) -> FloatArray | None:
+    """Return the (4, 4) T_other_one; None if a pose is unknown."""
     if one.T_world_camera is None or other.T_world_camera is None:
-        return np.eye(4)
+        return None
     return inverse(other.T_world_camera) @ one.T_world_camera
 
 

@@ -10,15 +10,17 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress, part
-from pipeline.importing.bag import is_bag, iterate_bag
+from pipeline.importing.bag import iterate_bag
+from pipeline.importing.bag_reader import is_bag
 from pipeline.importing.choosing import choose
 from pipeline.importing.depth_units import depth_in
 from pipeline.importing.kinds import kind_of
-from pipeline.importing.reading import check_scale, read_sequence
-from pipeline.importing.rig_folder import NodeImages, new_folder, write_node
+from pipeline.importing.reading import check_bag_intrinsics, check_scale, read_sequence
+from pipeline.importing.rig_folder import NodeImages, check_new, new_folder, write_node
 from pipeline.importing.sequence import SAME_VIEW_REMEDY, Candidate, Sequence
+from pipeline.importing.stored import read_color_of
 from pipeline.importing.upright import upright
-from pipeline.io.images import NoDepthError, ReadDepth, read_color
+from pipeline.io.images import NoDepthError, ReadDepth
 from pipeline.io.same_view import depth_camera_of, same_view_note
 from pipeline.types import MAX_NODES, AnyPath, FloatArray
 
@@ -57,7 +59,7 @@ class ImportReport:
 
 def is_recording(path: Path) -> bool:
     """Return whether ``iterate_import`` can read a path."""
-    return is_bag(path) or (path.is_dir() and kind_of(path) is not None)
+    return is_bag(path) or kind_of(path) is not None
 
 
 def iterate_import(
@@ -83,16 +85,13 @@ def iterate_import(
         raise InputError(f"A rig of {frames} frames cannot be; try 1 to {MAX_NODES}")
     check_scale(depth_scale)
     out = Path(out)
-    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
-        raise InputError(f"{out} is there already; try another name for the rig")
+    check_new(out)
     if is_bag(Path(path)):
-        if intrinsics is not None:
-            raise InputError(
-                f"The cameras of the bag {path} are read from its camera_info; try without intrinsics"
-            )
+        check_bag_intrinsics(Path(path), intrinsics)
         return (yield from _from_bag(Path(path), out, frames, depth_scale))
     yield Progress("files", 0.0)
     kind, folder, sequence = read_sequence(Path(path), depth_scale, intrinsics)
+    sequence = sequence.only_posed()
     yield Progress("choice of frames", 0.2)
     sequence, chosen, middle = _chosen(sequence, frames)
     written = []
@@ -177,11 +176,12 @@ def _scale_note(written: list[ImportedFrame], units_per_metre: float) -> str:
 def _node_of(candidate: Candidate, sequence: Sequence, T_up_world: FloatArray | None) -> NodeImages:
     T = candidate.T_world_camera
     camera = candidate.camera or sequence.camera
-    rgb, depth = read_color(candidate.color), depth_in(candidate, sequence).depth
+    rgb, depth = read_color_of(candidate.color), depth_in(candidate, sequence).depth
     depth_camera, T_color_depth = sequence.depth_camera, sequence.T_color_depth
     if depth_camera is None and rgb.shape[:2] == (camera.height_px, camera.width_px):
         shape = depth.z_m.shape
-        depth_camera = depth_camera_of(camera, shape, candidate.depth, candidate.color, SAME_VIEW_REMEDY)
+        names = str(candidate.depth), str(candidate.color)
+        depth_camera = depth_camera_of(camera, shape, *names, SAME_VIEW_REMEDY)
         T_color_depth = None if depth_camera is None else np.eye(4)
     return NodeImages(
         str(candidate.color),

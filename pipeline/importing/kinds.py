@@ -7,8 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from packetmesh.errors import InputError
-from pipeline.importing import arkit, associated, colmap, nerfstudio, numbered, stray, tum
-from pipeline.importing.bag import SUFFIXES
+from pipeline.importing import (
+    arkit,
+    associated,
+    colmap,
+    kinect,
+    nerfstudio,
+    numbered,
+    record3d,
+    sens,
+    stray,
+    tum,
+)
+from pipeline.importing.bag_reader import SUFFIXES
 from pipeline.importing.sequence import Sequence
 
 
@@ -18,11 +29,11 @@ class Kind:
 
     name: str
     looks_like: str
-    """Description of its folder for users."""
+    """Description of its folder or file for users."""
     recognised: Callable[[Path], bool]
-    """Returns whether a folder is of this kind, from its files."""
+    """Returns whether a folder or file is of this kind."""
     read: Callable[[Path, Path | None], Sequence]
-    """Reads the frames of a folder; the second argument is an intrinsics file given by the user."""
+    """Reads the frames; the second argument is an intrinsics file given by the user."""
 
 
 KINDS = (
@@ -36,12 +47,15 @@ KINDS = (
     Kind("ScanNet", "color/, depth/, pose/ and intrinsic/", numbered.is_scannet, numbered.read_scannet),
     Kind(
         "COLMAP",
-        "sparse/{cameras,images,points3D}.txt with images/ and stereo/depth_maps/ or depth/",
+        "sparse/{cameras,images,points3D}.txt or .bin with images/ and stereo/depth_maps/ or depth/",
         colmap.is_colmap,
         colmap.read_colmap,
     ),
     Kind(
-        "Stray Scanner", "rgb/, depth/, camera_matrix.csv and odometry.csv", stray.is_stray, stray.read_stray
+        "Stray Scanner",
+        "rgb/ or rgb.mp4, depth/, camera_matrix.csv and odometry.csv",
+        stray.is_stray,
+        stray.read_stray,
     ),
     Kind("Polycam", "keyframes/ with images/, cameras/ and depth/", arkit.is_polycam, arkit.read_polycam),
     Kind(
@@ -50,7 +64,21 @@ KINDS = (
         nerfstudio.is_nerfstudio,
         nerfstudio.read_nerfstudio,
     ),
-    Kind("Record3D", "metadata.json, rgb/ and depth/ of EXR images", arkit.is_record3d, arkit.read_record3d),
+    Kind(
+        "Record3D",
+        "metadata.json, rgb/ and depth/ of EXR images",
+        record3d.is_record3d,
+        record3d.read_record3d,
+    ),
+    Kind("Record3D .r3d", "a file .r3d", record3d.is_r3d, record3d.read_r3d),
+    Kind(
+        "3D Scanner App",
+        "frame_00000.json, frame_00000.jpg and depth_00000.png",
+        arkit.is_scanner_app,
+        arkit.read_scanner_app,
+    ),
+    Kind("ScanNet .sens", "a file .sens", sens.is_sens, sens.read_sens),
+    Kind("Azure Kinect or Femto", "a file .mkv", kinect.is_kinect, kinect.read_kinect),
     Kind(
         "ICL-NUIM or ORB-SLAM",
         "associations.txt with rgb/ and depth/",
@@ -69,27 +97,26 @@ KINDS = (
 
 
 def recognise(path: Path) -> tuple[Kind, Path]:
-    """Return the kind of a recording and its folder: ``path``, or the only recording in it.
+    """Return the kind of a recording and its folder or file: ``path``, or the only recording in it.
 
     Raises:
-        InputError: the path is no folder, of no kind, or contains several recordings.
+        InputError: the path is of no kind, or contains several recordings.
     """
     if not path.exists():
         raise InputError(f"{path} does not exist; check the path")
-    if not path.is_dir():
-        raise InputError(
-            f"{path} is a file not named .bag, .db3 or .mcap; try the folder of an unpacked recording: "
-            f"{_known()}"
-        )
     kind = kind_of(path)
     if kind is not None:
         return kind, path
-    inner = [folder for folder in sorted(path.iterdir()) if folder.is_dir()]
-    found = [(kind, folder) for folder in inner if (kind := kind_of(folder)) is not None]
+    if not path.is_dir():
+        raise InputError(
+            f"{path} is a file of no known kind; try the folder of an unpacked recording, or a file of a "
+            f"kind: {_known()}"
+        )
+    found = [(kind, place) for place in sorted(path.iterdir()) if (kind := kind_of(place)) is not None]
     if len(found) == 1:
         return found[0]
     if found:
-        names = ", ".join(folder.name for _, folder in found[:6])
+        names = ", ".join(place.name for _, place in found[:6])
         raise InputError(f"{path} holds {len(found)} recordings; try one of them: {names}")
     bags = [file for suffix in SUFFIXES for file in sorted(path.glob(f"*{suffix}"))]
     if bags:
@@ -97,9 +124,9 @@ def recognise(path: Path) -> tuple[Kind, Path]:
     raise InputError(f"{path} is of no known kind; the kinds are {_known()}")
 
 
-def kind_of(folder: Path) -> Kind | None:
-    """Return the kind of recording in a folder; None if it contains none."""
-    return next((kind for kind in KINDS if kind.recognised(folder)), None)
+def kind_of(path: Path) -> Kind | None:
+    """Return the kind of recording in a folder or file; None if it is none."""
+    return next((kind for kind in KINDS if kind.recognised(path)), None)
 
 
 def _known() -> str:

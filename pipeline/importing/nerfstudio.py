@@ -59,7 +59,7 @@ def read_nerfstudio(folder: Path, intrinsics: Path | None) -> Sequence:
         "try to unpack the images beside it",
     )
     candidates, notes = posed(named, f"transform_matrix in {_FILE}", poses)
-    if candidates[0].T_world_camera is not None:
+    if poses.T_world_camera:
         notes += (f"The poses of {_FILE} are taken to be in metres",)
     camera = candidates[0].camera
     if camera is None:

@@ -21,7 +21,7 @@ from pipeline.importing.pairing import (
     visible,
 )
 from pipeline.importing.sequence import Candidate, Sequence, posed
-from pipeline.io.images import read_color, read_depth_values
+from pipeline.importing.stored import read_color_of, read_depth_of
 from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.poses import rounding_note
 from pipeline.kernels.geometry import inverse
@@ -65,12 +65,12 @@ def read_scannet(folder: Path, intrinsics: Path | None) -> Sequence:
     candidates, lost = _with_poses(found, f"pose/{found[0][2].name}")
     notes = (*unpaired, *rare, *lost)
     first, beside = candidates[0], folder / "intrinsic"
-    height_px, width_px = read_color(first.color).shape[:2]
+    height_px, width_px = read_color_of(first.color).shape[:2]
     if intrinsics is None:
         camera = read_intrinsics(beside / "intrinsic_color.txt", (width_px, height_px))
     else:
         camera, _ = camera_of(folder, first.color, intrinsics, None, "")
-    depth_height_px, depth_width_px = read_depth_values(first.depth).shape
+    depth_height_px, depth_width_px = read_depth_of(first.depth).shape
     if (depth_height_px, depth_width_px) == (height_px, width_px):
         return Sequence(candidates, camera, notes=notes)
     depth_camera = read_intrinsics(beside / "intrinsic_depth.txt", (depth_width_px, depth_height_px))

@@ -2,44 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.importing.bag import is_bag
+from packetmesh.progress import Progress, drain
+from pipeline.importing.bag_reader import is_bag
 from pipeline.importing.depth_units import depth_in
+from pipeline.importing.depth_views import DepthCamera, DepthView, frame_of, unreadable_note, view_of
 from pipeline.importing.kinds import kind_of
-from pipeline.importing.reading import check_scale, read_sequence
+from pipeline.importing.reading import check_bag_intrinsics, check_scale, of_many, read_sequence
+from pipeline.importing.recorded_bag import BagRecording, iterate_bag_recording
 from pipeline.importing.sequence import SAME_VIEW_REMEDY, Candidate, Sequence
-from pipeline.io.depth_to_color import register_depth
-from pipeline.io.images import NoDepthError, read_color
+from pipeline.importing.stored import read_color_of
+from pipeline.io.images import NoDepthError
 from pipeline.io.same_view import depth_camera_of
-from pipeline.kernels.geometry import LEVEL_POSE, pixel_rays, project
-from pipeline.types import AnyPath, CameraIntrinsics, DepthMap, DepthNoise, FloatArray, RgbdFrame
+from pipeline.types import AnyPath, FloatArray, RgbdFrame
 
 FRAMES_PER_S = 30.0
 """Frame rate that is assumed for a recording without times."""
-KINECT = DepthNoise(s0_m=0.0012, s1_m=0.0015, p=2.0, q=1.0)
-"""Noise that is assumed for every sensor: within a tenth of ``acquisition.depth_sigma_m`` from 1.5 to 4 m."""
-
-
-@dataclass(frozen=True, slots=True)
-class DepthView:
-    """A depth image without distortion, with its camera."""
-
-    depth: DepthMap
-    """(H, W) metric."""
-    camera: CameraIntrinsics
-    """Pinhole camera of the same pixels."""
-    T_color_depth: FloatArray
-    """(4, 4) pose of this camera in the colour camera's frame, metres."""
-    noise: DepthNoise
-    """Law of the depth's standard deviation."""
 
 
 @dataclass(frozen=True)
@@ -65,17 +50,13 @@ class FolderRecording:
         return np.array(times, float)
 
     @cached_property
-    def T_world_camera(self) -> tuple[FloatArray, ...] | None:
-        poses = [candidate.T_world_camera for candidate in self.sequence.candidates]
-        known = tuple(pose for pose in poses if pose is not None)
-        return known if len(known) == len(poses) else None
+    def T_world_camera(self) -> tuple[FloatArray | None, ...] | None:
+        poses = tuple(candidate.T_world_camera for candidate in self.sequence.candidates)
+        return None if all(pose is None for pose in poses) else poses
 
     @property
     def notes(self) -> tuple[str, ...]:
-        if not self.unreadable:
-            return self.sequence.notes
-        count, first = len(self.unreadable), self.unreadable[min(self.unreadable)]
-        return (*self.sequence.notes, f"{count} depth images were left out, the first because: {first}")
+        return (*self.sequence.notes, *unreadable_note(self.unreadable))
 
     def view(self, index: int) -> DepthView:
         """Read the depth of a frame; it is all NaN without any depth, or if the image cannot be read.
@@ -85,15 +66,13 @@ class FolderRecording:
         candidate = self.sequence.candidates[index]
         try:
             z_m = depth_in(candidate, self.sequence).depth.z_m
-            camera, T_color_depth = self._depth_camera_of(candidate, z_m.shape)
+            depth_camera = self._depth_camera_of(candidate, z_m.shape)
         except InputError as error:
             if not isinstance(error, NoDepthError):
                 self.unreadable[index] = str(error)
             z_m = np.full(self._depth_shape, np.nan, np.float32)
-            camera, T_color_depth = self._depth_camera_of(candidate, self._depth_shape)
-        straight, pixels = _straight(camera)
-        z_m = z_m if pixels is None else _moved(z_m, pixels)
-        return DepthView(DepthMap(z_m), straight, T_color_depth, KINECT)
+            depth_camera = self._depth_camera_of(candidate, self._depth_shape)
+        return view_of(z_m, depth_camera)
 
     def frame(self, index: int) -> RgbdFrame:
         """Read colour and depth of a frame; depth of another camera is registered to colour.
@@ -102,25 +81,20 @@ class FolderRecording:
             InputError: an image cannot be read, or does not fit its camera.
         """
         candidate = self.sequence.candidates[index]
-        rgb, camera = read_color(candidate.color), candidate.camera or self.sequence.camera
+        rgb, camera = read_color_of(candidate.color), candidate.camera or self.sequence.camera
         if rgb.shape[:2] != (camera.height_px, camera.width_px):
             raise InputError(
                 f"The colour image {candidate.color} has {rgb.shape[1]} x {rgb.shape[0]} pixels and its "
                 f"camera {camera.width_px} x {camera.height_px}; try --intrinsics with the colour camera's"
             )
         depth = depth_in(candidate, self.sequence).depth
+        depth_camera = None
         if self.sequence.depth_camera is not None or depth.z_m.shape != rgb.shape[:2]:
-            depth_camera, T_color_depth = self._depth_camera_of(candidate, depth.z_m.shape)
-            depth = register_depth(depth, depth_camera, camera, T_color_depth)
-        T = candidate.T_world_camera
-        return RgbdFrame(
-            f"frame_{index:05d}", rgb, depth, camera, LEVEL_POSE if T is None else T, pose_known=T is not None
-        )
+            depth_camera = self._depth_camera_of(candidate, depth.z_m.shape)
+        return frame_of(index, rgb, camera, depth, depth_camera, candidate.T_world_camera)
 
-    def _depth_camera_of(
-        self, candidate: Candidate, shape: tuple[int, ...]
-    ) -> tuple[CameraIntrinsics, FloatArray]:
-        """Return the camera of a frame's depth, with its distortion, and its pose in the colour camera's.
+    def _depth_camera_of(self, candidate: Candidate, shape: tuple[int, ...]) -> DepthCamera:
+        """Return the camera of a frame's depth.
 
         Raises:
             InputError: depth of this height and width is of another camera.
@@ -128,14 +102,15 @@ class FolderRecording:
         camera, T_color_depth = self.sequence.depth_camera, self.sequence.T_color_depth
         if camera is None or T_color_depth is None:
             own = candidate.camera or self.sequence.camera
-            files = candidate.depth, candidate.color
-            return depth_camera_of(own, shape, *files, SAME_VIEW_REMEDY) or own, np.eye(4)
+            files = str(candidate.depth), str(candidate.color)
+            same_view = depth_camera_of(own, shape, *files, SAME_VIEW_REMEDY)
+            return DepthCamera(same_view or own, np.eye(4))
         if shape != (camera.height_px, camera.width_px):
             raise InputError(
                 f"The depth image {candidate.depth} has {shape[1]} x {shape[0]} pixels and its camera "
                 f"{camera.width_px} x {camera.height_px}; try a recording whose images are all of one size"
             )
-        return camera, T_color_depth
+        return DepthCamera(camera, T_color_depth)
 
     @cached_property
     def _depth_shape(self) -> tuple[int, ...]:
@@ -145,29 +120,54 @@ class FolderRecording:
 
 def open_recording(
     path: AnyPath, depth_scale: float | None = None, intrinsics: AnyPath | None = None
-) -> FolderRecording:
-    """Open the recording in a folder; depth images are read until one has depth.
+) -> FolderRecording | BagRecording:
+    """Open a recording; see ``iterate_opening``."""
+    return drain(iterate_opening(path, depth_scale, intrinsics))
+
+
+def iterate_opening(
+    path: AnyPath, depth_scale: float | None = None, intrinsics: AnyPath | None = None
+) -> Generator[Progress, None, FolderRecording | BagRecording]:
+    """Open a recording; depth images are read until one has depth. A bag is read once, for its index.
 
     Args:
-        path: the recording's folder, or a folder with only this recording.
+        path: the recording's folder, a bag, or a folder with only this recording or bag.
         depth_scale: depth units per metre; by default that of the kind of recording.
         intrinsics: intrinsics file of the colour camera; by default the recording's, or those of its kind.
 
     Raises:
         InputError: the path is no usable recording, or no frame has depth.
     """
-    place = Path(path)
-    bags = [place] if is_bag(place) else [file for file in sorted(place.glob("*")) if is_bag(file)]
-    if bags and (place in bags or kind_of(place) is None):
-        raise InputError(
-            f"{bags[0]} is a bag, which is not read frame by frame; try `packetmesh import {bags[0]} --out "
-            "RIG` for some of its moments"
-        )
     check_scale(depth_scale)
+    place = Path(path)
+    bag = _bag_in(place)
+    if bag is not None:
+        check_bag_intrinsics(bag, intrinsics)
+        return (yield from iterate_bag_recording(bag, depth_scale))
     kind, folder, sequence = read_sequence(place, depth_scale, intrinsics)
     if next(_with_depth(sequence), None) is None:
         raise NoDepthError(f"No frame of {folder} has depth; check the depth images and the depth scale")
+    chosen, notes = of_many(len(sequence.candidates))
+    candidates = sequence.candidates[chosen]
+    sequence = replace(sequence, candidates=candidates, notes=(*sequence.notes, *notes))
     return FolderRecording(kind.name, folder, sequence)
+
+
+def _bag_in(place: Path) -> Path | None:
+    """Return a bag, or the only bag in a folder that is no recording; None if there is none.
+
+    Raises:
+        InputError: there are several.
+    """
+    if is_bag(place):
+        return place
+    bags = [file for file in sorted(place.glob("*")) if is_bag(file)]
+    if not bags or kind_of(place) is not None:
+        return None
+    if len(bags) > 1:
+        names = ", ".join(bag.name for bag in bags[:6])
+        raise InputError(f"{place} holds {len(bags)} bags; try one of them: {names}")
+    return bags[0]
 
 
 def _with_depth(sequence: Sequence) -> Iterator[Candidate]:
@@ -178,35 +178,3 @@ def _with_depth(sequence: Sequence) -> Iterator[Candidate]:
         except NoDepthError:
             continue
         yield candidate
-
-
-def _straight(camera: CameraIntrinsics) -> tuple[CameraIntrinsics, FloatArray | None]:
-    """Return a camera without its distortion, and (H, W, 2) its pixels in the distorted image."""
-    if not camera.fisheye and not np.any(camera.distortion):
-        return camera, None
-    straight = replace(camera, distortion=np.zeros(5), fisheye=False)
-    values = camera.matrix.tobytes(), camera.distortion.tobytes()
-    return straight, _distorted(*values, camera.width_px, camera.height_px, camera.fisheye)
-
-
-@lru_cache(maxsize=2)
-def _distorted(matrix: bytes, distortion: bytes, width_px: int, height_px: int, fisheye: bool) -> FloatArray:
-    """Return (H, W, 2) float32 pixels in the distorted image of the pixels of the straight one."""
-    own = np.frombuffer(matrix).reshape(3, 3)
-    camera = CameraIntrinsics(own, np.frombuffer(distortion), width_px, height_px, fisheye)
-    straight = CameraIntrinsics(own, np.zeros(5), width_px, height_px)
-    pixels = project(camera, pixel_rays(straight).reshape(-1, 3))
-    return np.nan_to_num(pixels, nan=-10.0).astype(np.float32).reshape(height_px, width_px, 2)
-
-
-def _moved(z_m: FloatArray, pixels: FloatArray) -> FloatArray:
-    """Return (H, W) depth at (H, W, 2) pixels of an image, each from the nearest pixel; NaN outside."""
-    moved: FloatArray = cv2.remap(
-        z_m,
-        pixels[..., 0],
-        pixels[..., 1],
-        cv2.INTER_NEAREST,
-        borderMode=cv2.BORDER_CONSTANT,
-        borderValue=np.nan,
-    )
-    return moved

@@ -40,6 +40,12 @@ class NodeImages:
     """Doubts about its depth, one sentence each."""
 
 
+def check_new(out: Path) -> None:
+    """Raise an InputError for a folder that is neither new nor empty."""
+    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
+        raise InputError(f"{out} is there already; try another name")
+
+
 @contextmanager
 def new_folder(out: Path) -> Iterator[Path]:
     """Create a sibling folder that is renamed to ``out`` if the body succeeds, and deleted if not."""
@@ -51,9 +57,7 @@ def new_folder(out: Path) -> Iterator[Path]:
             out.rmdir()
         sibling.rename(out)
     except OSError as error:
-        raise InputError(
-            f"{out} cannot be written ({error.strerror or error}); try another folder for the rig"
-        ) from None
+        raise InputError(f"{out} cannot be written ({error.strerror or error}); try another folder") from None
     finally:
         shutil.rmtree(sibling, ignore_errors=True)
 

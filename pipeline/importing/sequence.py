@@ -9,6 +9,7 @@ from pathlib import Path
 from packetmesh.errors import InputError
 from packetmesh.files import path_below
 from pipeline.importing.found_poses import FoundPoses
+from pipeline.importing.stored import AnyImage, exists
 from pipeline.io.poses import rounding_note
 from pipeline.kernels.geometry import rigid
 from pipeline.types import CameraIntrinsics, FloatArray
@@ -21,16 +22,16 @@ SAME_VIEW_REMEDY = "try a recording whose depth shows the view of its colour ima
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """File names of a colour and a depth image of one moment, with the pose."""
+    """A colour and a depth image of one moment, with the pose."""
 
-    color: Path
-    depth: Path
+    color: AnyImage
+    depth: AnyImage
     T_world_camera: FloatArray | None = None
     """(4, 4) pose of the colour camera, metres."""
     time_s: float | None = None
     camera: CameraIntrinsics | None = None
     """Colour camera of this moment, if it differs from moment to moment."""
-    confidence: Path | None = None
+    confidence: AnyImage | None = None
     """Image of the depth image's size that is 0 where the sensor has low confidence in its depth."""
 
     def enlarged(self, factor: float) -> Candidate:
@@ -75,6 +76,14 @@ class Sequence:
             scale_stated=True,
         )
 
+    def only_posed(self) -> Sequence:
+        """Return the sequence without frames that lack a pose, which a note says; itself if none has one."""
+        known = tuple(one for one in self.candidates if one.T_world_camera is not None)
+        if len(known) in (0, len(self.candidates)):
+            return self
+        note = f"{len(self.candidates) - len(known)} frames without a pose were left out"
+        return replace(self, candidates=known, notes=(*self.notes, note))
+
 
 def named_inside(folder: Path, name: str, file: str) -> Path:
     """Return the path of ``name``, which a file of a recording contains, with any system's separators.
@@ -106,10 +115,10 @@ def existing(candidates: list[Candidate], lists: str, remedy: str) -> tuple[list
     Raises:
         InputError: none exists.
     """
-    missing = [path for own in candidates for path in (own.color, own.depth) if not path.is_file()]
+    missing = [image for own in candidates for image in (own.color, own.depth) if not exists(image)]
     if not missing:
         return candidates, ()
-    kept = [own for own in candidates if own.color.is_file() and own.depth.is_file()]
+    kept = [own for own in candidates if exists(own.color) and exists(own.depth)]
     if not kept:
         raise InputError(f"No two images that {lists} names together exist, such as {missing[0]}; {remedy}")
     return kept, (
@@ -123,7 +132,7 @@ def distinct(candidates: tuple[Candidate, ...]) -> tuple[tuple[Candidate, ...], 
 
     It is the same moment if the colour or the depth image is the same, or the time.
     """
-    seen: set[Path] = set()
+    seen: set[AnyImage] = set()
     times_s: set[float] = set()
     found = []
     repeated = 0
@@ -144,7 +153,7 @@ def distinct(candidates: tuple[Candidate, ...]) -> tuple[tuple[Candidate, ...], 
 def posed(
     candidates: list[Candidate], what: str, poses: FoundPoses | None = None
 ) -> tuple[tuple[Candidate, ...], tuple[str, ...]]:
-    """Return the candidates with a pose, or all if none has one, and notes on their poses.
+    """Return the candidates, and notes on their poses.
 
     Args:
         candidates: the frames of a recording.
@@ -160,11 +169,11 @@ def posed(
         elif lost:
             why = f"Every {what} holds numbers that are not finite, as where tracking was lost"
         return tuple(candidates), (f"{why}: poses are not known; reconstruct looks for them",)
-    left_out = len(candidates) - len(known)
+    without = len(candidates) - len(known)
     notes = []
-    if left_out:
+    if without:
         why = f"; {refused[0]}" if refused else ""
-        notes.append(f"{left_out} of {len(candidates)} frames have no pose and were left out{why}")
+        notes.append(f"{without} of {len(candidates)} frames have no pose{why}")
     if poses:
         notes += rounding_note("The rotation of a pose", poses.departure)
-    return tuple(known), tuple(notes)
+    return tuple(candidates), tuple(notes)

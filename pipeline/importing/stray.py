@@ -1,4 +1,4 @@
-"""Import of recordings of Stray Scanner: photographs and LiDAR depth of a telephone.
+"""Import of recordings of Stray Scanner: photographs or a video, and LiDAR depth of a telephone.
 
 https://docs.strayrobots.io/apps/scanner/format.html
 """
@@ -6,18 +6,19 @@ https://docs.strayrobots.io/apps/scanner/format.html
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
-from packetmesh.files import MAX_TEXT_BYTES, read_text
+from packetmesh.files import MAX_IMAGE_PIXELS, MAX_TEXT_BYTES, read_text
 from pipeline.importing.cameras import camera_of
-from pipeline.importing.pairing import color_folder, paired, thinned
+from pipeline.importing.pairing import color_folder, depth_images, paired, require, thinned
 from pipeline.importing.sequence import Candidate, Sequence, posed
-from pipeline.io.images import read_color
+from pipeline.importing.stored import AnyImage, StoredImage, read_color_of
+from pipeline.importing.video import TrackReader, contents_of
 from pipeline.kernels.geometry import rigid
 from pipeline.types import CameraIntrinsics, FloatArray
 
@@ -33,23 +34,17 @@ def is_stray(folder: Path) -> bool:
 
 
 def read_stray(folder: Path, intrinsics: Path | None) -> Sequence:
-    """Read the frames with a photograph in rgb/; depth in millimetres, poses and cameras of odometry.csv.
+    """Read the frames of rgb/ or of the video; depth in millimetres, poses and cameras of odometry.csv.
 
     Raises:
-        InputError: the photographs are only in the video, or a file has another form.
+        InputError: there is neither a photograph nor a video, or a file has another form.
     """
-    colors = color_folder(folder)
-    if colors is None:
-        raise InputError(
-            f"{folder} has no photographs in rgb/, and its video {_VIDEO} is not read; try in that folder: "
-            f"mkdir rgb && ffmpeg -i {_VIDEO} -start_number 0 rgb/%06d.png"
-        )
-    every, unpaired = paired(colors, folder / "depth")
-    pairs, rare = thinned(every)
+    pairs, notes = _pairs(folder)
     rows = _odometry(folder / _ODOMETRY)
+    own_cameras = intrinsics is None and not (folder / _MATRIX).is_file()
+    height_px, width_px = read_color_of(pairs[0][0]).shape[:2]
     found = []
-    for pair in pairs:
-        color, depth = pair.color, pair.depth
+    for color, depth in pairs:
         row = rows.get(_number(depth), {})
         confidence = folder / "confidence" / depth.with_suffix(".png").name
         found.append(
@@ -58,36 +53,68 @@ def read_stray(folder: Path, intrinsics: Path | None) -> Sequence:
                 depth,
                 _pose(row) if row.keys() >= set(_POSE) else None,
                 row.get("timestamp"),
+                camera=_camera(row, width_px, height_px) if own_cameras else None,
                 confidence=confidence if confidence.is_file() else None,
             )
         )
     candidates, pose_notes = posed(found, f"pose in {_ODOMETRY} with the number of a frame")
-    notes = (*unpaired, *rare, *pose_notes)
+    notes += pose_notes
     if any(candidate.confidence for candidate in candidates):
         notes += (CONFIDENCE_NOTE,)
-    if intrinsics is None and not (folder / _MATRIX).is_file():
-        return _with_cameras(folder, candidates, rows, notes)
-    camera, assumed = camera_of(folder, candidates[0].color, intrinsics or folder / _MATRIX, None, "")
-    return Sequence(candidates, camera, notes=(*notes, *assumed))
+    if not own_cameras:
+        camera, assumed = camera_of(folder, candidates[0].color, intrinsics or folder / _MATRIX, None, "")
+        return Sequence(candidates, camera, notes=(*notes, *assumed))
+    cameras = [candidate.camera for candidate in candidates if candidate.camera]
+    if len(cameras) < len(candidates):
+        raise InputError(
+            f"{folder} has no {_MATRIX}, and its {_ODOMETRY} no fx, fy, cx and cy of every frame; try "
+            "--intrinsics FILE"
+        )
+    return Sequence(candidates, cameras[0], notes=notes)
 
 
-def _with_cameras(
-    folder: Path, candidates: tuple[Candidate, ...], rows: dict[int, dict[str, float]], notes: tuple[str, ...]
-) -> Sequence:
-    """Return the sequence with the camera that odometry.csv gives for each frame."""
-    height_px, width_px = read_color(candidates[0].color).shape[:2]
-    own = []
-    for candidate in candidates:
-        row = rows.get(_number(candidate.depth), {})
-        if not row.keys() >= set(_CAMERA):
-            raise InputError(
-                f"{folder} has no {_MATRIX}, and its {_ODOMETRY} no fx, fy, cx and cy of every frame; try "
-                "--intrinsics FILE"
-            )
-        fx, fy, cx, cy = (row[name] for name in _CAMERA)
-        own.append(replace(candidate, camera=CameraIntrinsics.pinhole(fx, fy, cx, cy, width_px, height_px)))
-    assert own[0].camera is not None
-    return Sequence(tuple(own), own[0].camera, notes=notes)
+def _pairs(folder: Path) -> tuple[list[tuple[AnyImage, Path]], tuple[str, ...]]:
+    """Return colour and depth of each frame, and notes."""
+    colors = color_folder(folder)
+    if colors is not None:
+        every, unpaired = paired(colors, folder / "depth")
+        pairs, rare = thinned(every)
+        return [(pair.color, pair.depth) for pair in pairs], (*unpaired, *rare)
+    video = folder / _VIDEO
+    if not video.is_file():
+        raise InputError(
+            f"{folder} has neither photographs in rgb/ nor the video {_VIDEO}; try to copy it again"
+        )
+    tracks = contents_of(video).tracks
+    if not tracks or not tracks[0].stamps:
+        raise InputError(f"{video} holds no image; try to copy it again")
+    if tracks[0].width_px * tracks[0].height_px > MAX_IMAGE_PIXELS:
+        raise InputError(
+            f"{video} has images of {tracks[0].width_px} x {tracks[0].height_px} pixels, more than the "
+            f"{MAX_IMAGE_PIXELS / 1e6:g} million that are read; try a smaller one"
+        )
+    track, reader = tracks[0], TrackReader(video, tracks[:1], decoded=True)
+    depths = sorted(depth_images(folder / "depth", "*[0-9]*"), key=_number)
+    require(depths, folder, "depth/000000.png")
+    numbers = list(range(len(depths)))
+    if len(depths) != len(track.stamps):  # images are missing: their numbers count frames of the video
+        numbers = [_number(depth) - _number(depths[0]) for depth in depths]
+    films: list[tuple[AnyImage, Path]] = [
+        (StoredImage(video, f"frame {k}", partial(reader.frame, track, k)), depth)
+        for k, depth in zip(numbers, depths, strict=True)
+        if k < len(track.stamps)
+    ]
+    note = f"{_VIDEO} has {len(track.stamps)} frames and depth/ {len(depths)} images: {len(films)} are used"
+    kept, rare = thinned(films)
+    return kept, (*((note,) if len(depths) != len(track.stamps) else ()), *rare)
+
+
+def _camera(row: dict[str, float], width_px: int, height_px: int) -> CameraIntrinsics | None:
+    """Return the camera of a row; None if it has none."""
+    if not row.keys() >= set(_CAMERA):
+        return None
+    fx, fy, cx, cy = (row[name] for name in _CAMERA)
+    return CameraIntrinsics.pinhole(fx, fy, cx, cy, width_px, height_px)
 
 
 def _number(depth: Path) -> int:

@@ -32,10 +32,14 @@ def read_color(path: AnyPath) -> ByteArray:
     Raises:
         InputError: the file is missing, truncated, too large, or of another format.
     """
-    raw = _raw(path, "colour image")
-    if raw is not None:
-        return _rgb_of(path, raw)
-    bgr = _decode(path, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION, "colour image")
+    return color_in(read_bytes(path, MAX_IMAGE_BYTES, "colour image"), path)
+
+
+def color_in(data: bytes, name: AnyPath) -> ByteArray:
+    """Decode (H, W, 3) RGB from the bytes of an image file; ``name`` is for the errors of ``read_color``."""
+    if data.startswith(SIGNATURES):
+        return _rgb_of(name, raw_values(name, data, "colour image"))
+    bgr = _decode(name, data, cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION, "colour image")
     return np.ascontiguousarray(bgr[..., ::-1])
 
 
@@ -86,8 +90,11 @@ def read_depth_values(path: AnyPath) -> NDArray[Any]:
     Raises:
         InputError: the file is missing, truncated, too large, not one channel of 16 bits or more, or empty.
     """
-    raw = _raw(path, "depth image")
-    values = _decode(path, cv2.IMREAD_UNCHANGED, "depth image") if raw is None else raw
+    data = read_bytes(path, MAX_IMAGE_BYTES, "depth image")
+    if data.startswith(SIGNATURES):
+        values = raw_values(path, data, "depth image")
+    else:
+        values = _decode(path, data, cv2.IMREAD_UNCHANGED, "depth image")
     if values.ndim != 2 or values.itemsize < 2:
         channels = 1 if values.ndim == 2 else values.shape[2]
         raise InputError(
@@ -140,12 +147,6 @@ def write_depth_mm(path: AnyPath, depth: DepthMap) -> None:
         sibling.write_bytes(cv2.imencode(".png", depth_mm.astype(np.uint16))[1].tobytes())
 
 
-def _raw(path: AnyPath, what: str) -> np.ndarray | None:
-    """Return the numbers of a file with one of ``SIGNATURES``; None for a file that OpenCV decodes."""
-    data = read_bytes(path, MAX_IMAGE_BYTES, what)
-    return raw_values(path, data, what) if data.startswith(SIGNATURES) else None
-
-
 def _rgb_of(path: AnyPath, values: np.ndarray) -> ByteArray:
     """Convert an image with one, three or four channels to (H, W, 3) bytes."""
     if values.ndim == 2:
@@ -157,8 +158,7 @@ def _rgb_of(path: AnyPath, values: np.ndarray) -> ByteArray:
     return np.ascontiguousarray(values[..., :3])
 
 
-def _decode(path: AnyPath, flags: int, what: str) -> np.ndarray:
-    data = read_bytes(path, MAX_IMAGE_BYTES, what)
+def _decode(path: AnyPath, data: bytes, flags: int, what: str) -> np.ndarray:
     if not data.startswith((_PNG_SIGNATURE, _JPEG_SIGNATURE, *_PNM_SIGNATURES)):
         raise InputError(
             f"The {what} {path} is neither a PNG nor a JPEG file, nor PGM, PPM, TIFF or NPY; try to convert "

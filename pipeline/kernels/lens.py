@@ -26,6 +26,8 @@ _TABLE = 2000
 """Entries of the table of radii from which Newton's method starts."""
 _FARTHEST = math.radians(89.9)
 """Largest angle to the optical axis in that table."""
+_NO_COEFFICIENT = 1e-100
+"""A polynomial's coefficient below this counts as none; the roots would overflow."""
 
 
 def reach(camera: CameraIntrinsics) -> float:
@@ -190,6 +192,7 @@ def _through(homography: FloatArray, positions: FloatArray) -> FloatArray:
 
 def _first_root(polynomial: ArrayLike) -> float:
     """Return the smallest positive real root of a polynomial, highest power first; infinite without one."""
-    roots = np.roots(polynomial)
+    coefficients = np.asarray(polynomial, float)
+    roots = np.roots(np.where(np.abs(coefficients) < _NO_COEFFICIENT, 0.0, coefficients))
     real = roots.real[(np.abs(roots.imag) < 1e-12 * np.abs(roots)) & (roots.real > 0.0)]
     return float(real.min(initial=math.inf))

@@ -38,6 +38,12 @@ def straight_image(rgb: ByteArray, camera: CameraIntrinsics, view: CameraIntrins
     return cv2.remap(rgb, *_maps(camera, view), cv2.INTER_LINEAR, borderValue=(0, 0, 0))
 
 
+def straight_depth(depth: DepthMap, camera: CameraIntrinsics, view: CameraIntrinsics) -> DepthMap:
+    """Return depth of ``camera`` on the pixels of ``view``, each from the nearest pixel; NaN outside."""
+    z = cv2.remap(depth.z_m, *_maps(camera, view), cv2.INTER_NEAREST, borderValue=math.nan)
+    return DepthMap(z, depth.kind)
+
+
 def bent_depth(depth: DepthMap, camera: CameraIntrinsics, view: CameraIntrinsics) -> DepthMap:
     """Return depth of ``view`` on the pixels of ``camera``; NaN where ``view`` does not see."""
     z = cv2.remap(depth.z_m, *_maps(view, camera), cv2.INTER_LINEAR, borderValue=math.nan)

@@ -29,7 +29,10 @@ from pipeline.config import PRESETS
 from pipeline.depth.inference import DepthNetwork
 from pipeline.importing.bag import iterate_bag
 from pipeline.importing.colmap import read_depth_map
+from pipeline.importing.depth_units import depth_in
+from pipeline.importing.kinds import kind_of
 from pipeline.importing.numbered import read_trajectory_log
+from pipeline.importing.stored import read_color_of
 from pipeline.importing.tum import listed
 from pipeline.io.camera_files import WRITERS
 from pipeline.io.clouds import read_cloud
@@ -43,6 +46,8 @@ from pipeline.kernels.open3d_runtime import o3d
 from pipeline.types import CameraIntrinsics, DepthMap, RgbdFrame, Rig, Surface
 from tests.pipeline.depth.networks import channel
 from tests.pipeline.importing.bags import write_bag
+from tests.pipeline.importing.foxglove_files import write_foxglove
+from tests.pipeline.strangers.containers import write_kinect, write_r3d, write_sens
 
 RNG = np.random.default_rng(17)
 COUNT = 60
@@ -179,6 +184,19 @@ def bag(kind: str) -> bytes:
         return next(Path(folder).rglob(f"*.{suffix}")).read_bytes()
 
 
+def foxglove(encoding: str) -> bytes:
+    """A small MCAP file of Foxglove's schemas."""
+    rig = Rig("rig", (RgbdFrame("node_00", RGB, DepthMap(METRES), CAMERA, np.eye(4)),))
+    return written("a.mcap", lambda path: write_foxglove(path, rig, encoding, moments=1))
+
+
+def container(write: Callable[[Path, Rig], Path]) -> bytes:
+    """A small file with all images of a recording."""
+    rig = Rig("rig", (RgbdFrame("node_00", RGB, DepthMap(METRES), CAMERA, np.eye(4)),))
+    with tempfile.TemporaryDirectory() as folder:
+        return write(Path(folder) / "a", rig).read_bytes()
+
+
 def links() -> str:
     return "".join(f"{0.5 * k:.1f} 1.5 20.0 0.01\n" for k in range(40))
 
@@ -205,6 +223,13 @@ NETWORK = "infer-depth DIR/good.png --model FILE --out OUT"
 
 def _read_bag(path: Path) -> Any:
     return drain(iterate_bag(path, 1, None))
+
+
+def _read_container(path: Path) -> Any:
+    kind = kind_of(path)
+    assert kind is not None
+    sequence = kind.read(path, None)
+    return depth_in(sequence.candidates[0], sequence), read_color_of(sequence.candidates[0].color)
 
 
 def _read_config(path: Path) -> Any:
@@ -310,6 +335,11 @@ def samples() -> tuple[Sample, ...]:
         Sample("a.bag", bag("ros1"), _read_bag, IMPORT),
         Sample("a.db3", bag("ros2"), _read_bag, IMPORT),
         Sample("a.mcap", bag("mcap"), _read_bag, IMPORT),
+        Sample("protobuf.mcap", foxglove("protobuf"), _read_bag, IMPORT),
+        Sample("json.mcap", foxglove("json"), _read_bag, IMPORT),
+        Sample("a.r3d", container(write_r3d), _read_container, IMPORT),
+        Sample("a.sens", container(write_sens), _read_container, IMPORT),
+        Sample("a.mkv", container(write_kinect), _read_container, IMPORT, True),
         Sample("map.bin", f"{WIDTH}&{HEIGHT}&1&".encode() + METRES.tobytes(), read_depth_map),
         Sample("rgb.txt", b"".join(b"%d.5 rgb/%d.png\n" % (k, k) for k in range(20)), listed, "", True),
         Sample("traj.log", _log(), read_trajectory_log, "", True),

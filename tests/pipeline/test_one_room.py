@@ -13,7 +13,7 @@ import pytest
 
 from packetmesh.progress import drain
 from pipeline.importing import iterate_import
-from pipeline.importing.bag import SUFFIXES, is_bag
+from pipeline.importing.bag_reader import SUFFIXES, is_bag
 from pipeline.importing.kinds import KINDS, kind_of
 from pipeline.io.clouds import _PARSERS
 from pipeline.io.meshes import read_mesh
@@ -21,7 +21,7 @@ from pipeline.io.rigs import load_rig
 from pipeline.reconstruct import reconstruct
 from pipeline.surface.mesh_cloud import MeshOptions, iterate_mesh_file
 from pipeline.types import PointCloud, Rig, Surface
-from tests.pipeline.strangers import bags, clouds, colmap, data_sets, phones, texts
+from tests.pipeline.strangers import bags, clouds, colmap, containers, data_sets, foxglove, phones, texts
 from tests.pipeline.strangers.room import distances_mm, moved, reconstructed, room, room_cloud
 
 pytestmark = pytest.mark.xdist_group("one room")  # one worker reconstructs the room once
@@ -57,9 +57,15 @@ RECORDINGS = [
     Recording("nerfstudio", data_sets.write_nerfstudio, "nothing"),
     Recording("COLMAP, depth maps", colmap.write_colmap_dense, "depth in float32"),
     Recording("COLMAP, sensor", colmap.write_colmap_sensor, "the scale, from points to 1e-6"),
+    Recording("COLMAP, binary", colmap.write_colmap_binary, "the scale, from points to 1e-6"),
     Recording("Stray Scanner", phones.write_stray, "nothing", times=2, nodes=2),
+    Recording("Stray Scanner, video", containers.write_stray_video, "colours of a video", times=2, nodes=2),
     Recording("Polycam", phones.write_polycam, "JPEG colours", times=3, nodes=2),
     Recording("Record3D", phones.write_record3d, "JPEG colours, depth in float32", times=4, nodes=2),
+    Recording("Record3D .r3d", containers.write_r3d, "JPEG colours", times=3, nodes=2),
+    Recording("3D Scanner App", phones.write_scanner_app, "JPEG colours", times=3, nodes=2),
+    Recording("ScanNet .sens", containers.write_sens, "JPEG colours, poses in float32", times=2, nodes=2),
+    Recording("Azure Kinect", containers.write_kinect, "JPEG colours", nodes=1, own_world=True),
     Recording("ROS 1", bags.write_ros1, "nothing"),
     Recording("ROS 1, compressed metres", bags.write_ros1_metres, "JPEG colours, depth in z^2 / 10100"),
     Recording("ROS 2 db3", bags.write_db3, "depth in float32"),
@@ -67,6 +73,8 @@ RECORDINGS = [
     Recording("ROS 2 mcap, compressed", bags.write_mcap, "JPEG colours"),
     Recording("ROS 2 mcap, 2 x", bags.write_mcap_large, "nothing", times=2, nodes=2),
     Recording("ROS 2 mcap, image_rect", bags.write_image_rect, "nothing"),
+    Recording("Foxglove, protocol buffers", foxglove.write_protobuf, "nothing"),
+    Recording("Foxglove, JSON and PNG", foxglove.write_json, "nothing"),
 ]
 
 

@@ -6,6 +6,7 @@ from pipeline.io.rigs import load_rig
 from tests.app import commands
 from tests.app.commands import check_one_sentence
 from tests.pipeline.importing.recordings import orbit, write_tum
+from tests.pipeline.importing.test_bag_motion import write as write_moving
 
 
 def run(capsys, *argv: object) -> tuple[int, str, str]:
@@ -32,6 +33,19 @@ def test_without_json_nothing_goes_to_standard_output(capsys, tmp_path):
     code, out, err = run(capsys, tmp_path / "desk", "--out", tmp_path / "rig", "--depth-scale", 250)
     assert (code, out) == (0, "")
     assert "try --depth-scale 5000" in err
+
+
+def test_all_frames_become_a_recording_in_tums_form(capsys, tmp_path):
+    write_moving(tmp_path / "walk.bag")
+    out = tmp_path / "walk"
+    code, printed, err = run(capsys, tmp_path / "walk.bag", "--out", out, "--frames", "all", "--json")
+    report = json.loads(printed)
+    assert code == 0
+    assert (report["kind"], report["candidates"], report["frames"]) == ("bag", 5, 5)
+    assert len(list((out / "rgb").iterdir())) == 5
+    assert f"Next: packetmesh reconstruct --recording {out} --out runs/walk" in err
+    for note in report["notes"]:
+        assert note in err
 
 
 def test_what_is_no_recording_gets_one_sentence(capsys, tmp_path):

@@ -1,20 +1,23 @@
 """COLMAP's models, whose unit is unknown until depth or a person tells it."""
 
-import re
+import struct
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
+import pycolmap
 import pytest
 
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.importing import iterate_import
 from pipeline.importing.colmap import read_colmap, read_depth_map
+from pipeline.importing.colmap_binary import read_binary_model
+from pipeline.importing.colmap_model import PARAMETERS
 from pipeline.io.extrinsics import read_extrinsics
 from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.rigs import load_rig
+from pipeline.kernels.geometry import project
 from pipeline.types import DepthMap, Rig
 from tests.pipeline.importing.recordings import CAMERA, orbit, write_colmap
 
@@ -106,15 +109,6 @@ def test_a_model_that_cannot_be_used_is_refused_in_a_sentence(tmp_path, file, te
     assert not (tmp_path / "rig").exists()
 
 
-def test_a_binary_model_is_to_be_converted(tmp_path):
-    write_colmap(tmp_path / "model", orbit(1))
-    for name in ("cameras", "images"):
-        file = tmp_path / "model" / "sparse" / f"{name}.txt"
-        file.rename(file.with_suffix(".bin"))
-    with pytest.raises(InputError, match="model_converter"):
-        drain(iterate_import(tmp_path / "model", tmp_path / "rig"))
-
-
 @pytest.mark.parametrize(
     "data", [b"", b"40&30&1&", b"40&30&3&" + bytes(14400), b"99999&99999&1&", b"4&1&1&" + bytes(16)]
 )
@@ -147,16 +141,104 @@ def test_a_camera_model_that_is_not_read_is_named_and_opens_with_intrinsics(tmp_
     np.testing.assert_array_equal(load_rig(tmp_path / "rig").frames[0].intrinsics.matrix, CAMERA.matrix)
 
 
-def test_a_binary_model_opens_when_its_text_is_in_the_folder_that_is_told(tmp_path):
-    """colmap model_converter writes it to --output_path."""
-    write_colmap(tmp_path / "model", orbit(2))
+def test_images_of_several_cameras_each_keep_theirs(tmp_path):
+    """As networks write them that find a camera for every photograph."""
+    written = orbit(3)
+    write_colmap(tmp_path / "model", written, metres_a_unit=0.37, sensor=True)
     sparse = tmp_path / "model" / "sparse"
-    texts = {file.name: file.read_text() for file in sparse.iterdir()}
-    for file in list(sparse.iterdir()):
-        file.rename(file.with_suffix(".bin"))
-    with pytest.raises(InputError, match=r"model_converter") as error:
+    cameras = [f"{k} PINHOLE 40 30 {30 + k} 30.5 20 15" for k in (1, 2, 3)]
+    (sparse / "cameras.txt").write_text("\n".join(cameras) + "\n")
+    lines = (sparse / "images.txt").read_text().splitlines()
+    for k in range(3):
+        words = lines[1 + 2 * k].split()
+        words[8] = str(k + 1)
+        lines[1 + 2 * k] = " ".join(words)
+    (sparse / "images.txt").write_text("\n".join(lines) + "\n")
+    drain(iterate_import(tmp_path / "model", tmp_path / "rig"))
+    rig = load_rig(tmp_path / "rig")
+    assert [frame.intrinsics.fx_px for frame in rig.frames] == [31.0, 32.0, 33.0]
+    np.testing.assert_allclose(steps_m(rig), steps_m(written), rtol=1e-3)
+
+
+def binary(folder):
+    """Replace the text model by the binary one that pycolmap writes."""
+    sparse = folder / "sparse"
+    (sparse / "points3D.txt").write_text(_with_tracks(sparse))
+    model = pycolmap.Reconstruction(str(sparse))
+    for file in sparse.iterdir():
+        file.unlink()
+    model.write_binary(str(sparse))
+
+
+def _with_tracks(sparse):
+    """points3D.txt with the image and the feature of each point, which pycolmap checks."""
+    lines = [line for line in (sparse / "images.txt").read_text().splitlines() if not line.startswith("#")]
+    tracks = {}
+    for image, features in enumerate(lines[1::2], start=1):
+        for place, number in enumerate(features.split()[2::3]):
+            tracks[number] = f"{image} {place}"
+    points = [line for line in (sparse / "points3D.txt").read_text().splitlines() if not line.startswith("#")]
+    return "\n".join(f"{' '.join(line.split()[:8])} {tracks[line.split()[0]]}" for line in points) + "\n"
+
+
+def test_a_binary_model_of_pycolmap_is_the_rig_that_it_was_written_from(tmp_path):
+    """Its folder also has rigs.bin and frames.bin."""
+    written = orbit(3)
+    write_colmap(tmp_path / "model", written, metres_a_unit=0.37, sensor=True)
+    text = read_colmap(tmp_path / "model", None)
+    binary(tmp_path / "model")
+    assert {file.name for file in (tmp_path / "model" / "sparse").iterdir()} >= {"rigs.bin", "frames.bin"}
+    read = read_colmap(tmp_path / "model", None)
+    np.testing.assert_array_equal(read.camera.matrix, CAMERA.matrix)
+    for own, expected in zip(read.candidates, text.candidates, strict=True):
+        assert (own.color, own.depth) == (expected.color, expected.depth)
+        np.testing.assert_allclose(own.T_world_camera, expected.T_world_camera, atol=1e-9)
+    drain(iterate_import(tmp_path / "model", tmp_path / "rig"))
+    np.testing.assert_allclose(steps_m(load_rig(tmp_path / "rig")), steps_m(written), rtol=1e-3)
+
+
+@pytest.mark.parametrize("name", [name for name in pycolmap.CameraModelId.__members__ if name != "INVALID"])
+def test_every_camera_model_of_pycolmap_is_read_or_named(tmp_path, name):
+    """Those that are read project a point to where pycolmap projects it."""
+    model = pycolmap.CameraModelId.__members__[name]
+    camera = pycolmap.Camera.create_from_model_id(1, model, 30.0, 40, 30)
+    if name != "EQUIRECTANGULAR":
+        parameters = camera.params
+        for at in range(3, len(parameters)):
+            parameters[at] = parameters[at] if parameters[at] > 1.0 else 0.01 * (at - 2)
+        camera.params = parameters
+    reconstruction = pycolmap.Reconstruction()
+    reconstruction.add_camera(camera)
+    reconstruction.write_binary(str(tmp_path))
+    read = read_binary_model(tmp_path)
+    if name not in PARAMETERS:
+        assert read.others == {1: name}
+        return
+    point_m = np.array([[0.2, -0.1, 1.0]])
+    expected = camera.img_from_cam(point_m) - 0.5
+    np.testing.assert_allclose(project(read.cameras[1], point_m), expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("file", ["cameras.bin", "images.bin", "points3D.bin"])
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.5, 0.99])
+def test_a_cut_binary_file_gets_a_sentence(tmp_path, file, share):
+    write_colmap(tmp_path / "model", orbit(3), sensor=True)
+    binary(tmp_path / "model")
+    path = tmp_path / "model" / "sparse" / file
+    data = path.read_bytes()
+    path.write_bytes(data[: int(share * len(data))])
+    with pytest.raises(InputError, match=rf"{file}.*(truncated or damaged|is empty)"):
         drain(iterate_import(tmp_path / "model", tmp_path / "rig"))
-    told = Path(re.search(r"--output_path (\S+)", str(error.value))[1])
-    for name, text in texts.items():
-        (told / name).write_text(text)
-    assert len(drain(iterate_import(tmp_path / "model", tmp_path / "rig")).frames) == 2
+
+
+def test_an_unknown_camera_model_of_a_binary_file_gets_a_sentence(tmp_path):
+    write_colmap(tmp_path / "model", orbit(2), sensor=True)
+    binary(tmp_path / "model")
+    path = tmp_path / "model" / "sparse" / "cameras.bin"
+    data = bytearray(path.read_bytes())
+    data[12:16] = struct.pack("<i", 99)
+    path.write_bytes(data)
+    with pytest.raises(
+        InputError, match=r"Camera 1 of .* has the unknown model 99; try colmap model_converter"
+    ):
+        read_colmap(tmp_path / "model", None)

@@ -9,6 +9,7 @@ import pytest
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.importing import iterate_import
+from pipeline.importing.recorded import open_recording
 from pipeline.io.rigs import load_rig
 from tests.pipeline.importing.recordings import (
     LAYOUTS,
@@ -66,6 +67,18 @@ def test_a_pose_that_is_none_is_left_out_with_the_reason(tmp_path, kind):
     assert len(frames) == 2
     (note,) = (note for note in report.notes if "1 of 3 frames have no pose" in note)
     assert "is not a rigid transform: its 3 x 3 part is orthonormal only to 0.5" in note
+
+
+@pytest.mark.parametrize("kind", WITH_MATRICES)
+def test_a_recording_keeps_frames_without_a_pose(tmp_path, kind):
+    written = orbit(3)
+    WITH_MATRICES[kind](tmp_path / "recording", written)
+    bend(tmp_path / "recording", 0.5, first_only=True)
+    recording = open_recording(tmp_path / "recording")
+    assert [T is None for T in recording.T_world_camera] == [True, False, False]
+    np.testing.assert_allclose(recording.T_world_camera[1], written.frames[1].T_world_camera, atol=1e-6)
+    assert not recording.frame(0).pose_known
+    assert any("1 of 3 frames have no pose" in note for note in recording.notes)
 
 
 @pytest.mark.parametrize("kind", WITH_MATRICES)

@@ -8,7 +8,7 @@ import pytest
 from packetmesh.progress import drain
 from pipeline.importing import iterate_import
 from pipeline.importing.choosing import overlaps
-from pipeline.importing.colmap import _cameras
+from pipeline.importing.colmap_model import _cameras
 from pipeline.io.rigs import load_rig
 from pipeline.kernels.geometry import look_at
 from pipeline.types import CameraIntrinsics, Rig

@@ -1,17 +1,23 @@
 """Captures of telephones: photographs with LiDAR depth of the same view in fewer pixels."""
 
 import json
+import shutil
+from dataclasses import replace
 
+import av
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.importing import iterate_import
+from pipeline.importing.recorded import open_recording
 from pipeline.io.images import read_depth
 from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.rigs import load_rig
+from pipeline.types import Rig
 from tests.pipeline.importing.phone_captures import (
     PHOTO,
     photograph,
@@ -20,6 +26,8 @@ from tests.pipeline.importing.phone_captures import (
     write_stray,
 )
 from tests.pipeline.importing.recordings import CAMERA, orbit
+from tests.pipeline.strangers.containers import write_video
+from tests.pipeline.strangers.phones import write_scanner_app
 
 WRITERS = {"Stray Scanner": write_stray, "Polycam": write_polycam, "Record3D": write_record3d}
 
@@ -116,38 +124,94 @@ def test_a_capture_without_any_camera_opens_with_intrinsics(tmp_path):
     assert len(imported(tmp_path, intrinsics=tmp_path / "own.csv")[1]) == 2
 
 
-def test_a_video_is_to_be_unpacked_and_then_opens(tmp_path):
-    """The remedy writes rgb/000000.png and so on; cv2 does it here in place of ffmpeg."""
-    write_stray(tmp_path / "capture", orbit(3))
-    colors = tmp_path / "capture" / "rgb"
-    video = cv2.VideoWriter(
-        str(tmp_path / "capture" / "rgb.mp4"), cv2.VideoWriter.fourcc(*"mp4v"), 60, (120, 90)
-    )
-    for path in sorted(colors.iterdir()):
-        video.write(cv2.imread(str(path)))
+def as_video(folder, codec="mpeg4"):
+    """Replace the photographs by rgb.mp4, as the app leaves them."""
+    photographs = sorted((folder / "rgb").iterdir())
+    write_video(folder / "rgb.mp4", [np.asarray(Image.open(path)) for path in photographs], codec)
+    shutil.rmtree(folder / "rgb")
+
+
+def grey(count):
+    """A rig whose photographs are even grey of 20 k, which a video keeps."""
+    frames = orbit(count).frames
+    return Rig("grey", tuple(replace(own, rgb=np.full_like(own.rgb, 20 * k)) for k, own in enumerate(frames)))
+
+
+@pytest.mark.parametrize("codec", ["mpeg4", "libx264"])
+def test_frames_of_a_video_are_read_in_any_order(tmp_path, codec):
+    """Also of H.264, whose frames are stored in another order than they are shown in."""
+    if codec not in av.codecs_available:
+        pytest.skip(f"this FFmpeg has no {codec}")
+    write_stray(tmp_path / "capture", grey(12))
+    as_video(tmp_path / "capture", codec)
+    recording = open_recording(tmp_path / "capture")
+    np.testing.assert_allclose(recording.times_s, 0.1 * np.arange(12))
+    for k in (0, 1, 2, 11, 3, 10, 3, 7, 0):
+        frame = recording.frame(k)
+        assert np.abs(frame.rgb.astype(int) - 20 * k).max() <= 4
+        np.testing.assert_array_equal(frame.intrinsics.matrix, PHOTO.matrix)
+    assert recording.T_world_camera is not None
+
+
+def test_a_video_with_other_frames_than_depth_counts_them_by_number(tmp_path):
+    write_stray(tmp_path / "capture", grey(6))
+    as_video(tmp_path / "capture")
+    (tmp_path / "capture" / "depth" / "000002.png").unlink()
+    report, _ = imported(tmp_path)
+    assert any("rgb.mp4 has 6 frames and depth/ 5 images: 5 are used" in note for note in report.notes)
+    recording = open_recording(tmp_path / "capture")
+    for place, k in enumerate((0, 1, 3, 4, 5)):
+        assert np.abs(recording.frame(place).rgb.astype(int) - 20 * k).max() <= 4
+
+
+@pytest.mark.parametrize("data", [b"", b"no video", None])
+def test_a_damaged_video_gets_a_sentence(tmp_path, data):
+    write_stray(tmp_path / "capture", grey(3))
+    as_video(tmp_path / "capture")
+    video = tmp_path / "capture" / "rgb.mp4"
+    video.write_bytes(video.read_bytes()[:-200] if data is None else data)
+    with pytest.raises(InputError, match=r"rgb.mp4 cannot be read as a video file"):
+        imported(tmp_path)
+
+
+def test_a_capture_without_photographs_and_video_gets_a_sentence(tmp_path):
+    write_stray(tmp_path / "capture", orbit(2))
+    shutil.rmtree(tmp_path / "capture" / "rgb")
+    with pytest.raises(InputError, match=r"neither photographs in rgb/ nor the video rgb.mp4"):
+        imported(tmp_path)
+
+
+def test_frames_of_3d_scanner_app_are_those_that_were_written(tmp_path):
+    written = orbit(3)
+    write_scanner_app(tmp_path / "capture", written)
+    report, frames = imported(tmp_path)
+    assert (report.kind, report.candidates) == ("3D Scanner App", 3)
+    for k, (frame, expected) in enumerate(zip(frames, written.frames, strict=True)):
+        node = tmp_path / "rig" / f"node_{k:02d}"
+        known = expected.depth.valid
+        np.testing.assert_allclose(read_depth(node / "depth.png").z_m[known], expected.depth.z_m[known])
+        np.testing.assert_allclose(frame.T_world_camera, expected.T_world_camera, atol=1e-9)
+        np.testing.assert_allclose(frame.intrinsics.matrix, PHOTO.matrix)
+    np.testing.assert_allclose(open_recording(tmp_path / "capture").times_s, [40.0, 40.1, 40.2])
+
+
+@pytest.mark.parametrize("key", ["intrinsics", "cameraPoseARFrame"])
+def test_a_frame_of_3d_scanner_app_without_a_matrix_gets_a_sentence(tmp_path, key):
+    write_scanner_app(tmp_path / "capture", orbit(2))
+    file = tmp_path / "capture" / "frame_00006.json"
+    values = json.loads(file.read_text())
+    values[key] = values[key][:-1]
+    file.write_text(json.dumps(values))
+    with pytest.raises(InputError, match=r"frame_00006.json is not in 3D Scanner App's format"):
+        imported(tmp_path)
+
+
+def test_depth_without_photographs_of_3d_scanner_app_gets_a_sentence(tmp_path):
+    write_scanner_app(tmp_path / "capture", orbit(2))
+    for path in (tmp_path / "capture").glob("*.jpg"):
         path.unlink()
-    video.release()
-    colors.rmdir()
-    says = r"its video rgb.mp4 is not read; try .* ffmpeg -i rgb.mp4 -start_number 0 rgb/%06d.png"
-    with pytest.raises(InputError, match=says):
+    with pytest.raises(InputError, match=r"it lacks frame_00000.jpg"):
         imported(tmp_path)
-    colors.mkdir()
-    read, index = cv2.VideoCapture(str(tmp_path / "capture" / "rgb.mp4")), 0
-    while (frame := read.read())[0]:
-        cv2.imwrite(str(colors / f"{index:06d}.png"), frame[1])
-        index += 1
-    assert len(imported(tmp_path)[1]) == 3
-
-
-def test_compressed_depth_of_record3d_is_to_be_exported_as_images(tmp_path):
-    write_record3d(tmp_path / "capture", orbit(2))
-    (tmp_path / "capture" / "depth").rename(tmp_path / "capture" / "rgbd")
-    with pytest.raises(
-        InputError, match=r"compressed depth in rgbd/, .* try Record3D's export as EXR and JPG"
-    ):
-        imported(tmp_path)
-    (tmp_path / "capture" / "rgbd").rename(tmp_path / "capture" / "depth")
-    assert len(imported(tmp_path)[1]) == 2
 
 
 @pytest.mark.parametrize(

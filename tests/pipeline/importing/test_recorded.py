@@ -318,21 +318,21 @@ def test_what_cannot_be_used_gets_one_sentence(tmp_path, spoil, says):
     assert "\n" not in str(error.value)
 
 
-def test_a_bag_is_sent_to_import(tmp_path):
-    bag = tmp_path / "room.bag"
-    bag.write_bytes(b"#ROSBAG V2.0\n")
-    with pytest.raises(
-        InputError, match=r"room.bag is a bag, .*; try `packetmesh import .*room.bag --out RIG`"
-    ):
-        open_recording(bag)
-    with pytest.raises(
-        InputError, match=r"room.bag is a bag, .*; try `packetmesh import .*room.bag --out RIG`"
-    ):
-        open_recording(tmp_path)
-
-
 @pytest.mark.parametrize("scale", [0.0, -1.0, np.nan, np.inf])
 def test_a_scale_that_cannot_be_is_refused(tmp_path, scale):
     write_tum(tmp_path, orbit(2))
     with pytest.raises(InputError, match=r"The depth scale is .*; try 1000 for images in millimetres"):
         open_recording(tmp_path, depth_scale=scale)
+
+
+def test_of_a_long_recording_every_nth_frame_is_used(tmp_path, monkeypatch):
+    monkeypatch.setattr("pipeline.importing.reading.MOST_FRAMES", 3)
+    write_tum(tmp_path / "recording", orbit(7))
+    recording = open_recording(tmp_path / "recording")
+    monkeypatch.setattr("pipeline.importing.reading.MOST_FRAMES", 7)
+    every = open_recording(tmp_path / "recording")
+    np.testing.assert_array_equal(recording.times_s, every.times_s[[0, 3, 6]])
+    np.testing.assert_array_equal(recording.T_world_camera[2], every.T_world_camera[6])
+    np.testing.assert_array_equal(recording.frame(1).rgb, every.frame(3).rgb)
+    assert "Of the 7 frames one in 3 is used, so that there are at most 3" in recording.notes
+    assert not any("one in" in note for note in every.notes)

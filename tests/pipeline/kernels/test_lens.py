@@ -110,3 +110,13 @@ def test_a_fisheye_and_another_lens_with_the_same_numbers_have_rays_of_their_own
     equidistant = replace(pinhole, distortion=np.zeros(4), fisheye=True)
     other = replace(pinhole, distortion=np.zeros(4))
     assert not np.allclose(pixel_rays(equidistant), pixel_rays(other), equal_nan=True)
+
+
+@pytest.mark.parametrize("k3", [5e-324, 1e-307])
+def test_a_coefficient_next_to_nothing_is_nothing(k3):
+    """As damaged files have it: no root of the polynomial overflows."""
+    matrix = np.array([[100.0, 0.0, 40.0], [0.0, 100.0, 30.0], [0.0, 0.0, 1.0]])
+    reaches = [
+        reach(CameraIntrinsics(matrix, np.array([-0.2, 0.0, 0.0, 0.0, last]), 80, 60)) for last in (0.0, k3)
+    ]
+    assert reaches[0] == reaches[1] == pytest.approx(np.sqrt(1.0 / 0.6))

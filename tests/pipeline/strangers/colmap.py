@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pycolmap
 
 from pipeline.types import FloatArray, RgbdFrame, Rig
 from tests.pipeline.strangers.images import quaternion, save_color, save_depth
@@ -33,7 +34,8 @@ def write_colmap_sensor(folder: Path, rig: Rig) -> Path:
         features.append([])
         for v, u in np.argwhere(frame.depth.valid)[:: 20 * (1 + index)]:
             place = _world_m(frame, u, v) / METRES_A_UNIT
-            points.append(f"{len(points) + 1} {' '.join(f'{x:.6f}' for x in place)} 9 9 9 0.4 {index + 1} 0")
+            track = f"{index + 1} {len(features[-1])}"
+            points.append(f"{len(points) + 1} {' '.join(f'{x:.6f}' for x in place)} 9 9 9 0.4 {track}")
             features[-1].append(f"{u + 0.5} {v + 0.5} {len(points)}")
     _write_model(folder, rig, METRES_A_UNIT, features, points)
     return folder
@@ -61,3 +63,13 @@ def _write_model(
     (folder / "sparse").mkdir()
     for name, lines in (("cameras", [camera]), ("images", images), ("points3D", points)):
         (folder / "sparse" / f"{name}.txt").write_text("\n".join([f"# {name}", *lines]) + "\n")
+
+
+def write_colmap_binary(folder: Path, rig: Rig) -> Path:
+    """A model of its own unit, made binary by pycolmap, with its rigs.bin and frames.bin."""
+    write_colmap_sensor(folder, rig)
+    model = pycolmap.Reconstruction(str(folder / "sparse"))
+    for file in (folder / "sparse").iterdir():
+        file.unlink()
+    model.write_binary(str(folder / "sparse"))
+    return folder

@@ -64,3 +64,24 @@ def write_record3d(folder: Path, rig: Rig) -> Path:
     values = {"w": camera.width_px, "h": camera.height_px, "K": camera.matrix.T.ravel().tolist()}
     (folder / "metadata.json").write_text(json.dumps(values | {"fps": 60, "poses": poses}))
     return folder
+
+
+def write_scanner_app(folder: Path, rig: Rig) -> Path:
+    """3D Scanner App: three times as many pixels in JPEG; matrices by rows; some depth has no photograph."""
+    for index, frame in enumerate(rig.frames):
+        number = f"{6 * index:05d}"
+        rgb, camera = photograph(frame, 3)
+        save_color(folder / f"frame_{number}.jpg", rgb)
+        for own in (number, f"{6 * index + 1:05d}"):
+            save_depth(folder / f"depth_{own}.png", frame)
+            levels = np.full(frame.depth.z_m.shape, 2, np.uint8)
+            Image.fromarray(levels).save(folder / f"conf_{own}.png")
+            values = {
+                "cameraPoseARFrame": (frame.T_world_camera @ ARKIT).ravel().tolist(),
+                "intrinsics": camera.matrix.ravel().tolist(),
+                "time": 40.0 + 0.1 * index,
+                "frame_index": 6 * index,
+            }
+            (folder / f"frame_{own}.json").write_text(json.dumps(values))
+    (folder / "info.json").write_text("{}")
+    return folder

@@ -1,0 +1,132 @@
+"""All frames of a recording as a folder in TUM's form, which many programs for RGB-D images read."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import cv2
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress, part
+from pipeline.importing.recorded import iterate_opening
+from pipeline.importing.rig_folder import check_new, new_folder
+from pipeline.importing.tum import UNITS_PER_METRE
+from pipeline.io.images import write_color
+from pipeline.io.intrinsics import write_intrinsics
+from pipeline.io.same_view import alike
+from pipeline.types import AnyPath, CameraIntrinsics, RgbdFrame
+
+PROGRESS_EVERY, REPORTS = 5, 100
+"""Least number of frames between progress reports, and most reports."""
+FARTHEST_M = 65534 / UNITS_PER_METRE
+"""Largest depth of the form."""
+
+
+@dataclass(frozen=True, slots=True)
+class KeptReport:
+    """Result of keeping a recording."""
+
+    kind: str
+    folder: str
+    candidates: int
+    """Number of frames of the recording."""
+    frames: int
+    """Number of frames that were written."""
+    notes: tuple[str, ...]
+    """Notes, one sentence each."""
+
+
+def iterate_keep(
+    path: AnyPath, out: AnyPath, depth_scale: float | None = None, intrinsics: AnyPath | None = None
+) -> Generator[Progress, None, KeptReport]:
+    """Write all frames of a recording in TUM's form, completely or not at all.
+
+    The folder gets ``rgb/``, ``depth/`` (registered to colour, 5000 units in a metre), ``rgb.txt``,
+    ``depth.txt``, ``intrinsics.json`` and, if poses are known, ``groundtruth.txt``.
+
+    Args:
+        path: the recording's folder, a bag, or a folder with only this recording.
+        out: the new folder, or an empty one.
+        depth_scale: depth units per metre; by default that of the kind of recording.
+        intrinsics: intrinsics file of the colour camera; by default the recording's, or those of its kind.
+
+    Raises:
+        InputError: the path is no usable recording, its camera changes, or the folder cannot be written.
+    """
+    check_new(Path(out))
+    opening = iterate_opening(path, depth_scale, intrinsics)
+    recording = yield from part(opening, "files", 0.0, 0.1, detail=True)
+    count = len(recording.times_s)
+    left_out: list[str] = []
+    with new_folder(Path(out)) as folder:
+        writer = _Writer(folder)
+        for number in range(count):
+            if number % max(PROGRESS_EVERY, count // REPORTS) == 0:
+                yield Progress(f"frame {number} of {count}", 0.1 + 0.9 * number / count)
+            try:
+                frame = recording.frame(number)
+            except InputError as error:
+                left_out.append(str(error))
+                continue
+            writer.write(frame, float(recording.times_s[number]))
+        if writer.camera is None:
+            raise InputError(f"No frame of {recording.name} can be read, the first because: {left_out[0]}")
+        writer.finish(writer.camera)
+    notes = [*recording.notes]
+    if left_out:
+        notes.append(f"{len(left_out)} frames were left out, the first because: {left_out[0]}")
+    if writer.too_far:
+        notes.append(f"{writer.too_far} depths beyond {FARTHEST_M:.1f} m, the form's largest, were left out")
+    return KeptReport(recording.kind, str(path), count, count - len(left_out), tuple(dict.fromkeys(notes)))
+
+
+@dataclass(slots=True)
+class _Writer:
+    """A folder in TUM's form."""
+
+    folder: Path
+    camera: CameraIntrinsics | None = None
+    too_far: int = 0
+    """Number of depths that were left out."""
+    lines: dict[str, list[str]] = field(default_factory=lambda: {"rgb": [], "depth": [], "groundtruth": []})
+
+    def write(self, frame: RgbdFrame, time_s: float) -> None:
+        """Write the images of a frame.
+
+        Raises:
+            InputError: its camera is not that of the frames before.
+        """
+        self.camera = frame.intrinsics if self.camera is None else self.camera
+        if not alike(frame.intrinsics, self.camera):
+            raise InputError(
+                f"The camera of {frame.name} is not that of the frames before, and TUM's form has only one; "
+                "try `packetmesh reconstruct --recording` with the recording as it is"
+            )
+        name = f"{frame.name.removeprefix('frame_')}.png"
+        for kind in ("rgb", "depth"):
+            (self.folder / kind).mkdir(exist_ok=True)
+            self.lines[kind].append(f"{time_s:.6f} {kind}/{name}")
+        write_color(self.folder / "rgb" / name, frame.rgb)
+        units = np.where(frame.depth.valid, frame.depth.z_m, 0.0).astype(np.float64) * UNITS_PER_METRE
+        far = units > FARTHEST_M * UNITS_PER_METRE
+        self.too_far += int(far.sum())
+        png = cv2.imencode(".png", np.rint(np.where(far, 0.0, units)).astype(np.uint16))[1]
+        (self.folder / "depth" / name).write_bytes(png.tobytes())
+        if frame.pose_known:
+            T = frame.T_world_camera
+            values = [*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_quat()]
+            numbers = " ".join(f"{value:.9f}" for value in values)
+            self.lines["groundtruth"].append(f"{time_s:.6f} {numbers}")
+
+    def finish(self, camera: CameraIntrinsics) -> None:
+        """Write the lists and the camera."""
+        write_intrinsics(self.folder / "intrinsics.json", camera)
+        for name, lines in self.lines.items():
+            columns = "tx ty tz qx qy qz qw" if name == "groundtruth" else "filename"
+            if lines:
+                text = "\n".join([f"# timestamp {columns}", *lines]) + "\n"
+                (self.folder / f"{name}.txt").write_text(text, encoding="utf-8")
