@@ -48,6 +48,8 @@ FusionMode = Literal["union", "fill"]
 Fill = Literal["auto", "completion", "network"]
 RadiusRule = Literal["thesis", "thesis+", "manual"]
 NodePoints = Literal["sensor", "fused"]
+MOST_FRAMES = 64
+"""Most depth images of a camera that stands that are averaged: 79 MB at 640 x 480 pixels."""
 
 
 def _at_least(key: str, value: float, least: float) -> None:
@@ -58,6 +60,19 @@ def _at_least(key: str, value: float, least: float) -> None:
 def _above(key: str, value: float, bound: float) -> None:
     if not value > bound:
         raise InputError(f"{key} is {value}; try a value above {bound}")
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingConfig:
+    """Recording to rig (SPEC 10)."""
+
+    frames: int = MOST_FRAMES
+    """Frames of a camera that stands, from the first one, that are averaged, 1 to 64; recordings of a camera
+    that walks and other images do not use it."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.frames <= MOST_FRAMES:
+            raise InputError(f"recording.frames is {self.frames}; try a number from 1 to {MOST_FRAMES}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,6 +258,7 @@ class PipelineConfig:
     """Registers nodes to one another."""
     fusion: FusionConfig = field(default_factory=FusionConfig)
     surface: SurfaceConfig = field(default_factory=SurfaceConfig)
+    recording: RecordingConfig = field(default_factory=RecordingConfig)
 
 
 PRESETS: dict[str, PipelineConfig] = {

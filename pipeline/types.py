@@ -108,6 +108,27 @@ class DepthNoise:
 
 
 @dataclass(frozen=True, slots=True)
+class Averaging:
+    """Average of a recording's depth images, of a camera that stands (SPEC 10.4)."""
+
+    sd_m: FloatArray
+    """(H, W) standard deviation of the averaged depth; NaN where it is unknown."""
+    frames: int
+    """Number of depth images that were averaged."""
+    available: int
+    """Most that could be."""
+    moving_share: float
+    """Share of the pixels that moved, which have no depth."""
+    flickering_share: float
+    """Share of the pixels that few of the images measured."""
+
+    @property
+    def median_sd_m(self) -> float:
+        """Median standard deviation of the averaged depth."""
+        return float(np.nanmedian(self.sd_m))
+
+
+@dataclass(frozen=True, slots=True)
 class RgbdFrame:
     """One registered colour and depth image of one camera node."""
 
@@ -129,6 +150,8 @@ class RgbdFrame:
     """False if the pose is unknown, so that registration must find it without a start."""
     notes: tuple[str, ...] = ()
     """Doubts about the images, one sentence each, with what to try."""
+    averaging: Averaging | None = None
+    """How ``depth`` was averaged; None for a single image."""
 
 
 @dataclass(frozen=True, slots=True)

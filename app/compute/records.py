@@ -64,6 +64,24 @@ class SceneNode:
 
 
 @dataclass(frozen=True, slots=True)
+class AveragedView:
+    """Depth of cameras that stand, averaged over the frames of their recordings."""
+
+    frames: int
+    """Number of frames that were averaged; of several cameras the most."""
+    available: int
+    """Most that could be."""
+    unmeasured_share: float
+    """Share of the pixels without depth."""
+    moving_share: float
+    """Share of the pixels that moved, which have no depth."""
+    flickering_share: float
+    """Share of the pixels that few of the frames measured."""
+    median_sd_m: float
+    """Standard deviation of the depth, median."""
+
+
+@dataclass(frozen=True, slots=True)
 class SceneView:
     """A loaded rig."""
 
@@ -72,6 +90,10 @@ class SceneView:
     has_truth: bool
     notes: tuple[str, ...]
     """Doubts about the images of the rig, one sentence each."""
+    has_walk: bool = False
+    """Whether its nodes are keyframes of a recording."""
+    averaged: AveragedView | None = None
+    """Average of the frames, if its cameras stand; None for single images."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,7 +38,8 @@ def acquire(frame: RgbdFrame, config: AcquisitionConfig) -> Acquired:
         InputError: no pixel has a depth, or as for ``find_outliers``.
     """
     known = pixels_in_front(frame, frame.depth)
-    planes = local_planes(frame.depth, frame.intrinsics, frame.noise)
+    least_sd_m = None if frame.averaging is None else frame.averaging.sd_m
+    planes = local_planes(frame.depth, frame.intrinsics, frame.noise, least_sd_m)
     if config.outlier_mode == "flying":
         score = flying_score(planes)[known]
         outliers = Outliers(score <= FARTHEST_SD, score, FARTHEST_SD)

@@ -8,7 +8,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from pipeline.kernels.geometry import has_ray, pixel_rays
-from pipeline.types import BoolArray, DepthMap, FloatArray, PointCloud, PointSource, RgbdFrame
+from pipeline.types import BoolArray, DepthMap, FloatArray, IntArray, PointCloud, PointSource, RgbdFrame
 
 
 def back_project(
@@ -44,7 +44,7 @@ def back_project(
         points_m=points_m,
         colors=frame.rgb.reshape(-1, 3).take(places, axis=0),
         pixels=np.stack([places % known.shape[1], places // known.shape[1]], axis=1),
-        sigma_m=_sigma_m(frame, z_m) if source == PointSource.SENSOR else None,
+        sigma_m=_sigma_m(frame, places, z_m) if source == PointSource.SENSOR else None,
         source=np.full(len(z_m), source, dtype=np.uint8),
     )
 
@@ -76,9 +76,14 @@ def without_rayless(frame: RgbdFrame) -> RgbdFrame:
     return replace(frame, depth=replace(frame.depth, z_m=z_m))
 
 
-def _sigma_m(frame: RgbdFrame, z_m: FloatArray) -> FloatArray:
-    """Return (N,) deviations by the sensor's calibrated noise at normal incidence; else by a Kinect's."""
-    return depth_sigma_m(z_m) if frame.noise is None else frame.noise.sd_m(z_m)
+def _sigma_m(frame: RgbdFrame, places: IntArray, z_m: FloatArray) -> FloatArray:
+    """Return (N,) deviations of an average where there is one; else by the sensor's calibrated noise at
+    normal incidence, or by a Kinect's."""
+    sd_m = depth_sigma_m(z_m) if frame.noise is None else frame.noise.sd_m(z_m)
+    if frame.averaging is None:
+        return sd_m
+    own_m = frame.averaging.sd_m.reshape(-1).take(places)
+    return np.where(np.isfinite(own_m), own_m, sd_m)
 
 
 def depth_sigma_m(z_m: FloatArray) -> FloatArray:

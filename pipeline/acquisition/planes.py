@@ -57,7 +57,10 @@ class LocalPlanes:
 
 
 def local_planes(
-    depth: DepthMap, intrinsics: CameraIntrinsics, noise: DepthNoise | None = None
+    depth: DepthMap,
+    intrinsics: CameraIntrinsics,
+    noise: DepthNoise | None = None,
+    least_sd_m: FloatArray | None = None,
 ) -> LocalPlanes:
     """Estimate the local planes of a depth image.
 
@@ -65,6 +68,7 @@ def local_planes(
         depth: (H, W) metric.
         intrinsics: the camera, whose focal length determines which steps are too steep for a surface.
         noise: the sensor's calibrated noise; None estimates it from the image.
+        least_sd_m: (H, W) least standard deviation of each depth, NaN where there is none.
     """
     known = depth.valid & (depth.z_m > 0)
     inverse = (known / np.where(known, depth.z_m, 1.0)).astype(np.float32)
@@ -78,6 +82,8 @@ def local_planes(
     else:
         z_m = 1.0 / np.where(known, inverse, 1.0)
         sd = noise.sd_m(z_m, 1.0 / np.hypot(1.0, slope * z_m * intrinsics.fx_px)) * inverse**2
+    if least_sd_m is not None:
+        sd = np.fmax(sd, least_sd_m * inverse**2)
     return LocalPlanes(inverse, right, down, sd.astype(np.float32))
 
 

@@ -160,6 +160,18 @@ def load_rig(directory: AnyPath, calibration: AnyPath | None = None, depth_scale
     ['node_00', 'node_01', 'node_02']
     """
     directory = Path(directory)
+    folders = nodes_in(directory)
+    over = {} if calibration is None else calibration_files(calibration, [folder.name for folder in folders])
+    frames = tuple(load_node(folder, over.get(folder.name, NodeFiles()), depth_scale) for folder in folders)
+    return Rig(directory.resolve().name, frames, read_truth(directory, [frame.name for frame in frames]))
+
+
+def nodes_in(directory: Path) -> list[Path]:
+    """Return the folders of a rig's nodes, node_2 before node_10.
+
+    Raises:
+        InputError: the folder is missing, has no node or more than ``MAX_NODES``.
+    """
     if directory.is_file():
         raise InputError(f"The rig {directory} is a file; packetmesh import makes a rig of a recording")
     if not directory.is_dir():
@@ -175,9 +187,7 @@ def load_rig(directory: AnyPath, calibration: AnyPath | None = None, depth_scale
             f"The rig folder {directory} holds {len(folders)} nodes; try to move some away, so that at most "
             f"{MAX_NODES} remain"
         )
-    over = {} if calibration is None else calibration_files(calibration, [folder.name for folder in folders])
-    frames = tuple(_load_node(folder, over.get(folder.name, NodeFiles()), depth_scale) for folder in folders)
-    return Rig(directory.resolve().name, frames, read_truth(directory, [frame.name for frame in frames]))
+    return folders
 
 
 def is_rig(path: Path) -> bool:
@@ -241,7 +251,17 @@ def _natural(name: str) -> list[tuple[str, int]]:
     return [(letters, int(number or -1)) for letters, number in re.findall(r"(\D*)(\d*)", name)]
 
 
-def _load_node(folder: Path, over: NodeFiles, depth_scale: float | None) -> RgbdFrame:
+def load_node(folder: Path, over: NodeFiles, depth_scale: float | None) -> RgbdFrame:
+    """Load one node of a rig.
+
+    Args:
+        folder: contains color.png, depth.png, intrinsics.json and, if they are known, pose.txt and so on.
+        over: files that replace its own.
+        depth_scale: depth units per metre, as for ``load_frame``.
+
+    Raises:
+        InputError: a file is missing or cannot be used.
+    """
     files: NodeFiles = {"intrinsics": _intrinsics_in(folder), **node_files(folder), **over}
     for stem in ("color", "depth"):
         names = [file.name for file in _images_in(folder, stem)]

@@ -42,6 +42,7 @@ RULES: dict[str, RadiusRule] = {
     "one radius (slider)": "manual",
 }
 """Rules for the radii of the balls."""
+COLORING_NAMES = {key: name for name, key in COLORINGS.items()}
 RULE_NAMES = {rule: name for name, rule in RULES.items()}
 NAMES: dict[Shown, str] = {
     "after": "After fusion",
@@ -51,6 +52,7 @@ NAMES: dict[Shown, str] = {
 }
 """Names of the surfaces in exported files."""
 HINTS = {
+    "Radius": "Radius of the ball; drag to roll another.",
     "Radii": "r_F and σ_D: mean and standard deviation of the distance to the nearest neighbour in the fused "
     "cloud. Several balls roll one after the other, the small ones first.",
     "Show": "Surface that is drawn: the ball's, or that of another method from the same points.",

@@ -14,6 +14,7 @@ from app.screens.surface import labels
 from app.screens.surface.advice import AdviceFolder
 from app.screens.surface.baselines import Baselines
 from app.screens.surface.export import surface_offers
+from app.screens.surface.frames import FramesSlider
 from app.screens.surface.holes import HolesFolder
 from app.screens.surface.lesson import NUMBERS, SETTINGS, SHIPPED, SurfaceLook, numbers, surface_of
 from app.screens.surface.numbers import quality_table, quick_line
@@ -57,10 +58,9 @@ class SurfacePanel(Panel):
         gui.add_markdown(labels.TEXT)
         lesson = read_lesson(SHIPPED, SETTINGS, SurfaceLook(), NUMBERS)
         self._lesson = LessonFolder(self.ui, lesson, self._take_look, self._lesson_numbers)
-        self._radius = gui.add_slider(
-            "Radius (mm)", 1.0, 120.0, 0.5, 20.0, hint="Radius of the ball; drag to roll another."
-        )
+        self._radius = gui.add_slider("Radius (mm)", 1.0, 120.0, 0.5, 20.0, hint=labels.HINTS["Radius"])
         self.ui.when_changed(self._radius, self._dragged)
+        self._frames = FramesSlider(session)
         rule = labels.RULE_NAMES[session.spec.config.surface.radius_rule]
         self._rule = gui.add_dropdown(
             "Radii", list(labels.RULES), initial_value=rule, hint=labels.HINTS["Radii"]
@@ -120,6 +120,7 @@ class SurfacePanel(Panel):
             return
         self._key = spec.key("surface")
         self._controls.write(spec.config)
+        self._frames.write(spec.config)
         self._rule.value = labels.RULE_NAMES[spec.config.surface.radius_rule]
         thinning = (spec.config.surface.max_points, spec.config.surface.smoothing_passes)
         if thinning != self._thinning:
@@ -138,6 +139,7 @@ class SurfacePanel(Panel):
             self._holes.forget()
         if step == "scene":
             self._ball.forget()
+            self._frames.show(view.averaged)
         if step == "surface":
             self.on_partial(view)
 
@@ -359,9 +361,7 @@ class SurfacePanel(Panel):
         session = self.session
         with self.ui.atomic():
             self._shown.value = look.shown
-            self._coloring.value = next(
-                name for name, key in labels.COLORINGS.items() if key == look.coloring
-            )
+            self._coloring.value = labels.COLORING_NAMES[look.coloring]
             self._loops.value = look.rims
             self._walks.close()
             self._picked_coloring()

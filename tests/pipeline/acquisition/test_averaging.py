@@ -48,3 +48,13 @@ def test_no_pixel_moves_beyond_its_noise_and_edges_stay():
     assert np.all(moved <= FARTHEST_SD * planes.sd[known] * (1.0 + 1e-4) + 1e-6)
     between = known & (found.z_m > 1.5) & (found.z_m < 1.7)
     assert not between.any()
+
+
+def test_the_deviation_of_an_average_is_the_least_that_counts():
+    z_m = np.full((CAMERA.height_px, CAMERA.width_px), 2.0, np.float32)
+    sd_m = np.full_like(z_m, 0.0001)
+    z_m[100, 100], sd_m[100, 100], sd_m[50, 50] = 2.05, 0.1, np.nan
+    alone, known = (local_planes(DepthMap(z_m), CAMERA, None, least) for least in (None, sd_m))
+    assert known.sd[100, 100] == pytest.approx(0.1 / 2.05**2, rel=1e-3)
+    assert known.sd[50, 50] == alone.sd[50, 50]
+    assert known.sd[10, 10] == pytest.approx(max(alone.sd[10, 10], 0.0001 / 2.0**2), rel=1e-3)

@@ -1,0 +1,167 @@
+"""A recording as a rig: the average of a camera that stands, or the map of one that walks (SPEC 10)."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress, part
+from pipeline.config import MOST_FRAMES
+from pipeline.importing.recorded import DepthView
+from pipeline.io.depth_to_color import register_depth
+from pipeline.kernels.geometry import inverse, pixel_rays, project
+from pipeline.recording.recording import Recording
+from pipeline.recording.still import Vote, inverse_depth, voted
+from pipeline.recording.tracking import REPORTED, read_ahead
+from pipeline.recording.walk import LEAST_FRAMES, iterate_walk
+from pipeline.types import Averaging, ByteArray, DepthMap, FloatArray, RgbdFrame, Rig
+
+COMPARED = 12
+"""Frames that are compared with the first one, evenly chosen."""
+SIDE_PX = 8
+"""Side of the squares of pixels whose mean depth is compared."""
+KNOWN, WITHIN_SD = 0.5, 1.0
+"""Least share of a square's pixels that both frames measured, and largest change of their mean depth at rest,
+in standard deviations of one pixel: the change of a square's mean has a sixth of it."""
+AT_REST = 0.5
+"""Least share of the squares that do not change: with Kinect's noise, walks have .4 and less after three
+frames, and the frames of a real SR300 .9 until it begins to move."""
+CLIPPED_SD = 6.0
+"""A pixel counts for no larger change."""
+MOVED_M = 0.1
+"""Given positions farther apart are those of a walk: a corridor looks the same all along."""
+PHOTOGRAPHS = 3
+"""Photographs of which the median colour is taken: what stood in one of them is not painted on a wall."""
+NAME = "camera"
+"""Name of the node."""
+
+
+def iterate_recording(recording: Recording, frames: int = MOST_FRAMES) -> Generator[Progress, None, Rig]:
+    """Turn a recording into a rig, of one node if the camera stands; else its path is tracked.
+
+    Args:
+        recording: the frames.
+        frames: number of frames that are averaged if the camera stands.
+
+    Raises:
+        InputError: as ``iterate_walk``.
+    """
+    yield Progress("comparing frames", 0.0)
+    if not stands(recording):
+        return (yield from iterate_walk(recording))
+    steps = iterate_still(recording, frames)
+    frame = yield from part(steps, "a camera that stands", 0.0, 1.0, detail=True)
+    return Rig(recording.name, (frame,))
+
+
+def stands(recording: Recording) -> bool:
+    """Return whether the camera is at rest, by depth: in every compared frame most squares of the first one
+    keep their distance. Frames without depth are not compared.
+    """
+    count = len(recording.times_s)
+    if count < LEAST_FRAMES or _walks_by_poses(recording):
+        return False
+    numbers = np.unique(np.linspace(0, count - 1, COMPARED + 1).round().astype(int))
+    views = (recording.view(int(k)) for k in numbers)
+    first = next((view for view in views if view.depth.valid.any()), None)
+    shares = [] if first is None else [unchanged_share(first, v) for v in views if v.depth.valid.any()]
+    return bool(shares) and min(shares) >= AT_REST
+
+
+def _walks_by_poses(recording: Recording) -> bool:
+    """Return whether the poses that came with a recording are apart; their convention does not matter."""
+    at_m = np.array([T[:3, 3] for T in recording.T_world_camera or () if T is not None]).reshape(-1, 3)
+    return len(at_m) > 0 and float(np.linalg.norm(at_m - at_m[0], axis=1).max()) > MOVED_M
+
+
+def unchanged_share(first: DepthView, other: DepthView) -> float:
+    """Return the share of the first view's squares whose mean 1/z the other has, too; 0 for other sizes."""
+    shape = first.depth.z_m.shape
+    if shape != other.depth.z_m.shape:
+        return 0.0
+    inverse_first, inverse_other = inverse_depth(first.depth), inverse_depth(other.depth)
+    known = _squares(inverse_first > 0.0)
+    both = known & _squares(inverse_other > 0.0)
+    z_m = 1.0 / np.where(inverse_first > 0.0, inverse_first, np.inf)
+    sd = first.noise.sd_m(np.maximum(z_m, 1e-6)) * inverse_first**2
+    change = _squares((inverse_other - inverse_first) / np.where(sd > 0.0, sd, np.inf))
+    total = np.where(both, np.clip(change, -CLIPPED_SD, CLIPPED_SD), 0.0).sum(axis=1)
+    seen, counts = known.mean(axis=1) >= KNOWN, both.sum(axis=1)
+    same = (both.mean(axis=1) >= KNOWN) & (np.abs(total) <= WITHIN_SD * counts)
+    return float(same[seen].mean()) if seen.any() else 0.0
+
+
+def _squares(image: NDArray[Any]) -> NDArray[Any]:
+    """Return (squares, pixels of one) of an (H, W) image, without incomplete squares at its rims."""
+    rows, columns = (length // SIDE_PX for length in image.shape)
+    cut = image[: rows * SIDE_PX, : columns * SIDE_PX].reshape(rows, SIDE_PX, columns, SIDE_PX)
+    return cut.transpose(0, 2, 1, 3).reshape(rows * columns, SIDE_PX**2)
+
+
+def iterate_still(recording: Recording, frames: int) -> Generator[Progress, None, RgbdFrame]:
+    """Average the first frames of a camera that stands; colours are the median of three of them.
+
+    Raises:
+        InputError: a photograph cannot be read, or nothing keeps its depth.
+    """
+    available = min(len(recording.times_s), MOST_FRAMES)
+    count = min(frames, available)
+    view = recording.view(0)
+    stack = np.zeros((count, *view.depth.z_m.shape), np.float32)
+    for k, view in read_ahead(recording, range(count)):
+        if k % REPORTED == 0:
+            yield Progress(f"reading frame {k} of {count}", k / count)
+        if view.depth.z_m.shape == stack.shape[1:]:
+            stack[k] = inverse_depth(view.depth)
+    yield Progress(f"averaging {count} frames", 0.9)
+    vote = voted(stack, view.noise)
+    if not vote.depth.valid.any():
+        raise InputError(f"No pixel of {recording.name} keeps its depth; try recording.frames=1")
+    numbers = np.unique(np.linspace(0, count - 1, PHOTOGRAPHS).round().astype(int))
+    photographs = [recording.frame(int(k)) for k in numbers]
+    depth, sd_m = _on_color(vote, view, photographs[0])
+    shares = float(vote.moving.mean()), float(vote.flickering.mean())
+    averaging = Averaging(sd_m, count, available, *shares)
+    notes = (*recording.notes, _sentence(averaging, len(recording.times_s)), *photographs[0].notes)
+    rgb = _median_color([frame.rgb for frame in photographs])
+    return replace(photographs[0], name=NAME, rgb=rgb, depth=depth, averaging=averaging, notes=notes)
+
+
+def _median_color(photographs: list[ByteArray]) -> ByteArray:
+    """Return (H, W, 3) the median of photographs; of two it is the first."""
+    if len(photographs) < PHOTOGRAPHS:
+        return photographs[0]
+    return np.median(photographs, axis=0).astype(np.uint8)
+
+
+def _on_color(vote: Vote, view: DepthView, frame: RgbdFrame) -> tuple[DepthMap, FloatArray]:
+    """Return depth and its (H, W) standard deviation on the pixel grid of a photograph."""
+    camera = frame.intrinsics
+    same = view.depth.z_m.shape == frame.rgb.shape[:2] and not camera.fisheye
+    same = same and np.array_equal(view.camera.matrix, camera.matrix) and not np.any(camera.distortion)
+    if same and np.array_equal(view.T_color_depth, np.eye(4)):
+        return vote.depth, vote.sd_m
+    depth = register_depth(vote.depth, view.camera, camera, view.T_color_depth)
+    rows, columns = np.nonzero(depth.valid)
+    points_m = pixel_rays(camera)[rows, columns] * depth.z_m[rows, columns, None]
+    T_depth_color = inverse(view.T_color_depth)
+    own_m = points_m @ T_depth_color[:3, :3].T + T_depth_color[:3, 3]
+    u, v = np.rint(np.nan_to_num(project(view.camera, own_m), nan=-1.0)).astype(int).T
+    inside = (u >= 0) & (u < view.camera.width_px) & (v >= 0) & (v < view.camera.height_px)
+    sd_m = np.full(depth.z_m.shape, np.nan, np.float32)
+    sd_m[rows[inside], columns[inside]] = vote.sd_m[v[inside], u[inside]]
+    return depth, sd_m
+
+
+def _sentence(averaging: Averaging, of: int) -> str:
+    """Return what was averaged, and what share of the pixels moved and flickers."""
+    verb = "was used" if averaging.frames == 1 else "were averaged"
+    return (
+        f"The camera stands: {averaging.frames} of {of} frames {verb}; {averaging.moving_share:.1%} of the "
+        f"pixels moved and are left out, {averaging.flickering_share:.1%} flicker"
+    )
