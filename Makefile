@@ -8,7 +8,7 @@ ARGS   ?=
 # Where no bytecode is kept, every process compiles all that it imports: two seconds each.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run test test-fast mutants check docs audit bench reproduce results results-record lock scenes clean
+.PHONY: run test test-fast mutants check docs audit bench reproduce results results-record lock scenes recordings clean
 
 run: $(VENV)/.core  ## the app in the browser, with a scene reconstructed
 	$(BIN)/packetmesh serve --scene $(SCENE) --open $(ARGS)
@@ -49,6 +49,9 @@ results-record: $(VENV)/.dev  ## measure for the records named by ONLY, then as 
 
 scenes: $(VENV)/.core  ## render the demo scenes again
 	$(BIN)/python -m lab.worlds $(ARGS)
+
+recordings: $(VENV)/.core  ## render the demo recording again
+	$(BIN)/python -m lab.walks.shipped
 
 lock: $(VENV)/.uv  ## pin everything anew
 	$(BIN)/uv pip compile -q --universal --generate-hashes --no-header --python-version 3.11 pyproject.toml -o requirements.lock

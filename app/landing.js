@@ -33,16 +33,21 @@
     else window.packetmeshAddress.ask(place);
   }
 
-  function openLesson(title) {
-    const label = `Lesson: ${title}`;
-    const seen = element => element.offsetParent !== null;
+  const seen = element => element.offsetParent !== null;
+
+  // Open the folder of this label, and call `act` with it.
+  function openFolder(label, act) {
     const head = () => [...document.querySelectorAll("svg.tabler-icon-chevron-down")]
       .map(arrow => arrow.parentElement).find(one => one.textContent.trim() === label && seen(one));
-    const next = folder => () => [...folder.querySelectorAll("button")].find(one => one.textContent === "Next" && seen(one));
     once(head, found => {
       found.click();
-      once(next(found.parentElement), go => { go.click(); leave(); });
+      act(found.parentElement);
     });
+  }
+
+  function openLesson(title) {
+    const next = folder => () => [...folder.querySelectorAll("button")].find(one => one.textContent === "Next" && seen(one));
+    openFolder(`Lesson: ${title}`, folder => once(next(folder), go => { go.click(); leave(); }));
   }
 
   landing.addEventListener("click", event => {
@@ -52,6 +57,7 @@
     landing.style.cursor = "progress";
     goTo(card.dataset.place);
     if ("lesson" in card.dataset) openLesson(card.dataset.lesson);
+    else if ("folder" in card.dataset) openFolder(card.dataset.folder, leave);
     else leave();
   });
   window.addEventListener("keydown", escape, true);

@@ -1,5 +1,5 @@
 """The page that a browser gets: viser's, with the app's scripts and styles, and over it the landing, which
-offers lessons and scenes with pictures while the first scene loads.
+offers lessons, scenes and the folder for one's own images while the first scene loads.
 
 The landing is part of the page itself, so it is shown before viser starts. An address with a query skips it;
 in a lecture only the teacher's link shows it, without the scenes.
@@ -14,7 +14,7 @@ from app.lesson.files import LESSONS
 from app.web.entrance import WELCOME
 from app.web.markup import Markup
 from app.web.page import Page
-from pipeline.io.demos import DEMO_SCENES
+from pipeline.io.demos import DEMOS
 
 PICTURES = Path(__file__).resolve().parents[1] / "assets" / "landing"
 """Folder of ``NAME.jpg`` of every lesson and scene."""
@@ -25,8 +25,11 @@ LESSON_PLACES = {
     "how-images-cross-a-network": ("living-room", "network"),
     "what-one-lost-packet-costs": ("living-room", "network"),
     "how-good-is-my-calibration": ("uncalibrated", "calibrate"),
+    "how-a-walk-becomes-a-room": ("living-room-walk", "fuse"),
 }
 """Scene and screen of each lesson, in the order in which the lessons are offered."""
+OWN_FOLDER = "Use your own images"
+"""Title of the Scene screen's folder for uploads."""
 
 _HERE = Path(__file__).parent
 SCRIPTS = tuple(
@@ -63,14 +66,17 @@ def landing_html(lecture: bool = False) -> Markup:
         _card(name, _title(name), f"scene={scene}&screen={screen}", lesson=True)
         for name, (scene, screen) in LESSON_PLACES.items()
     )
-    scenes = Markup("").join(_card(name, scene.title, f"scene={name}") for name, scene in DEMO_SCENES.items())
+    scenes = Markup("").join(_card(name, scene.title, f"scene={name}") for name, scene in DEMOS.items())
     shared = Markup(" data-lecture") if lecture else ""
-    others = Markup("<div><h2>Or a scene to explore</h2><section>{}</section></div>").format(scenes)
+    own = Markup('<button type="button" data-place="screen=scene" data-folder="{}">Open your own …</button>')
+    others = Markup("<div><h2>Or a scene to explore</h2><section>{}</section>{}</div>").format(
+        scenes, own.format(OWN_FOLDER)
+    )
     return Markup(
         '<main id="packetmesh-landing"{} inert role="dialog" aria-label="Welcome">'
         "<header><div><h1>PacketMesh</h1><p>From a camera network's packets to a surface mesh.</p></div>"
         '<button type="button" data-explore>Explore <kbd>Esc</kbd></button></header>'
-        "<article><div><h2>Six lessons, each about one question</h2><section>{}</section></div>{}"
+        "<article><div><h2>Seven lessons, each about one question</h2><section>{}</section></div>{}"
         "</article></main>"
     ).format(shared, lessons, "" if lecture else others)
 

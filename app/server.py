@@ -46,7 +46,7 @@ from packetmesh.errors import InputError
 from packetmesh.files import file_trouble
 from packetmesh.memory import give_back_memory, share_arenas
 from pipeline.config import PRESETS, PipelineConfig
-from pipeline.sources import Demo, Recorded, RigFolder
+from pipeline.sources import Demo, Recorded, RigFolder, demo_of
 
 PANEL_WIDTH_PX = 440
 ANYWHERE = "0.0.0.0"
@@ -261,14 +261,15 @@ def start_spec(scene: str, config: PipelineConfig) -> Spec:
 
 
 def _source(scene: str) -> Demo | RigFolder | Recorded:
-    folder = Path(scene)
-    if not folder.is_dir():
-        return Demo(scene)
-    from pipeline.importing.kinds import kind_of
+    place = Path(scene)
+    if not place.exists():
+        return demo_of(scene)
+    from pipeline.importing import is_recording
     from pipeline.io.rigs import is_rig
 
-    path = str(folder.resolve())
-    return Recorded(path) if kind_of(folder) is not None and not is_rig(folder) else RigFolder(path)
+    if is_recording(place) and not is_rig(place):
+        return Recorded(str(place.resolve()))
+    return RigFolder(str(place.resolve())) if place.is_dir() else Demo(scene)
 
 
 def own_address() -> str:

@@ -9,10 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeAlias
 
+from packetmesh.errors import InputError
+from pipeline.config import MOST_FRAMES
 from pipeline.types import Rig
 
 if TYPE_CHECKING:
-    from pipeline.importing.recorded import FolderRecording
+    from collections.abc import Generator
+
+    from packetmesh.progress import Progress
+    from pipeline.importing.recorded import BagRecording, FolderRecording
     from pipeline.io.calibrations import NodeFiles
 
 
@@ -62,7 +67,7 @@ class Demo:
 
 @dataclass(frozen=True, slots=True)
 class RigFolder:
-    """A folder with node_00, node_01 and so on."""
+    """A folder with node_00, node_01 and so on: images, or recordings of cameras that stand."""
 
     path: str
     depth_scale: float | None = None
@@ -77,9 +82,18 @@ class RigFolder:
 
     def load_with(self, calibration: str | None) -> Rig:
         """Load the rig, with calibration files from a folder instead of its own."""
+        from packetmesh.progress import drain
         from pipeline.io.rigs import load_rig
+        from pipeline.recording.rig import holds_recordings, iterate_recorded_rig
 
-        return load_rig(self.path, calibration, self.depth_scale)
+        if not holds_recordings(self.path):
+            return load_rig(self.path, calibration, self.depth_scale)
+        if calibration is not None:
+            raise InputError(
+                f"The nodes of {self.path} are recordings, which take no calibration from elsewhere; try to "
+                f"copy each node's pose.txt from {calibration} into the rig"
+            )
+        return drain(iterate_recorded_rig(self.path, MOST_FRAMES, self.depth_scale))
 
     def arguments(self) -> list[str]:
         return ["--rig", self.path, *_depth_scale_argument(self.depth_scale)]
@@ -153,36 +167,53 @@ class Calibrated:
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """A recording whose camera walks; ``stages.open_rig`` tracks it."""
+    """A recording; ``stages.open_rig`` averages it if its camera stands, and tracks it if it walks."""
 
     path: str
     depth_scale: float | None = None
     """Depth units per metre; by default that of the kind of recording."""
     intrinsics: str | None = None
     """Intrinsics of the colour camera; by default the recording's, or those of its kind."""
+    demo: str | None = None
+    """Name of the demo whose recording it is."""
 
     @property
     def title(self) -> str:
-        return self.path
+        return self.demo or self.path
 
-    def open(self) -> FolderRecording:
+    @property
+    def true_path(self) -> Path | None:
+        """Return the file of the true poses, which only judge the result; None if they are not known."""
+        from pipeline.io.demos import TRUE_PATH
+
+        return None if self.demo is None else Path(self.path) / TRUE_PATH
+
+    def iterate_open(self) -> Generator[Progress, None, FolderRecording | BagRecording]:
         """Open the recording; its images are read when they are requested.
 
         Raises:
             InputError: it cannot be used.
         """
-        from pipeline.importing.recorded import open_recording
+        from pipeline.importing.recorded import iterate_opening
 
-        return open_recording(self.path, self.depth_scale, self.intrinsics)
+        return (yield from iterate_opening(self.path, self.depth_scale, self.intrinsics))
+
+    def open(self) -> FolderRecording | BagRecording:
+        """Open the recording as ``iterate_open`` does."""
+        from packetmesh.progress import drain
+
+        return drain(self.iterate_open())
 
     def load(self) -> Rig:
-        """Track the recording and return its keyframes and its map."""
+        """Return the average of a camera that stands, or the keyframes and the map of one that walks."""
         from packetmesh.progress import drain
-        from pipeline.recording.walk import iterate_walk
+        from pipeline.recording.opening import iterate_recording
 
-        return drain(iterate_walk(self.open()))
+        return drain(iterate_recording(self.open()))
 
     def arguments(self) -> list[str]:
+        if self.demo is not None:
+            return ["--scene", self.demo]
         words = ["--recording", self.path]
         if self.intrinsics is not None:
             words += ["--intrinsics", self.intrinsics]
@@ -208,6 +239,13 @@ class LoadedRig:
 
 def _depth_scale_argument(depth_scale: float | None) -> list[str]:
     return [] if depth_scale is None else ["--depth-scale", f"{depth_scale:g}"]
+
+
+def demo_of(name: str) -> Demo | Recorded:
+    """Return a demo: the recording of this name, else the rig, whose loading fails if there is none."""
+    from pipeline.io.demos import DEMO_WALKS, RECORDINGS
+
+    return Recorded(str(RECORDINGS / name), demo=name) if name in DEMO_WALKS else Demo(name)
 
 
 FileSource: TypeAlias = Demo | RigFolder | ImagePair | Calibrated | Recorded

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Self
 
 from packetmesh.settings import differences
-from pipeline.config import PRESETS, PipelineConfig
-from pipeline.sources import Source
+from pipeline.config import MOST_FRAMES, PRESETS, PipelineConfig
+from pipeline.sources import Recorded, RigFolder, Source
 
 StageName = Literal[
     "rig",
@@ -62,8 +62,13 @@ class Needs:
     """Stages whose results it uses."""
 
 
+def _averaged(spec: Spec) -> int:
+    """Return the frames to average; the most for sources without frames, whose rig is the same for all."""
+    return spec.config.recording.frames if isinstance(spec.source, Recorded | RigFolder) else MOST_FRAMES
+
+
 NEEDS: dict[StageName, Needs] = {
-    "rig": Needs(lambda spec: (spec.source,)),
+    "rig": Needs(lambda spec: (spec.source, _averaged(spec))),
     "inferred": Needs(lambda spec: (spec.config.depth.of_network(),), ("rig",)),
     "outliers": Needs(lambda spec: (spec.config.acquisition,), ("rig",)),
     "nodes": Needs(

@@ -19,6 +19,7 @@ import numpy as np
 from packetmesh.progress import Progress, drain, part
 from pipeline.acquisition import Acquired, acquire, without_rayless
 from pipeline.config import (
+    MOST_FRAMES,
     AcquisitionConfig,
     DepthConfig,
     FusionMode,
@@ -41,8 +42,10 @@ from pipeline.nodes import (
 from pipeline.placement.outcome import Placement, whole_placement
 from pipeline.placement.pairwise import place_nodes
 from pipeline.placement.walked import place_walked
-from pipeline.recording.walk import iterate_walk
-from pipeline.sources import Recorded, Source
+from pipeline.recording.opening import iterate_recording
+from pipeline.recording.rig import holds_recordings, iterate_recorded_rig
+from pipeline.recording.truth import with_true_path
+from pipeline.sources import Recorded, RigFolder, Source
 from pipeline.spec import CHAIN, NEEDS, SIDE_BY_SIDE, Spec, StageName, key
 from pipeline.surface.ball_pivoting import roll_or_nothing
 from pipeline.surface.baselines import alpha_surface, poisson_surface
@@ -139,11 +142,21 @@ def _ready(stage: StageName, results: dict[StageName, Done]) -> bool:
 # The stages.
 
 
-def open_rig(source: Source) -> Steps[Rig]:
-    """Load the images and, if it is known, the truth; a recording is tracked and mapped."""
+def open_rig(source: Source, frames: int = MOST_FRAMES) -> Steps[Rig]:
+    """Load the images and, if it is known, the truth; a recording is averaged, or tracked and mapped.
+
+    ``frames`` is the number that is averaged if its camera stands.
+    """
     yield Progress(f"loading {source.title}", 0.0)
     if isinstance(source, Recorded):
-        rig = yield from part(iterate_walk(source.open()), "recording", 0.0, 0.05, detail=True)
+        recording = yield from part(source.iterate_open(), "recording", 0.0, 0.01, detail=True)
+        steps = iterate_recording(recording, frames)
+        rig = yield from part(steps, "recording", 0.01, 0.05, detail=True)
+        if source.true_path is not None:
+            rig = with_true_path(rig, source.true_path)
+    elif isinstance(source, RigFolder) and holds_recordings(source.path):
+        steps = iterate_recorded_rig(source.path, frames, source.depth_scale)
+        rig = yield from part(steps, "recordings", 0.0, 0.05, detail=True)
     else:
         rig = source.load()
     return replace(rig, frames=tuple(without_rayless(frame) for frame in rig.frames))

@@ -99,11 +99,14 @@ def _network() -> Iterator[Finding]:
 
 def _scenes() -> Iterator[Finding]:
     def look() -> str:
-        from pipeline.io.demos import DEMO_SCENES, load_demo
+        from pipeline.importing.recorded import open_recording
+        from pipeline.io.demos import DEMO_SCENES, DEMO_WALKS, DEMOS, RECORDINGS, load_demo
 
-        return f"{len(DEMO_SCENES)} demos, {sum(len(load_demo(name).frames) for name in DEMO_SCENES)} nodes"
+        nodes = sum(len(load_demo(name).frames) for name in DEMO_SCENES)
+        frames = sum(len(open_recording(RECORDINGS / name).times_s) for name in DEMO_WALKS)
+        return f"{len(DEMOS)} demos, {nodes} nodes, {frames} frames of walks"
 
-    yield _finding_of("scenes", look, "restore assets/scenes from the repository")
+    yield _finding_of("scenes", look, "restore assets from the repository")
 
 
 def _port() -> Iterator[Finding]:

@@ -28,8 +28,8 @@ class SourceOptions:
     """A folder with node_00/{color.png, depth.png, intrinsics.json, pose.txt}, node_01/...; `reconstruct`
     also takes a recording that `import` can read."""
     recording: Path | None = None
-    """Folder of a recording of a walking camera, of any kind that `import` can read but bags: all its frames
-    are used."""
+    """A recording of any kind that `import` can read. All frames of a walking camera are used; of one that
+    stands, up to 64 are averaged (`--set recording.frames=16`)."""
     color: Path | None = None
     """Colour image of a single RGB-D pair."""
     depth: Path | None = None
@@ -51,10 +51,14 @@ class SourceOptions:
         """Return the source that the options name; exit if they name none or more than one."""
         if self.recording is not None:
             return self._recorded()
-        from pipeline.sources import Calibrated
+        from pipeline.sources import Calibrated, Recorded
 
         source = self._images()
-        return source if self.calibration is None else Calibrated(source, str(self.calibration))
+        if self.calibration is None:
+            return source
+        if isinstance(source, Recorded):
+            wrong_use(f"the demo {source.title} is a recording, which takes no --calibration")
+        return Calibrated(source, str(self.calibration))
 
     def nothing_but_scale(self, option: str) -> None:
         """Exit if they name any images; only the depth scale may be given with this option."""
@@ -71,7 +75,7 @@ class SourceOptions:
         intrinsics = None if self.intrinsics is None else str(self.intrinsics)
         return Recorded(str(self.recording), self.depth_scale, intrinsics)
 
-    def _images(self) -> Demo | RigFolder | ImagePair:
+    def _images(self) -> Demo | RigFolder | ImagePair | Recorded:
         pair = (self.color, self.depth, self.intrinsics, self.depth_intrinsics, self.extrinsics)
         ways = [self.scene is not None, self.rig is not None, any(part is not None for part in pair)]
         if sum(ways) != 1:
@@ -79,12 +83,12 @@ class SourceOptions:
                 "give the images to reconstruct: --scene NAME, --rig DIR, --recording DIR, or --color C "
                 "--depth D --intrinsics K"
             )
-        from pipeline.sources import Demo, ImagePair, RigFolder
+        from pipeline.sources import ImagePair, RigFolder, demo_of
 
         if self.scene is not None:
             if self.depth_scale is not None:
                 wrong_use("a demo scene has its own depth scale: leave out --depth-scale")
-            return Demo(self.scene)
+            return demo_of(self.scene)
         if self.rig is not None:
             return RigFolder(str(self.rig), self.depth_scale)
         if self.color is None or self.depth is None or self.intrinsics is None:

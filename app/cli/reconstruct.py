@@ -32,8 +32,8 @@ def reconstruct(
     Args:
         images: Images to reconstruct.
         out: Folder for config.json, metrics.json, poses.json, the clouds, the surfaces and report.html.
-        rigs: Instead of one rig: a folder of rigs and of recordings that `import` can read. Each gets its
-            own folder in OUT, and all together a table (rigs.html, rigs.csv, rigs.json). The same command
+        rigs: Instead of one rig: a folder of rigs and of recordings, of which all frames are used. Each gets
+            its own folder in OUT, and all together a table (rigs.html, rigs.csv, rigs.json). The same command
             resumes an interrupted run.
         scheduler: Address of a Dask scheduler that runs many rigs; without it, this machine's cores do. Its
             workers must see the same folders.

@@ -23,11 +23,13 @@ from packetmesh.files import atomic_path, finite, writable_folder, write_json
 from packetmesh.progress import Progress, drain, part
 from packetmesh.settings import settings
 from pipeline.config import Baseline, PipelineConfig
+from pipeline.folders.keyframes import delete_keyframes, iterate_keyframes
 from pipeline.folders.run import METRICS, clear_run_folder, metrics_of, write_baseline, write_run_folder
 from pipeline.importing import ImportReport, is_recording, iterate_import
 from pipeline.io.rigs import is_rig
 from pipeline.placement.outcome import APART
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
+from pipeline.recording.walk import LEAST_FRAMES
 from pipeline.sources import Calibrated, FileSource, Recorded, RigFolder
 from pipeline.spec import Spec
 from pipeline.stages import RunCache, cameras_of, compute, run
@@ -95,6 +97,10 @@ def iterate_run(
     beside = None if baseline is None else (yield from compute(spec, baseline, cache)).value
     metrics = metrics_of(result) | ({} if report is None else {"import": asdict(report)})
     clear_run_folder(out)
+    if isinstance(rig, Recorded) and result.rig.walk is not None:
+        yield from part(iterate_keyframes(rig.open(), result.rig.walk, out), "keyframes", 0.95, 1.0)
+    else:
+        delete_keyframes(out)
     write_reconstruction_report(result, metrics, out / REPORT)
     if baseline is not None and beside is not None:
         write_baseline(baseline, beside, result, out)
@@ -188,8 +194,7 @@ def reconstruct_one(task: RigTask) -> RigOutcome:
         if kept is not None:
             return kept
         (out / TASK).unlink(missing_ok=True)
-        source = RigFolder(task.path, task.depth_scale)
-        result, metrics = drain(iterate_run(source, task.preset, task.config, out))
+        result, metrics = drain(iterate_run(_source_of(task), task.preset, task.config, out))
         _write_picture(result, out)
         write_json(out / TASK, _record(task))
         return _outcome(task, "done", finite(metrics))
@@ -202,6 +207,18 @@ def reconstruct_one(task: RigTask) -> RigOutcome:
             log.write_text(traceback.format_exc(), encoding="utf-8")
         sentence = f"An error of the program, {type(error).__name__}: {error}; see {log.name}"
         return RigOutcome(task.name, "failed", " ".join(sentence.split()))
+
+
+def _source_of(task: RigTask) -> FileSource:
+    """Return the images of a task: all frames of a recording, or a rig, as which one frame counts, too.
+
+    Raises:
+        InputError: a recording that cannot be used.
+    """
+    path, recorded = Path(task.path), Recorded(task.path, task.depth_scale)
+    if is_recording(path) and not is_rig(path) and len(recorded.open().times_s) >= LEAST_FRAMES:
+        return recorded
+    return RigFolder(task.path, task.depth_scale)
 
 
 def _record(task: RigTask) -> dict[str, Any]:

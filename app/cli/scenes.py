@@ -11,10 +11,10 @@ def scenes(json: bool = False) -> None:
     Args:
         json: Print them as one JSON object.
     """
-    from pipeline.io.demos import DEMO_SCENES
+    from pipeline.io.demos import DEMOS
 
     if json:
-        print_json({name: scene.description for name, scene in DEMO_SCENES.items()})
+        print_json({name: scene.description for name, scene in DEMOS.items()})
         return
-    for name, scene in DEMO_SCENES.items():
-        print(f"{name:<14} {scene.description}")
+    for name, scene in DEMOS.items():
+        print(f"{name:<16} {scene.description}")

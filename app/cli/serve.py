@@ -35,7 +35,7 @@ def serve(
     """Open the app: step through a reconstruction in the browser.
 
     Args:
-        scene: Demo scene to start with (see `packetmesh scenes`), a rig folder, or a recording's folder.
+        scene: Demo scene to start with (see `packetmesh scenes`), a rig folder, or a recording.
         preset: Settings to start with.
         host: Address to listen on; other machines can connect only if it is not a loopback address.
         port: Port to listen on.

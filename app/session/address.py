@@ -23,8 +23,8 @@ from app.window.ui import Ui
 from packetmesh.errors import InputError
 from packetmesh.settings import differences, key_of, with_settings
 from pipeline.config import PRESETS, PipelineConfig
-from pipeline.io.demos import DEMO_SCENES
-from pipeline.sources import Demo, Source
+from pipeline.io.demos import DEMOS
+from pipeline.sources import Source, demo_of
 
 WAIT_S = 0.3
 """Delay between a change and the update of the address, seconds."""
@@ -133,7 +133,7 @@ class Address:
         """
         self._uploads, self._start, self._on_place = uploads, start, on_place
         self._screens, self._keys = screens, keys
-        self._sources: dict[str, Source] = {name: Demo(name) for name in DEMO_SCENES}
+        self._sources: dict[str, Source] = {name: demo_of(name) for name in DEMOS}
         self._sources[name_of(start.spec.source)] = start.spec.source
         self._place = start
         self._text = ""

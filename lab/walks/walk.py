@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from lab.places.pairs import FOV_DEG
 from lab.walks.path import RATE_HZ, walk_poses
@@ -69,7 +69,9 @@ def render_walk(scene: Scene, frames: int, camera: CameraIntrinsics, out: AnyPat
     """
     folder = writable_folder(out)
     poses = walk_poses(scene, camera, frames, np.random.default_rng([seed, 29]))
-    _write_lists(folder, poses)
+    times_s = np.arange(frames) / RATE_HZ
+    write_lists(folder, times_s)
+    write_tum(folder / TRUE_POSES, times_s, poses)
     write_intrinsics(folder / "intrinsics.json", camera)
     vertices_m, triangles = world_mesh(scene)
     with atomic_path(folder / TRUTH) as temporary:
@@ -77,11 +79,11 @@ def render_walk(scene: Scene, frames: int, camera: CameraIntrinsics, out: AnyPat
             temporary, vertices_m=vertices_m, triangles=triangles, T_world_camera=np.array(poses)
         )
     renderer, rng = Renderer(scene, threads=1), np.random.default_rng([seed, 31])
-    film = _one_film(rng)
+    film = one_film(rng)
     for k, T in enumerate(poses):
         view = renderer.exposure(camera, T, "fast", rng).developed(film, rng)
-        write_color(folder / _file("rgb", k), view.rgb)
-        _write_depth(folder / _file("depth", k), sense_depth(view, camera, rng))
+        write_color(folder / image_file("rgb", k), view.rgb)
+        _write_depth(folder / image_file("depth", k), sense_depth(view, camera, rng))
 
 
 def read_truth(folder: AnyPath) -> WalkTruth:
@@ -98,35 +100,32 @@ def read_truth(folder: AnyPath) -> WalkTruth:
         raise InputError(f"{path} is missing or damaged; render the walk again") from None
 
 
-def _one_film(rng: Rng) -> Film:
+def one_film(rng: Rng) -> Film:
     """Return a film without the random differences between photographs."""
     usual = Film()
     noise, blur_px, vignette = (rng.uniform(*of) for of in (usual.noise, usual.blur_px, usual.vignette))
     return Film(0.0, 0.0, (noise, noise), (blur_px, blur_px), (vignette, vignette))
 
 
-def _write_lists(folder: Path, poses: Sequence[FloatArray]) -> None:
-    """Write rgb.txt, depth.txt and the true poses: time, position and quaternion (x, y, z, w)."""
-    times = [f"{k / RATE_HZ:.6f}" for k in range(len(poses))]
-    lines = {
-        f"{kind}.txt": [
-            f"# {kind} images: time in seconds, file",
-            *(f"{t} {_file(kind, k)}" for k, t in enumerate(times)),
-        ]
-        for kind in ("rgb", "depth")
-    }
-    write_tum(folder / TRUE_POSES, np.arange(len(poses)) / RATE_HZ, poses)
-    for name, text in lines.items():
-        with atomic_path(folder / name) as temporary:
-            temporary.write_text("\n".join(text) + "\n")
+def write_lists(folder: Path, times_s: FloatArray, color_suffix: str = ".png") -> None:
+    """Write rgb.txt and depth.txt: the (N,) times and the file of each image."""
+    for kind, suffix in (("rgb", color_suffix), ("depth", ".png")):
+        lines = [f"{time_s:.6f} {image_file(kind, k, suffix)}" for k, time_s in enumerate(times_s)]
+        text = "\n".join([f"# {kind} images: time in seconds, file", *lines])
+        with atomic_path(folder / f"{kind}.txt") as temporary:
+            temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def _file(kind: str, index: int) -> str:
-    return f"{kind}/{index:06d}.png"
+def image_file(kind: str, index: int, suffix: str = ".png") -> str:
+    """Return the name of an image, relative to the folder of its walk."""
+    return f"{kind}/{index:06d}{suffix}"
+
+
+def depth_units(depth: DepthMap) -> NDArray[np.uint16]:
+    """Return (H, W) depth in ``UNITS_PER_METRE``; 0 is unknown."""
+    return np.rint(np.nan_to_num(depth.z_m) * UNITS_PER_METRE).astype(np.uint16)
 
 
 def _write_depth(path: Path, depth: DepthMap) -> None:
-    """Write 16 bits, ``UNITS_PER_METRE``; 0 is unknown."""
-    units = np.rint(np.nan_to_num(depth.z_m) * UNITS_PER_METRE).astype(np.uint16)
     with atomic_path(path) as temporary:
-        temporary.write_bytes(cv2.imencode(".png", units)[1].tobytes())
+        temporary.write_bytes(cv2.imencode(".png", depth_units(depth))[1].tobytes())

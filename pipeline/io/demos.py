@@ -1,4 +1,4 @@
-"""Demo scenes in assets/scenes: rendered rigs with ground truth, each described by a file."""
+"""Demos in assets: rendered rigs with ground truth and walks of one camera, each described by a file."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from packetmesh.errors import InputError
 from pipeline.types import AnyPath, Rig
 
 SCENES = Path(__file__).resolve().parents[2] / "assets" / "scenes"
+RECORDINGS = SCENES.with_name("recordings")
+TRUE_PATH = "truth.txt"
+"""True poses of a walk's frames; under TUM's own name they would be taken as given."""
 BOARDS = "board"
 """Folder with board images, in scenes whose nodes need calibration."""
 
@@ -22,19 +25,24 @@ class DemoScene:
     """Displayed name."""
     description: str
     seed: int
-    """Seed, together with the name, of its sensor noise and of its nodes' pose errors."""
+    """Seed, together with the name, of its sensor noise and of its nodes' pose errors; of a walk, seed of
+    path, film and sensor."""
 
 
-def _described() -> dict[str, DemoScene]:
+def _described(folder: Path) -> dict[str, DemoScene]:
     scenes = {
         path.parent.name: DemoScene(**json.loads(path.read_text(encoding="utf-8")))
-        for path in SCENES.glob("*/scene.json")
+        for path in folder.glob("*/scene.json")
     }
     return dict(sorted(scenes.items(), key=lambda item: (item[0] != "living-room", item[0])))
 
 
-DEMO_SCENES: dict[str, DemoScene] = _described()
+DEMO_SCENES: dict[str, DemoScene] = _described(SCENES)
 """Demo scenes by name; the first, the living room, is opened at the start."""
+DEMO_WALKS: dict[str, DemoScene] = _described(RECORDINGS)
+"""Demo recordings of a walking camera by name."""
+DEMOS: dict[str, DemoScene] = DEMO_SCENES | DEMO_WALKS
+"""All demos by name, in the order in which they are offered."""
 
 
 def board_views_of(scene: str) -> Path | None:
@@ -70,8 +78,12 @@ def load_demo(name: str, calibration: AnyPath | None = None) -> Rig:
     >>> len(rig.frames), rig.truth.T_world_camera[0].shape
     (3, (4, 4))
     """
+    if name in DEMO_WALKS:
+        raise InputError(
+            f"The demo {name!r} is a recording, not a rig; try `packetmesh reconstruct --scene {name}`"
+        )
     if name not in DEMO_SCENES:
-        raise InputError(f"There is no demo scene {name!r}; try one of {', '.join(DEMO_SCENES)}")
+        raise InputError(f"There is no demo scene {name!r}; try one of {', '.join(DEMOS)}")
     from pipeline.io.rigs import load_rig  # imports large libraries, which listing the scenes does not need
 
     return load_rig(SCENES / name, calibration)

@@ -32,7 +32,7 @@ from app.window.in_address import STOP, Awaited
 from app.window.panel import Panel
 from packetmesh.errors import InputError
 from pipeline.io.demos import DEMO_SCENES, board_views_of
-from pipeline.sources import Calibrated, Demo
+from pipeline.sources import Calibrated, Demo, Recorded
 
 
 class CalibratePanel(Panel):
@@ -281,7 +281,15 @@ class CalibratePanel(Panel):
     # The chain.
 
     def _use_it(self) -> None:
-        """Write the calibration that is shown, and let the chain use it."""
+        """Write the calibration that is shown, and let the chain use it.
+
+        Raises:
+            InputError: the scene is a recording.
+        """
+        if isinstance(self._source, Recorded):
+            raise InputError(
+                "A recording keeps its own camera; on the command line --recording takes other --intrinsics."
+            )
         self._uses += 1
         self._use.show_status(WRITING)
         folder = str(self.session.new_folder() / f"calibration_{self._uses:02d}")

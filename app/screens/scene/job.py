@@ -6,14 +6,14 @@ from collections.abc import Generator
 
 import numpy as np
 
-from app.compute.records import SCREEN_POINTS, Picture, SceneNode, SceneView, sample
+from app.compute.records import SCREEN_POINTS, AveragedView, Picture, SceneNode, SceneView, sample
 from app.compute.state import Spec
 from app.compute.store import Store
 from app.drawing.pictures import depth_picture, depth_range_m
 from packetmesh.progress import Progress
 from pipeline.acquisition import back_project
 from pipeline.folders.walk import walk_sentences
-from pipeline.types import RgbdFrame
+from pipeline.types import RgbdFrame, Rig
 
 
 def scene_job(store: Store, spec: Spec) -> Generator[Progress, None, SceneView]:
@@ -22,7 +22,25 @@ def scene_job(store: Store, spec: Spec) -> Generator[Progress, None, SceneView]:
     most = SCREEN_POINTS // len(rig.frames)
     nodes = tuple(_scene_node(frame, most) for frame in rig.frames)
     notes = rig.notes if rig.walk is None else (*walk_sentences(rig.walk, len(nodes)), *rig.notes)
-    return SceneView(spec.source.title, nodes, rig.truth is not None, notes)
+    return SceneView(
+        spec.source.title, nodes, rig.truth is not None, notes, rig.walk is not None, averaged_view(rig)
+    )
+
+
+def averaged_view(rig: Rig) -> AveragedView | None:
+    """Return the numbers of cameras that stand, the mean over them; None for single images."""
+    frames = [frame for frame in rig.frames if frame.averaging is not None]
+    found = [frame.averaging for frame in frames if frame.averaging is not None]
+    if not found:
+        return None
+    return AveragedView(
+        frames=max(one.frames for one in found),
+        available=max(one.available for one in found),
+        unmeasured_share=float(np.mean([1.0 - frame.depth.coverage for frame in frames])),
+        moving_share=float(np.mean([one.moving_share for one in found])),
+        flickering_share=float(np.mean([one.flickering_share for one in found])),
+        median_sd_m=float(np.median([one.median_sd_m for one in found])),
+    )
 
 
 def _scene_node(frame: RgbdFrame, most: int) -> SceneNode:

@@ -25,16 +25,18 @@ FILES = {
     "depth": ("Depth image …", IMAGES),
     "intrinsics": ("Intrinsics …", ".json,.yaml,.yml,.txt"),
 }
-RECORDINGS = ".zip,.bag,.mcap,.db3,application/zip"
+RECORDINGS = ".zip,.bag,.mcap,.db3,.r3d,.sens,.mkv,application/zip"
 PAIR_TEXT = Markdown(
     """**A pair**: colour, depth (16 bits, or metres in floating point) and the camera's
 intrinsics (JSON, YAML or a 3 × 3 matrix)."""
 )
 RECORDING_TEXT = Markdown(
-    """**A recording**: a bag of ROS, or a ZIP of a rig (node_00, node_01 …) or of a folder of
-TUM, 7-Scenes, ScanNet, SUN RGB-D, Redwood, Open3D or COLMAP, or of a pair (color.png, depth.png,
-intrinsics.json)."""
+    """**A recording**: a bag of ROS, a .r3d of Record3D, .sens of ScanNet or .mkv of Azure Kinect, or
+a ZIP of a rig (node_00, node_01 …) or of a folder of TUM, 7-Scenes, ScanNet, SUN RGB-D, Redwood,
+Open3D, COLMAP or a telephone's app, or of a pair (color.png, depth.png, intrinsics.json)."""
 )
+MOMENTS, WALK = "some of its frames, as nodes", "one surface, from all its frames"
+"""What a recording becomes."""
 INSTEAD = "use packetmesh import and reconstruct for larger files"
 
 
@@ -47,7 +49,7 @@ class OwnFolder:
         below: Path,
         new_folder: Callable[[], Path],
         on_pair: Callable[[ImagePair], None],
-        on_recording: Callable[[Path, str, float | None, int], None],
+        on_recording: Callable[[Path, str, float | None, int | None], None],
     ) -> None:
         """Add the folder.
 
@@ -57,7 +59,7 @@ class OwnFolder:
             new_folder: makes a folder for one upload.
             on_pair: called with a pair to reconstruct.
             on_recording: called with the file of a recording, a name for its rig, depth units per metre or
-                None, and the number of frames that become nodes.
+                None, and the number of frames that become nodes or None for all as one surface.
         """
         self._ui, self._below, self._new_folder = ui, below, new_folder
         self._on_pair, self._on_recording = on_pair, on_recording
@@ -82,6 +84,13 @@ class OwnFolder:
                 lambda _: ui.post(self._use_files)
             )
             gui.add_markdown(RECORDING_TEXT)
+            self._becomes = gui.add_dropdown(
+                "It becomes",
+                [MOMENTS, WALK],
+                hint="Some frames are nodes of a rig, which are registered to one another. For one surface, "
+                "the path of the one camera that walked (or stood) is found from all frames.",
+            )
+            ui.when_changed(self._becomes, self._show_frames)
             self._frames = gui.add_number(
                 "Frames",
                 3,
@@ -96,6 +105,9 @@ class OwnFolder:
     def show_notes(self, notes: tuple[str, ...]) -> None:
         """Show the notes on a recording; none clears them."""
         self._notes.content = Markdown("\n").join(Markdown("- {}").format(note) for note in notes)
+
+    def _show_frames(self) -> None:
+        self._frames.visible = self._becomes.value == MOMENTS
 
     def _add_button(self, label: str, mime: str, action: Callable[..., None], *arguments: str) -> None:
         button = self._ui.gui.add_upload_button(label, icon=viser.Icon.UPLOAD, mime_type=mime)
@@ -127,7 +139,8 @@ class OwnFolder:
         path = keep_upload(file, self._new_folder() / OWN, RECORDING_LIMIT_BYTES, INSTEAD)
         self.show_notes(("Reading the recording …",))
         stem = re.sub(r"[^A-Za-z0-9._-]+", "-", Path(file.name).stem).strip(".-")[:40]
-        self._on_recording(path, stem or "rig", self._depth_scale, int(self._frames.value))
+        frames = int(self._frames.value) if self._becomes.value == MOMENTS else None
+        self._on_recording(path, stem or "rig", self._depth_scale, frames)
 
     @property
     def _depth_scale(self) -> float | None:

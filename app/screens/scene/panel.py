@@ -18,15 +18,15 @@ from app.web.markup import Markdown, Markup
 from app.window.panel import Panel
 from app.window.tables import number, table
 from pipeline.config import PRESETS
-from pipeline.io.demos import DEMO_SCENES
-from pipeline.sources import Demo, ImagePair, RigFolder
+from pipeline.io.demos import DEMOS
+from pipeline.sources import ImagePair, Recorded, RigFolder, demo_of
 
 TEXT = Markdown(
     """**What you see.** Each camera node delivers a colour image and a depth image. The points are the
 depth pixels at their places in space; gaps are pixels that the sensor could not measure. Go on with
 **Depth**."""
 )
-DEMOS = {name: scene.title for name, scene in DEMO_SCENES.items()}
+TITLES = {name: scene.title for name, scene in DEMOS.items()}
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
 
 
@@ -42,12 +42,12 @@ class ScenePanel(Panel):
         gui, spec = self.gui, self.session.spec
         gui.add_markdown(TEXT)
         title = _title(spec)
-        options = [*DEMOS.values()] if title in DEMOS.values() else [title, *DEMOS.values()]
+        options = [*TITLES.values()] if title in TITLES.values() else [title, *TITLES.values()]
         self._demo = gui.add_dropdown(
             "Scene",
             options,
             initial_value=title,
-            hint="Rendered rooms with known truth.",
+            hint="Rendered rooms with known truth: nodes, or one camera that walks.",
         )
         self.ui.when_changed(self._demo, self._picked_demo)
         self._preset = gui.add_dropdown(
@@ -73,7 +73,7 @@ class ScenePanel(Panel):
         self._preset.value = spec.preset
         title = _title(spec)
         if title not in self._demo.options:
-            self._demo.options = (title, *DEMOS.values())
+            self._demo.options = (title, *TITLES.values())
         self._demo.value = title
 
     def on_view(self, step: Step, view: Any) -> None:
@@ -131,9 +131,9 @@ class ScenePanel(Panel):
             )
 
     def _picked_demo(self) -> None:
-        name = next((name for name, title in DEMOS.items() if title == self._demo.value), None)
+        name = next((name for name, title in TITLES.items() if title == self._demo.value), None)
         if name is not None:
-            self.session.want(dataclasses.replace(self.session.spec, source=Demo(name)))
+            self.session.want(dataclasses.replace(self.session.spec, source=demo_of(name)))
 
     def _picked_preset(self) -> None:
         self.session.want(self.session.spec.with_preset(self._preset.value))
@@ -141,7 +141,7 @@ class ScenePanel(Panel):
     def _use_pair(self, source: ImagePair) -> None:
         self.session.want(dataclasses.replace(self.session.spec, source=source))
 
-    def _read_recording(self, path: Path, name: str, depth_scale: float | None, frames: int) -> None:
+    def _read_recording(self, path: Path, name: str, depth_scale: float | None, frames: int | None) -> None:
         words = path, name, depth_scale, frames
         self.session.side_job("scene.recording_job:recording_job", *words, on_end=self._use_recording)
 
@@ -154,7 +154,8 @@ class ScenePanel(Panel):
 
 
 def _title(spec: Spec) -> str:
-    """Return the scene's name: a demo's title, a rig's folder name, or a pair's colour image."""
-    if isinstance(spec.source, RigFolder | ImagePair):
-        return Path(spec.source.title).name
-    return DEMOS.get(spec.source.title, spec.source.title)
+    """Return the scene's name: a demo's title, the name of a rig or recording, or a pair's colour image."""
+    source = spec.source
+    if isinstance(source, RigFolder | ImagePair) or (isinstance(source, Recorded) and source.demo is None):
+        return Path(source.title).name
+    return TITLES.get(source.title, source.title)

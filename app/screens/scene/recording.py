@@ -1,16 +1,16 @@
-"""The rig that was made from an uploaded recording."""
+"""The source that was made from an uploaded recording."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipeline.sources import RigFolder
+from pipeline.sources import Recorded, RigFolder
 
 
 @dataclass(frozen=True, slots=True)
 class ReadRecording:
-    """A rig in the session's folder, and notes on it."""
+    """A rig or a recording in the session's folder, and notes on it."""
 
-    source: RigFolder
+    source: RigFolder | Recorded
     notes: tuple[str, ...]
     """Notes, one sentence each."""

@@ -1,4 +1,4 @@
-"""The job that makes a rig from an uploaded recording."""
+"""The job that makes a rig from an uploaded recording, or keeps all its frames."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from packetmesh.errors import InputError
 from packetmesh.files import path_below
 from packetmesh.progress import Progress
 from pipeline.importing import is_recording, iterate_import
+from pipeline.importing.recorded import iterate_opening
 from pipeline.io.rigs import is_pair, is_rig, load_rig
-from pipeline.sources import RigFolder
+from pipeline.sources import Recorded, RigFolder
 from pipeline.types import Rig
 
 UNPACKED_LIMIT_BYTES = 1 << 30
@@ -24,17 +25,17 @@ INSTEAD = "use packetmesh import and reconstruct for larger ones"
 
 
 def recording_job(
-    store: Store, spec: Spec, path: Path, name: str, depth_scale: float | None, frames: int
+    store: Store, spec: Spec, path: Path, name: str, depth_scale: float | None, frames: int | None
 ) -> Generator[Progress, None, ReadRecording]:
-    """Unpack a ZIP and make a rig from its content, without results of the chain.
+    """Unpack a ZIP and make a source of its content, without results of the chain.
 
     Args:
         store: not used.
         spec: not used.
         path: a bag or a ZIP, in a folder of its own.
-        name: name of the rig, which is made next to that folder.
+        name: name of the rig or recording, which is put next to that folder.
         depth_scale: depth units per metre; None takes the one of the images or the kind of recording.
-        frames: number of frames of a recording that become nodes.
+        frames: number of frames of a recording that become nodes; None keeps the recording with all frames.
 
     Raises:
         InputError: a file cannot be read, is too large, or holds no recording or several.
@@ -42,7 +43,7 @@ def recording_job(
     yield Progress("reading the recording", 0.0)
     rig = path_below(path.parent.parent, name)
     if path.suffix.lower() != ".zip":
-        return (yield from _imported(path, rig, frames, depth_scale))
+        return (yield from _used(path, rig, frames, depth_scale))
     unpacked = path.with_suffix("")
     try:
         unpack(path, unpacked / "files")
@@ -54,7 +55,7 @@ def recording_job(
             read = load_rig(found, depth_scale=depth_scale)  # reports errors of the rig now
             found.rename(rig)
             return ReadRecording(RigFolder(str(rig), depth_scale), (_rig_note(read),))
-        return (yield from _imported(found, rig, frames, depth_scale))
+        return (yield from _used(found, rig, frames, depth_scale))
     finally:
         shutil.rmtree(unpacked, ignore_errors=True)
 
@@ -97,9 +98,15 @@ def unpack(path: Path, folder: Path) -> None:
         archive.extractall(folder)
 
 
-def _imported(
-    path: Path, rig: Path, frames: int, depth_scale: float | None
+def _used(
+    path: Path, place: Path, frames: int | None, depth_scale: float | None
 ) -> Generator[Progress, None, ReadRecording]:
-    report = yield from iterate_import(path, rig, frames, depth_scale)
-    found = f"{report.kind}: {len(report.frames)} of {report.candidates} frames became nodes"
-    return ReadRecording(RigFolder(str(rig)), (found, *report.notes))
+    """Import some frames of a recording to ``place`` as a rig, or move all of it there."""
+    if frames is not None:
+        report = yield from iterate_import(path, place, frames, depth_scale)
+        found = f"{report.kind}: {len(report.frames)} of {report.candidates} frames became nodes"
+        return ReadRecording(RigFolder(str(place)), (found, *report.notes))
+    opened = yield from iterate_opening(path, depth_scale)  # reports errors of the recording now
+    note = f"{opened.kind}: {len(opened.times_s)} frames become one surface"
+    place = place.with_name(path.name) if path.is_file() else place  # a bag keeps its suffix
+    return ReadRecording(Recorded(str(path.rename(place)), depth_scale), (note,))
