@@ -149,6 +149,14 @@ class Dock:
         self._draw()
         self._send_state()
 
+    def mark(self, lane: int, item: int) -> None:
+        """Mark an item; -1 marks none."""
+        self._choose(lane, item)
+        self._send_state()
+
+    def _choose(self, lane: int, item: int) -> None:
+        self._chosen = {"lane": lane, "place": self._lanes[lane].place(item)} if item >= 0 else {}
+
     def play(self) -> None:
         """Start the clock; from the start if it is at the end."""
         if self.now_ns >= self._end_ns:
@@ -267,7 +275,7 @@ class Dock:
         """Move the clock to a click and mark the item there."""
         there = 0 <= lane < len(self._lanes)
         item = self._lanes[lane].pick(round(t_ns), int(y_px), round(tolerance_ns)) if there else -1
-        self._chosen = {"lane": lane, "place": self._lanes[lane].place(item)} if item >= 0 else {}
+        self._choose(lane, item)
         self.seek(round(t_ns))
         if there:
             self._on_pick(lane, item)

@@ -14,13 +14,15 @@ import viser
 
 import app.landing
 from app.compute.state import Spec
-from app.landing import LESSON_PLACES, PICTURES, SCRIPTS, STYLES, app_page, landing_html
+from app.landing import LESSON_PLACES, OWN_FOLDER, PICTURES, SCRIPTS, STYLES, app_page, landing_html
 from app.lesson.files import LESSONS
+from app.screens.scene.panel import ScenePanel
 from app.server import PANELS
 from app.session.address import Place, place_of
 from packetmesh.errors import InputError
-from pipeline.io.demos import DEMO_SCENES
-from pipeline.sources import Demo
+from pipeline.io.demos import DEMOS
+from pipeline.sources import Demo, demo_of
+from tests.app.fakes import Bench, ui_of
 
 
 @pytest.fixture(scope="module")
@@ -111,13 +113,13 @@ def test_another_page_of_viser_is_no_page_of_the_app(monkeypatch, tmp_path, know
 def test_it_offers_every_lesson_and_every_scene_with_a_small_picture():
     assert set(LESSON_PLACES) == {path.stem for path in LESSONS.glob("*.md")}
     assert {screen for _, screen in LESSON_PLACES.values()} <= {panel.title.lower() for panel in PANELS}
-    assert {scene for scene, _ in LESSON_PLACES.values()} <= set(DEMO_SCENES)
-    names = {*LESSON_PLACES, *DEMO_SCENES}
+    assert {scene for scene, _ in LESSON_PLACES.values()} <= set(DEMOS)
+    names = {*LESSON_PLACES, *DEMOS}
     assert {path.stem for path in PICTURES.iterdir()} == names
     assert all(path.stat().st_size <= 40_000 for path in PICTURES.iterdir())
     page = landing_html()
     assert page.count("data:image/jpeg") == len(names)
-    assert all(f">{scene.title}</span>" in page for scene in DEMO_SCENES.values())
+    assert all(f">{scene.title}</span>" in page for scene in DEMOS.values())
     for name in LESSON_PLACES:
         title = (LESSONS / f"{name}.md").read_text().splitlines()[0].removeprefix("# ")
         assert f">{title}</span>" in page
@@ -125,11 +127,23 @@ def test_it_offers_every_lesson_and_every_scene_with_a_small_picture():
 
 def test_every_card_leads_to_a_place_that_an_address_can_name():
     start = Place(Spec(Demo("office")), "Scene")
-    sources = {name: Demo(name) for name in DEMO_SCENES}
+    sources = {name: demo_of(name) for name in DEMOS}
     titles = tuple(panel.title for panel in PANELS)
     places = [html.unescape(place) for place in re.findall('data-place="([^"]+)"', landing_html())]
     found, wrong = zip(*(place_of(place, start, titles, sources) for place in places), strict=True)
     assert not any(wrong)
     wanted = [(scene, screen) for scene, screen in LESSON_PLACES.values()]
-    wanted += [(name, "scene") for name in DEMO_SCENES]
-    assert [(place.spec.source.name, place.screen.lower()) for place in found] == wanted
+    wanted += [(name, "scene") for name in DEMOS]
+    wanted += [("office", "scene")]  # the folder for uploads, in the scene that is open
+    assert [(place.spec.source.title, place.screen.lower()) for place in found] == wanted
+
+
+def test_the_button_for_own_images_names_the_folder_of_the_scene_screen(store, tmp_path):
+    assert f'data-folder="{OWN_FOLDER}"' in landing_html()
+    assert "data-folder" not in landing_html(lecture=True)
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        bench = Bench(ScenePanel, ui_of(server.scene), store, tmp_path, steps=("scene",))
+        assert "A recording" in bench.gui.text(OWN_FOLDER)
+    finally:
+        server.stop()

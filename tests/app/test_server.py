@@ -9,7 +9,7 @@ import pytest
 from app.server import build_server, start_spec
 from packetmesh.errors import InputError
 from pipeline.config import PRESETS, PipelineConfig
-from pipeline.sources import Demo, RigFolder
+from pipeline.sources import Demo, Recorded, RigFolder
 
 
 def test_a_taken_port_is_one_sentence():
@@ -34,10 +34,16 @@ def test_an_address_that_cannot_be_used_is_one_sentence(host, port, sentence):
         build_server(host=host, port=port)
 
 
-def test_a_folder_is_a_rig_and_a_name_is_a_demo(tmp_path):
+def test_a_folder_is_a_rig_a_bag_a_recording_and_a_name_a_demo(tmp_path):
     assert start_spec(str(tmp_path), PipelineConfig()).source == RigFolder(str(tmp_path))
+    (tmp_path / "walk.bag").write_bytes(b"#ROSBAG V2.0\n")
+    bag = str(tmp_path / "walk.bag")
+    assert start_spec(bag, PipelineConfig()).source == Recorded(bag)
     assert start_spec("office", PRESETS["thesis"]).source == Demo("office")
     assert start_spec("office", PRESETS["thesis"]).preset == "thesis"
+    walk = start_spec("living-room-walk", PipelineConfig()).source
+    assert isinstance(walk, Recorded)
+    assert walk.demo == "living-room-walk"
 
 
 def test_the_serving_process_loads_nothing_heavy():

@@ -13,7 +13,10 @@ import numpy as np
 from PIL import Image, ImageFile
 
 from app.landing import PICTURES
-from pipeline.io.demos import DEMO_SCENES, SCENES
+from pipeline.io.demos import DEMO_SCENES, DEMO_WALKS, SCENES
+from pipeline.kernels.geometry import apply, inverse, look_at, project
+from pipeline.sources import demo_of
+from pipeline.types import CameraIntrinsics
 
 DOCS = Path(__file__).parents[2] / "docs"
 SIZE_PX = (320, 200)
@@ -23,8 +26,11 @@ CUTS_PX = {
     "icp-against-ceicp": ("fuse", (0, 0, 950, 594)),
     "which-ball-radius": ("surface", (150, 180, 870, 630)),
     "how-images-cross-a-network": ("network", (100, 120, 760, 533)),
+    "how-a-walk-becomes-a-room": ("walk", (160, 50, 864, 490)),
 }
 """Picture of docs/, and left, top, right and bottom of the piece that is shown."""
+EYE_M = (-1.8, -4.2, 5.4)
+"""Place from which a walk's map is shown, relative to its middle."""
 SHARE_ARRIVED = 0.55
 """Of the bytes of the JPEG whose rest was lost."""
 
@@ -56,9 +62,30 @@ def cut_short(scene: str) -> Image.Image:
     return Image.open(io.BytesIO(came)).convert("RGB")
 
 
+def walked(name: str) -> Image.Image:
+    """The map of a walk, obliquely from above without the surfaces that face away, and the camera's path."""
+    walk = demo_of(name).load().walk
+    camera = CameraIntrinsics.pinhole(800.0, 800.0, 479.5, 299.5, 960, 600)
+    points_m, path_m = walk.map.points_m, np.array([T[:3, 3] for T in walk.T_world_camera if T is not None])
+    middle_m = 0.5 * (points_m.min(axis=0) + points_m.max(axis=0))
+    T_world_eye = look_at(middle_m + EYE_M, middle_m)
+    facing = np.einsum("nk,nk->n", walk.map.normals, T_world_eye[:3, 3] - points_m) > 0.0
+    eye_m = apply(inverse(T_world_eye), points_m[facing])
+    order = np.argsort(-eye_m[:, 2])  # the nearest is drawn last
+    drawn = np.full((600, 960, 3), 244, np.uint8)
+    at_px = np.rint(project(camera, eye_m[order])).astype(int)
+    for (u, v), rgb in zip(at_px.tolist(), walk.map.colors[facing][order].tolist(), strict=True):
+        cv2.circle(drawn, (u, v), 3, rgb, -1)
+    line_px = np.rint(project(camera, apply(inverse(T_world_eye), path_m))).astype(np.int32)
+    cv2.polylines(drawn, [line_px], False, (255, 255, 255), 9, cv2.LINE_AA)
+    cv2.polylines(drawn, [line_px], False, (208, 52, 44), 5, cv2.LINE_AA)
+    return Image.fromarray(drawn)
+
+
 def main() -> None:
     """Make all of them."""
     pictures = {scene: photograph(scene) for scene in DEMO_SCENES}
+    pictures |= {name: walked(name) for name in DEMO_WALKS}
     pictures |= {name: Image.open(DOCS / f"{doc}.jpg").crop(box) for name, (doc, box) in CUTS_PX.items()}
     pictures["can-a-picture-measure"] = half_depth("living-room")
     pictures["what-one-lost-packet-costs"] = cut_short("living-room")

@@ -55,6 +55,16 @@ def test_a_scene_opens(landing):
     expect(landing.get_by_role("dialog", name="Welcome")).to_have_count(0)
 
 
+def test_ones_own_images_are_asked_for_in_the_open_folder(landing):
+    landing.get_by_role("button", name="Open your own").click()
+    landing.get_by_role("button", name="Recording …").locator("visible=true").wait_for()
+    expect(landing.get_by_label("It becomes").locator("visible=true")).to_have_value(
+        "some of its frames, as nodes"
+    )
+    expect(landing.get_by_role("dialog", name="Welcome")).to_have_count(0)
+    expect(landing.get_by_label("Scene", exact=True).first).to_have_value("Box on a table")
+
+
 def test_a_lesson_opens_in_the_scene_that_it_speaks_of(landing):
     """That of calibration needs photographs of a board, which only one scene has."""
     landing.get_by_role("button", name="How good is my calibration?").click()

@@ -56,6 +56,12 @@ def same_surface(one, other):
     return np.array_equal(one.vertices_m, other.vertices_m) and np.array_equal(one.triangles, other.triangles)
 
 
+def test_a_rig_that_is_loaded_is_not_loaded_again(rig):
+    """Of a recording it would be tracked again."""
+    other = replace(rig, frames=rig.frames[:1])
+    assert [frame.name for frame in send(delivery_spec(rig, moments=1), other).rig.frames] == ["node_00"]
+
+
 def test_in_the_end_there_is_what_a_reconstruction_of_the_images_gives(rig, whole):
     alone = drain(iterate_reconstruction(delivery_spec(rig).spec))
     last = whole.moments[-1]

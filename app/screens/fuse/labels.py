@@ -85,7 +85,7 @@ RUNNING = Markdown("Which method ends nearer? The numbers appear here at the end
 RACES = {f"race: {name}": mode for name, mode in MODES.items()}
 RACE_NAMES = {mode: name for name, mode in RACES.items()}
 RESULT, BEFORE = "result", "before registration"
-SHOWN = {"race": next(iter(RACES)), "result": RESULT, "before": BEFORE}
+WALK = "the walk"
 ADVANCED = (
     Choice(
         "Chain: method",

@@ -13,36 +13,28 @@ from app.compute.records import DepthView
 from app.compute.state import Spec, Step
 from app.drawing.cameras import Stage, stage_of
 from app.drawing.clouds import clear
-from app.drawing.poses import place
 from app.lesson.files import Numbers, read_lesson
 from app.lesson.player import LessonFolder
 from app.screens.fuse.board import Board
 from app.screens.fuse.capture import CaptureFolder
 from app.screens.fuse.charts import RaceCharts
-from app.screens.fuse.draw import ROOM_STAGE, NodesDrawing, RaceDrawing, RaceFraming, gizmo_pose
+from app.screens.fuse.draw import ROOM_STAGE, NodesDrawing, RaceDrawing, RaceFraming
 from app.screens.fuse.export import race_offers
-from app.screens.fuse.labels import (
-    ADVANCED,
-    BEFORE,
-    MARKS,
-    RACE_NAMES,
-    RACES,
-    RESULT,
-    RUNNING,
-    SHOWN,
-    SINGLE,
-    TEXT,
-)
+from app.screens.fuse.gizmo import StartGizmo
+from app.screens.fuse.labels import ADVANCED, MARKS, RUNNING, SINGLE, TEXT
 from app.screens.fuse.lesson import NUMBERS, SETTINGS, SHIPPED, RaceLook, numbers
 from app.screens.fuse.numbers import places_table, race_table, winner
 from app.screens.fuse.place import moment_of, moment_text, race_of, race_text
 from app.screens.fuse.player import END, RacePlayer
 from app.screens.fuse.setup import RaceSetup
+from app.screens.fuse.shown import ShownChoice
 from app.screens.fuse.view import CaptureView, FuseView, Race, RaceView, Start
+from app.screens.fuse.walk_part import BELOW, WalkPart
 from app.web.markup import Markdown, Markup
 from app.window.controls import Controls
-from app.window.in_address import STOP, CallbackState, Picked
+from app.window.in_address import STOP, CallbackState
 from app.window.panel import Offers, Panel
+from pipeline.sources import Recorded
 
 _RaceRequest: TypeAlias = tuple[tuple[Hashable, ...], Race]
 """The key of the clouds and the race of them."""
@@ -67,8 +59,6 @@ class FusePanel(Panel):
         self._raced = self._arrived = self._mapped = None
         self._view: RaceView | None = None
         self._drawing: RaceDrawing | None = None
-        self._drawn: Start = Start()
-        self._gizmo: Any = None
         self._seek_at: float | None = 0.0
         """Place to which the player goes in the next race; None is its end."""
         self._framing = RaceFraming()
@@ -76,13 +66,28 @@ class FusePanel(Panel):
         self._seen: tuple[int, ...] = ()
         """The step of each lane that is shown."""
         self._result = NodesDrawing(self.scene, "/fuse/result")
-        gui.add_markdown(TEXT)
-        self._single = gui.add_markdown(SINGLE, visible=False)
-        lesson = read_lesson(SHIPPED, SETTINGS, RaceLook(), NUMBERS)
-        self._lesson = LessonFolder(self.ui, lesson, self._take_stop, self._lesson_numbers)
-        self._shown = gui.add_dropdown("Show", [*RACES, RESULT, BEFORE], hint="Contents of the 3-D view.")
-        self.ui.when_changed(self._shown, self._picked_shown)
-        self._setup = RaceSetup(self.ui, self._start)
+        self._walk = WalkPart(self.session, self._choose_walk)
+        self._shown = ShownChoice(self.ui, self._picked_shown)
+        with self._shown.group(walk=False):
+            gui.add_markdown(TEXT)
+            self._single = gui.add_markdown(SINGLE, visible=False)
+            lesson = read_lesson(SHIPPED, SETTINGS, RaceLook(), NUMBERS)
+            self._lesson = LessonFolder(self.ui, lesson, self._take_stop, self._lesson_numbers)
+        with self._shown.group(walk=True):
+            self._walk.add_lesson()
+        self._shown.add()
+        with self._shown.group(walk=False):
+            self._build_race()
+        with self._shown.group(walk=True):
+            self._walk.add_controls()
+        self._shown.expect(walk=isinstance(self.session.spec.source, Recorded))
+        self.in_address |= {STOP: self._lesson, f"{STOP}-walk": self._walk.lesson, "show": self._shown}
+        self.in_address["race"] = CallbackState(self._race_text, self._take_race_text)
+        self.in_address["t"] = CallbackState(self._moment, self._take_moment)
+        self.in_address |= self._walk.in_address
+
+    def _build_race(self) -> None:
+        gui, self._setup = self.gui, RaceSetup(self.ui, self._start)
         self._setup.add_comparisons()
         self._setup.add_preset()
         self._player = RacePlayer(self.ui, self._moved, self._clocked)
@@ -92,9 +97,6 @@ class FusePanel(Panel):
         self._charts = RaceCharts(self.ui)
         self._build_folders()
         self._rows = gui.add_html(Markup(""))
-        shown = Picked(self._shown, SHOWN, self._picked_shown)
-        self.in_address |= {STOP: self._lesson, "race": CallbackState(self._race_text, self._take_race_text)}
-        self.in_address |= {"show": shown, "t": CallbackState(self._moment, self._take_moment)}
 
     def _build_folders(self) -> None:
         gui, session = self.gui, self.session
@@ -103,12 +105,7 @@ class FusePanel(Panel):
             self._setup.add_nodes()
             self._player.add_axis()
         with gui.add_folder("Start by hand", expand_by_default=False):
-            self._dragging = gui.add_checkbox(
-                "Drag",
-                False,
-                hint="Arrows and rings in the first lane change the start of all lanes.",
-            )
-            self.ui.when_changed(self._dragging, self._place_gizmo)
+            self._gizmo = StartGizmo(self.ui, self._dragged)
             self._setup.add_numbers()
         with gui.add_folder("Degrade the moving cloud", expand_by_default=False):
             self._setup.add_degradations()
@@ -119,11 +116,15 @@ class FusePanel(Panel):
     def on_spec(self, spec: Spec) -> None:
         """Show the current settings."""
         self._controls.write(spec.config)
+        if not self.session.results.fresh("scene", spec):
+            self._shown.expect(walk=isinstance(spec.source, Recorded))
+            self._show_parts()
 
     def on_view(self, step: Step, view: Any) -> None:
         """Take a view: a new scene drops the race, new clouds set the nodes, new poses start a race."""
         if step == "scene":
             self._forget()
+            self._offer(single=len(view.nodes) == 1, walk=view.has_walk)
         if step == "depth":
             self._choose_nodes([node.name for node in view.nodes])
         if step == "fuse":
@@ -132,7 +133,7 @@ class FusePanel(Panel):
             self._start()
 
     def on_show(self) -> None:
-        """Start the race if none has run yet."""
+        """Start the race, or request the walk, if none is there yet."""
         self._here = True
         self._framing.anew()
         self._show_parts()
@@ -155,35 +156,43 @@ class FusePanel(Panel):
 
     # The methods and nodes of the race.
 
-    def _choose_nodes(self, names: list[str]) -> None:
-        single = len(names) == 1
-        options = tuple(name for name, mode in RACES.items() if mode != "nodes" or not single)
+    def _offer(self, single: bool, walk: bool) -> None:
         with self.ui.atomic():
             self._single.visible = single
-            if self._shown.options != (*options, RESULT, BEFORE):
-                self._shown.options = (*options, RESULT, BEFORE)
-                self._shown.value = options[0]
+            self._walk.forget()
+            self._shown.offer(single, walk)
+            self._arrange()
+        if self._here:
+            self._start()
+
+    def _choose_nodes(self, names: list[str]) -> None:
+        with self.ui.atomic():
             self._setup.choose_nodes(names)
-            if self._shown.value in RACES:
-                self._setup.choose_mode(RACES[self._shown.value])
+            if self._shown.mode is not None:
+                self._setup.choose_mode(self._shown.mode)
 
     @property
     def _racing(self) -> bool:
         """Whether a race is shown."""
-        return self._shown.value in RACES and self._view is not None
+        return self._shown.mode is not None and self._view is not None
 
     def _picked_shown(self) -> None:
-        if self._shown.value in RACES:
-            self._setup.choose_mode(RACES[self._shown.value])
-            self._start()
+        if self._shown.mode is not None:
+            self._setup.choose_mode(self._shown.mode)
+        self._start()
         self._arrange()
+
+    def _choose_walk(self) -> None:
+        """Show the walk for a stop of its lesson."""
+        self._shown.walk()
+        self._picked_shown()
 
     def _take_stop(self, stop: RaceLook) -> None:
         """Set the controls for a stop of the lesson, and race."""
-        single = RACE_NAMES["nodes"] not in self._shown.options
+        single = "nodes" not in self._shown.races
         race = replace(stop.race, mode="inferred") if single and stop.race.mode == "nodes" else stop.race
         with self.ui.atomic():
-            self._shown.value = RACE_NAMES[race.mode]
+            self._shown.race(race.mode)
             self._setup.write(race)
             self._player.choose(stop.in_ms)
         self._seek_at = stop.place
@@ -193,11 +202,10 @@ class FusePanel(Panel):
 
     def _reset(self) -> None:
         with self.ui.atomic():
-            self._shown.value = self._shown.options[0]
-            self._setup.reset(RACES[self._shown.value])
+            self._shown.restart()
+            self._setup.reset(self._shown.mode or self._shown.races[0])
             self._player.choose(in_ms=False)
-            self._dragging.value = False
-            self._place_gizmo()
+            self._gizmo.hide()
             self._capture.forget()
             self._mapped = None
         if not self._start() and self._view is not None:
@@ -225,8 +233,8 @@ class FusePanel(Panel):
     def _take_race_text(self, text: str) -> None:
         race = race_of(text)
         with self.ui.atomic():
-            if self._shown.value in RACES and RACE_NAMES[race.mode] in self._shown.options:
-                self._shown.value = RACE_NAMES[race.mode]
+            if self._shown.mode is not None and race.mode in self._shown.races:
+                self._shown.race(race.mode)
             self._setup.choose(race)
         self._start()
 
@@ -245,8 +253,11 @@ class FusePanel(Panel):
     # The race.
 
     def _start(self) -> bool:
-        """Race if the clouds or the race have changed. Returns whether the result has yet to come."""
+        """Race if anything has changed, or request the walk. Returns whether the race has yet to come."""
         session = self.session
+        if self._shown.walking:
+            self._walk.begin()
+            return True
         if session.results.view("depth") is None or not session.results.fresh("fuse", session.spec):
             return True
         request = self._request()
@@ -263,7 +274,8 @@ class FusePanel(Panel):
 
     def _forget(self) -> None:
         """Remove the race of another scene."""
-        self._raced = self._arrived = self._view = self._drawing = self._gizmo = None
+        self._raced = self._arrived = self._view = self._drawing = None
+        self._gizmo.forget()
         with self.ui.atomic():
             clear(self.scene, "/fuse/race")
             self._board.load(None)
@@ -277,17 +289,17 @@ class FusePanel(Panel):
         if view is None:
             self._raced = None
             return
-        self._arrived, self._drawn = request, request[1].start
+        self._arrived = request
         self._take_race(view)
 
     def _take_race(self, view: RaceView) -> None:
         self._view = view
         with self.ui.atomic():
             self._drawing = RaceDrawing(self.scene, "/fuse/race", view, self._stage())
-            self._gizmo = None
             self._framing.anew()
             self._seen = ()
-            self._place_gizmo()
+            assert self._arrived is not None
+            self._gizmo.load(self._drawing, view, self._arrived[1].start)
             self._board.load(view)
             self._winner.content, self._table.content = RUNNING, Markup("")
             self._player.load(view.lanes, view.reference)
@@ -297,9 +309,10 @@ class FusePanel(Panel):
             self._lesson.refresh()
 
     def _show_parts(self) -> None:
-        """Show board and dock while a race is shown, else hide them."""
+        """Show the board and dock of the race, or the dock of the walk, while it is shown."""
         self._board.show(self._racing and self._here)
         self._player.show(self._racing and self._here)
+        self._walk.show(self._shown.walking and self._here)
 
     def _clocked(self) -> None:
         if self._view is not None and self._player.clock is not None:
@@ -318,26 +331,8 @@ class FusePanel(Panel):
                 self._winner.content = winner(self._view.reference, self._view.lanes)
                 self._table.content = race_table(self._view.reference, self._view.lanes)
 
-    # The gizmo.
-
-    def _place_gizmo(self) -> None:
-        """Put the gizmo at the race's start, or hide it."""
-        if self._drawing is None or self._view is None:
-            return
-        if self._gizmo is None and self._dragging.value:
-            self._gizmo = self._drawing.add_gizmo(
-                self._drawn, lambda start, ended: self.ui.post(self._dragged, start, ended)
-            )
-        if self._gizmo is not None:
-            place(self._gizmo, gizmo_pose(self._drawn, self._view.center_m))
-            self._gizmo.visible = self._dragging.value
-
     def _dragged(self, start: Start, ended: bool) -> None:
-        if self._drawing is None:
-            return
-        with self.ui.atomic():
-            self._drawing.preview(self._drawn, start)
-            self._setup.write_start(start)
+        self._setup.write_start(start)
         if ended and not self._start():
             self._seen = ()
             self._moved(self._player.now_ns)
@@ -370,7 +365,7 @@ class FusePanel(Panel):
         """Fit all lanes into the picture, once per window shape. False leaves the view to the session."""
         if self._drawing is None or not self._racing:
             self._framing.widen(self.session.clients())
-            return False
+            return self._shown.walking and self._walk.look(self.session.clients())
         self._framing.frame(self._drawing, self.session.clients())
         return True
 
@@ -383,15 +378,19 @@ class FusePanel(Panel):
             self._arrange()
 
     def _arrange(self) -> None:
-        """Show the race, or the nodes at their poses before or after registration."""
-        racing = self._racing
+        """Show the walk, the race, or the nodes at their poses before or after registration."""
+        racing, walking = self._racing, self._shown.walking
+        other = self._lesson if walking else self._walk.lesson
+        if other.place():
+            other.take("")
         self._show_parts()
-        for name, visible in (("/fuse/race", racing), ("/fuse/result", not racing)):
+        shown = {"/fuse/race": racing, BELOW: walking, "/fuse/result": not (racing or walking)}
+        for name, visible in shown.items():
             frame = self.scene.get_handle_by_name(name)
             if frame is not None:
                 frame.visible = visible
         self.session.frame_view()
-        self._result.place(before=self._shown.value == BEFORE)
+        self._result.place(before=self._shown.before)
 
 
 def _anywhere(request: _RaceRequest) -> _RaceRequest:

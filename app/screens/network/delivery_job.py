@@ -41,8 +41,18 @@ from pipeline.delivery.sending import (
     send,
     senders_of,
 )
+from pipeline.sources import Recorded
 from pipeline.spec import key as spec_key
-from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray, PointCloud, RgbdFrame, SurfaceResult
+from pipeline.types import (
+    BoolArray,
+    ByteArray,
+    DepthMap,
+    FloatArray,
+    PointCloud,
+    RgbdFrame,
+    Rig,
+    SurfaceResult,
+)
 
 NODE_POINTS = 6000
 """Points of the cloud of one node."""
@@ -86,16 +96,23 @@ def packet_job(
 def sending_of(store: Store, spec: Spec) -> Generator[Progress, None, Sending]:
     """Return the sent images and the simulated run."""
     key = ("sending", spec_key(spec, "rig"), spec.sent)
-    return (yield from store.remember(key, partial(_send, spec)))
+    return (yield from store.remember(key, partial(_send, store, spec)))
 
 
-def _send(spec: Spec) -> Generator[Progress, None, Sending]:
+def _send(store: Store, spec: Spec) -> Generator[Progress, None, Sending]:
+    rig = yield from _tracked(store, spec)
     yield Progress("sending the images", 0.02)
     sent = _sent_of(spec)
-    return send(DeliverySpec(spec, sent.network, sent.coding, sent.moments, sent.down))
+    return send(DeliverySpec(spec, sent.network, sent.coding, sent.moments, sent.down), rig)
+
+
+def _tracked(store: Store, spec: Spec) -> Generator[Progress, None, Rig | None]:
+    """Return the keyframes of a recording, which take long to track; None for a rig."""
+    return (yield from store.stage(spec, "rig")) if isinstance(spec.source, Recorded) else None
 
 
 def _delivered(store: Store, spec: Spec) -> Steps:
+    yield from _tracked(store, spec)
     started = time.perf_counter()
     sending = yield from sending_of(store, spec)
     view = _first_view(sending, _sent_of(spec), time.perf_counter() - started)

@@ -158,6 +158,10 @@ TEXT = Markdown(
     """The cameras of the room send their pictures and depth by radio, packet by packet; some are lost.
 **Play** below, and watch the mesh grow from what has arrived."""
 )
+WALK_TEXT = Markdown(
+    """One camera walked through the room. Each **node** is a keyframe of its recording and sends from where
+the camera was, by radio, packet by packet; some are lost. **Play** below, and watch the mesh grow."""
+)
 STREET_TEXT = Markdown(
     """Vehicles with cameras drive on a grid of streets and offer images to access points (green). **Play**
 below: every moving point is a frame on the air; a red point is a frame that was lost there."""

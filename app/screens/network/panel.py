@@ -29,7 +29,7 @@ from app.screens.network.delivery_view import DeliveryView, MomentView
 from app.screens.network.draw import NetworkDrawing, look_at_ground, road_legend
 from app.screens.network.export import delivery_offers, network_offers
 from app.screens.network.inspector import Inspector
-from app.screens.network.labels import NETWORKS, ORIGIN, RUNNING, STREET_TEXT, TEXT
+from app.screens.network.labels import NETWORKS, ORIGIN, RUNNING, STREET_TEXT, TEXT, WALK_TEXT
 from app.screens.network.lanes import frames_lane, growth_lane, run_curves, run_names, stops_ns
 from app.screens.network.lesson import (
     CROSSING,
@@ -237,10 +237,11 @@ class NetworkPanel(Panel):
         """Show another delivery: its frames, and the moments computed so far."""
         now_ns = self._dock.now_ns if self._delivery is not None else None
         if self._delivery is not None and self._delivery.moments and self._delivery.nodes:
-            same_room = not self._other_room
             ended = self._delivery.moments[-1].t_ns == self._delivery.times_ns[-1]
-            self._before = self._delivery if same_room and ended else None
+            self._before = self._delivery if ended and not self._other_room else None
         self._delivery, self._runs, self._other_room = view, (), False
+        walks = getattr(self.session.results.view("scene"), "has_walk", False)
+        self._text.content = WALK_TEXT if walks else TEXT
         self._frames = [Frames(view.run)]
         drawing = self._drawing = DeliveryDrawing(self.scene, self._next_name(), view)
         self._setup.what_if.load(view, drawing.place_m)

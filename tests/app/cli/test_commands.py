@@ -11,7 +11,7 @@ import pytest
 from lab import benchmarks
 from lab.benchmarks.benchmark import Benchmark
 from pipeline.io.clouds import read_cloud
-from pipeline.io.demos import DEMO_SCENES
+from pipeline.io.demos import DEMOS
 from pipeline.io.meshes import read_mesh
 from tests.app.commands import check_one_sentence, run
 from tests.paths import ASSETS
@@ -82,7 +82,7 @@ def test_a_written_config_repeats_the_run_bit_for_bit(pair_run, capsys, tmp_path
 def test_scenes_lists_every_demo(capsys):
     code, out, _ = run(capsys, "scenes", "--json")
     assert code == 0
-    assert json.loads(out) == {name: scene.description for name, scene in DEMO_SCENES.items()}
+    assert json.loads(out) == {name: scene.description for name, scene in DEMOS.items()}
 
 
 def test_doctor_finds_this_machine_well(capsys):

@@ -5,6 +5,7 @@ from html import unescape
 
 import cv2
 import numpy as np
+import pycolmap
 import pytest
 
 from lab.walks.walk import kinect, read_truth, render_walk
@@ -46,6 +47,11 @@ def test_a_recording_becomes_a_surface_a_trajectory_and_a_report(capsys, walk, o
     assert set(metrics["poses"]) <= {f"frame_{k:05d}" for k in written["keyframes"]}
     assert len(read_mesh(out / "surface_after.ply").triangles) == metrics["surface_after"]["triangles"] > 1000
     assert "A recording of <b>12</b> frames" in (out / "report.html").read_text()
+    model = pycolmap.Reconstruction(str(out / "keyframes" / "sparse"))
+    names = {f"frame_{k:05d}.jpg" for k in written["keyframes"]}
+    assert {image.name for image in model.images.values()} == names
+    frames = json.loads((out / "keyframes" / "transforms.json").read_text())["frames"]
+    assert {own["file_path"] for own in frames} == {f"images/{name}" for name in names}
 
 
 def test_frames_that_are_lost_are_named(capsys, walk, tmp_path):
@@ -66,6 +72,17 @@ def test_frames_that_are_lost_are_named(capsys, walk, tmp_path):
     sentence = "The camera was lost in 2 of 12 frames (5 to 6), which are not in the surface"
     assert sentence in said
     assert sentence in unescape((tmp_path / "out" / "report.html").read_text())
+
+
+def test_of_a_recording_among_rigs_all_frames_are_used(capsys, walk, tmp_path):
+    (tmp_path / "rigs").mkdir()
+    (tmp_path / "rigs" / "walk").symlink_to(walk)
+    words = ["--rigs", tmp_path / "rigs", "--out", tmp_path / "out", "--set", "surface.max_points=3000"]
+    code, _, said = run(capsys, "reconstruct", *words)
+    assert code == 0, said
+    metrics = json.loads((tmp_path / "out" / "walk" / "metrics.json").read_text())
+    assert metrics["recording"]["frames"] == 12
+    assert not (tmp_path / "out" / "walk" / "imported").exists()
 
 
 @pytest.mark.parametrize(

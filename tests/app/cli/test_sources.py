@@ -10,7 +10,7 @@ from pipeline.io.extrinsics import write_extrinsics
 from pipeline.io.images import write_color, write_depth_mm
 from pipeline.io.intrinsics import write_intrinsics
 from pipeline.kernels.geometry import rigid
-from pipeline.sources import Calibrated, Demo, ImagePair, RigFolder
+from pipeline.sources import Calibrated, Demo, ImagePair, Recorded, RigFolder, demo_of
 from pipeline.types import CameraIntrinsics, DepthMap
 from tests.app.commands import check_one_sentence, run
 
@@ -22,6 +22,7 @@ UNREGISTERED = ImagePair("c.png", "d.png", "k.json", 5000.0, "kd.json", "e.json"
     "source",
     [
         Demo("office"),
+        demo_of("living-room-walk"),
         RigFolder("my rig"),
         RigFolder("my rig", 5000.0),
         PAIR,
@@ -44,6 +45,14 @@ def test_a_depth_camera_needs_its_lens_and_its_place(capsys):
 def test_a_demo_has_its_own_depth_scale(capsys):
     got = run(capsys, "reconstruct", "--scene", "office", "--depth-scale", 5000, "--out", "out")
     check_one_sentence(got, 2, "a demo scene has its own depth scale")
+
+
+def test_a_demo_may_be_a_recording_which_keeps_its_camera(capsys):
+    source = demo_of("living-room-walk")
+    assert isinstance(source, Recorded)
+    assert source.title == "living-room-walk"
+    got = run(capsys, "reconstruct", "--scene", source.title, "--calibration", "cal", "--out", "out")
+    check_one_sentence(got, 2, "living-room-walk is a recording, which takes no --calibration")
 
 
 def test_a_calibration_of_another_rig_leaves_no_folder(capsys, tmp_path):

@@ -15,6 +15,7 @@ from app.lesson.player import BEGIN, COMPUTING, FIRST, OFF, SKIP, SKIPPED, Lesso
 from app.screens.calibrate import lesson as calibrate
 from app.screens.depth import lesson as depth
 from app.screens.fuse import lesson as fuse
+from app.screens.fuse import walk_lesson as walk
 from app.screens.fuse.labels import STARTS
 from app.screens.fuse.lesson import SETTINGS, SHIPPED, RaceLook
 from app.screens.fuse.view import Race, RaceMode, Start
@@ -65,6 +66,7 @@ def test_the_stops_of_the_lesson_that_ships_have_different_titles_and_text():
         (network.CROSSING, network.NUMBERS, network.SETTINGS, network.NetworkLook()),
         (network.LOST_PACKET, network.NUMBERS, network.SETTINGS, network.NetworkLook()),
         (SHIPPED, fuse.NUMBERS, SETTINGS, RaceLook()),
+        (walk.SHIPPED, walk.NUMBERS, walk.SETTINGS, walk.WalkLook()),
     ],
     ids=lambda value: getattr(value, "stem", ""),
 )
@@ -326,6 +328,7 @@ def test_what_a_lost_packet_costs_is_told_by_what_is_left_of_the_cameras():
         (network.CROSSING, network),
         (network.LOST_PACKET, network),
         (SHIPPED, fuse),
+        (walk.SHIPPED, walk),
     ],
     ids=lambda value: getattr(value, "stem", ""),
 )

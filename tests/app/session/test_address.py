@@ -9,7 +9,7 @@ from app.session.address import Place, name_of, place_of
 from network_sim.config import NetworkConfig
 from packetmesh.settings import with_settings
 from pipeline.config import PRESETS
-from pipeline.sources import Demo, RigFolder
+from pipeline.sources import Demo, Recorded, RigFolder, demo_of
 
 SCREENS = ("Scene", "Fuse", "Surface")
 SOURCES = {"office": Demo("office"), "desk-001": RigFolder("/tmp/x/desk-001")}
@@ -31,6 +31,12 @@ def test_what_is_written_is_read_back(source, preset, changes, added):
     place = Place(spec, "Surface", added)
     assert read(place.text()) == place
     assert name_of(source) in place.text()
+
+
+def test_an_uploaded_recording_is_named_by_its_upload_and_a_demo_by_its_name():
+    upload = "upload-" + 22 * "a"
+    assert name_of(Recorded(f"/tmp/x/{upload}/my-walk", 5000.0)) == upload
+    assert name_of(demo_of("living-room-walk")) == "living-room-walk"
 
 
 def test_an_address_that_says_nothing_is_the_start():

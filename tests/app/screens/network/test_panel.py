@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import viser
 
-from app.compute.state import Spec
+from app.compute.state import Results, Spec
 from app.dock.dock import time_text
 from app.drawing.colors import COVERAGE_STOPS, linear
 from app.lesson.files import read_lesson
@@ -114,6 +114,18 @@ def test_the_first_visit_sends_the_room(screen):
     assert {"node_00", "node_01", "node_02", "sink", "cloud", "client", "routes"} <= set(screen.names())
     assert "3 cameras sent" in screen.gui.text()
     assert "Rays without surface" in screen.gui.text()
+
+
+def test_of_a_recording_it_is_said_that_the_nodes_are_keyframes(screen):
+    view = Results.view
+    recording = SimpleNamespace(title="walk", has_walk=True)
+    assert "The cameras of the room send" in screen.gui.text()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Results, "view", lambda self, step: recording if step == "scene" else view(self, step))
+        screen.panel._take_delivery(screen.view)
+        assert "**node** is a keyframe of its recording" in screen.gui.text()
+    screen.panel._take_delivery(screen.view)
+    assert "The cameras of the room send" in screen.gui.text()
 
 
 def test_scrubbing_shows_the_moment_before_and_nothing_before_the_first(screen):

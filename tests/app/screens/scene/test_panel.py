@@ -9,11 +9,16 @@ import numpy as np
 import pytest
 
 from app.screens.scene import own, recording_job
+from app.screens.scene.own import MOMENTS, WALK
 from app.screens.scene.panel import ScenePanel
+from lab.walks.walk import kinect, render_walk
+from lab.worlds.rooms import random_room
 from packetmesh.errors import InputError
+from pipeline.io.demos import DEMOS, load_demo
 from pipeline.io.rigs import save_rig
-from pipeline.sources import Demo
+from pipeline.sources import Demo, Recorded, RigFolder, demo_of
 from tests.app.fakes import Bench, ui_of
+from tests.pipeline.importing.bags import write_bag
 from tests.pipeline.importing.recordings import orbit, write_colmap, write_tum
 
 FOLDER = "Use your own images"
@@ -83,6 +88,45 @@ def test_a_pair_or_nodes_from_another_number_on_may_come_in_a_zip(session, tmp_p
         assert f"A rig of {node.name}" in session.gui.text(FOLDER)
 
 
+def test_a_recording_in_a_zip_may_stay_one_walk(session, tmp_path):
+    render_walk(random_room(5_000_001), 6, kinect(160), tmp_path / "walk")
+    session.gui.set("It becomes", WALK)
+    assert not session.gui.find("Frames").seen
+    session.gui.upload("Recording …", "my walk.zip", zipped(tmp_path / "walk"))
+    (upload,) = session.folder.iterdir()
+    assert session.spec.source == Recorded(str(upload / "my-walk"))
+    assert "TUM: 6 frames become one surface" in session.gui.text(FOLDER)
+    assert session.gui.find("Scene").value == "my-walk"
+    assert session.results.view("scene").nodes[0].name.startswith("frame_0000")
+    assert sorted(path.name for path in (upload / "own").iterdir()) == ["my walk.zip"]
+    session.gui.set("It becomes", MOMENTS)
+    assert session.gui.find("Frames").seen
+
+
+def test_a_rig_stays_a_rig_whatever_a_recording_becomes(session, tmp_path):
+    save_rig(tmp_path / "rig", orbit(2))
+    session.gui.set("It becomes", WALK)
+    session.gui.upload("Recording …", "rig.zip", zipped(tmp_path / "rig"))
+    assert isinstance(session.spec.source, RigFolder)
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_a_bag_may_stay_one_recording_by_its_own_name(session, tmp_path, packed):
+    write_bag(tmp_path / "walk", load_demo("living-room"), "mcap", moments=2)
+    (bag,) = (tmp_path / "walk").glob("*.mcap")
+    content = zipped(bag.parent) if packed else bag.read_bytes()
+    session.gui.set("It becomes", WALK)
+    session.gui.upload("Recording …", "desk.zip" if packed else "desk.mcap", content)
+    assert isinstance(session.spec.source, Recorded)
+    assert Path(session.spec.source.path).exists()
+    assert Path(session.spec.source.path).suffix in ("", ".mcap")
+
+
+def test_a_demo_may_be_a_walk(session):
+    session.gui.set("Scene", DEMOS["living-room-walk"].title)
+    assert session.spec.source == demo_of("living-room-walk")
+
+
 def test_a_zip_of_several_names_them_and_takes_none(session, tmp_path):
     save_rig(tmp_path / "both" / "first", orbit(1))
     write_tum(tmp_path / "both" / "second", orbit(2))
@@ -133,7 +177,7 @@ def test_images_of_one_name_are_both_kept_by_it(session):
     [
         ("a.zip", b"nonsense", "cannot be read as a ZIP"),
         ("a.bag", b"nonsense", "bag"),
-        ("a.txt", b"nonsense", "is a file not named .bag"),
+        ("a.txt", b"nonsense", "is a file of no known kind"),
         ("a.zip", zipfile.ZipFile, "of no known kind"),
     ],
 )

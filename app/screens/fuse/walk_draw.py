@@ -1,0 +1,242 @@
+"""Drawing of a walk: the map is sent once, in pieces; then its visible part, poses and one picture change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import cv2
+import numpy as np
+import viser
+
+from app.compute.records import Sample
+from app.drawing.cameras import turn
+from app.drawing.clouds import add_cloud
+from app.drawing.colors import DELIVERED, LOSS, SOURCE
+from app.drawing.poses import move, place
+from app.screens.fuse.walk_view import NO_PICTURES, LoopView, WalkView
+from pipeline.types import ByteArray, FloatArray, IntArray
+
+PIECES = 80
+"""Approximate number of clouds into which the map is split."""
+COLORS = {
+    "solid": SOURCE,
+    "faint": (246, 214, 150),
+    "dashed": (30, 34, 40),
+    "gaps": (255, 255, 255),
+    "frustum": SOURCE,
+    "loop": DELIVERED,
+}
+"""Colours by the names in ``walk_numbers.LINES``; gaps are white, to be seen on any map."""
+WIDTHS_PX = {"solid": 4.0, "faint": 3.0, "dashed": 3.5, "gaps": 3.5}
+POINT = 0.75
+"""Size of a point over the distance between neighbours."""
+FRUSTUM = 0.35
+"""Size of a frustum over the distance from the path to what it sees, at most ``MOST_FRUSTUM_M``."""
+MOST_FRUSTUM_M = 0.3
+SLOPE_RAD = np.radians(50.0)
+"""Angle at which one looks down on the walk."""
+FITTED, MARGIN = 3000, 0.9
+"""Number of map points that must fit into the picture, and the share of the picture that they may fill."""
+MOST_SEGMENTS = 1000
+"""Most segments in which a path is drawn."""
+DASHES = 30
+"""Number of dashes of the path by tracking alone."""
+ENLARGED = (1, 2, 5, 10, 20, 50)
+"""Factors by which the drift may be enlarged."""
+SEEN_DRIFT = 0.2
+"""Largest drift over the path's extent, as it is drawn."""
+
+
+def enlarging(view: WalkView) -> int:
+    """Return the largest factor at which the drift is drawn no larger than ``SEEN_DRIFT`` allows."""
+    drift_m = float(np.nanmax(view.drift_m))
+    most_m = SEEN_DRIFT * float(np.linalg.norm(np.nanmax(view.at_m, axis=0) - np.nanmin(view.at_m, axis=0)))
+    return max((times for times in ENLARGED if times * drift_m <= most_m), default=1)
+
+
+class WalkDrawing:
+    """A walk below a scene node, at any of its moments."""
+
+    def __init__(self, scene: viser.SceneApi, below: str, view: WalkView) -> None:
+        """Draw the paths and, hidden, the pieces of the map and the cameras."""
+        self._scene, self._below, self._view = scene, below, view
+        self.pictures = NO_PICTURES
+        self._size_m = frustum_m(view)
+        self.ends = pieces(view.until)
+        starts = np.append(0, self.ends[:-1])
+        self._pieces = [
+            self._add_points(f"map{index}", start, end)
+            for index, (start, end) in enumerate(zip(starts, self.ends, strict=True))
+        ]
+        self._whole = 0
+        self._faint, self._solid = self._add_line("faint"), self._add_line("solid")
+        self._dashed, self._gaps = self._add_line("dashed"), self._add_line("gaps")
+        self._camera = self._add_camera("camera", SOURCE)
+        self._alone = self._add_camera("alone", COLORS["dashed"])
+        self._pair = [self._add_camera(f"loop{index}", DELIVERED) for index in range(2)]
+        self._names = [self._add_name(index) for index in range(2)]
+        self.enlarge(1)
+
+    def _add_points(self, name: str, start: int, end: int) -> viser.PointCloudHandle:
+        view = self._view
+        sample = Sample(view.points_m[start:end], view.colors[start:end], end - start)
+        name = f"{self._below}/{name}"
+        size_m = POINT * view.spacing_m
+        return add_cloud(self._scene, name, sample, np.eye(4), size_m=size_m, visible=False)
+
+    def _add_line(self, look: str) -> viser.LineSegmentsHandle:
+        return self._scene.add_line_segments(
+            f"{self._below}/{look}",
+            np.zeros((1, 2, 3), np.float32),
+            np.array(COLORS[look]),
+            thickness=WIDTHS_PX[look],
+            thickness_units="screen",
+            visible=False,
+        )
+
+    def _add_camera(self, name: str, color: tuple[int, int, int]) -> viser.CameraFrustumHandle:
+        return self._scene.add_camera_frustum(
+            f"{self._below}/{name}",
+            fov=self._view.fov_rad,
+            aspect=self._view.aspect,
+            scale=self._size_m,
+            thickness=0.04 * self._size_m,
+            color=color,
+            format="jpeg",
+            visible=False,
+        )
+
+    def _add_name(self, index: int) -> viser.LabelHandle:
+        """Add the name of a loop's first camera above its picture, or of its second one below."""
+        _, height, depth = self._pair[index].compute_canonical_frustum_size()
+        return self._scene.add_label(
+            f"{self._below}/loop{index}/name",
+            "",
+            font_screen_scale=0.9,
+            anchor="top-center" if index else "bottom-center",
+            position=(0.0, (index - 0.5) * height * self._size_m, depth * self._size_m),
+        )
+
+    def enlarge(self, times: int) -> None:
+        """Draw the path by tracking alone this many times as far from the final one as it is."""
+        self._times = times
+        dashes, gaps = _dashes(self._shifted())
+        self._show_line(self._dashed, dashes)
+        self._show_line(self._gaps, gaps)
+
+    def _shifted(self) -> FloatArray:
+        """Return (F, 3) positions by tracking alone, their drift enlarged."""
+        view = self._view
+        shifted: FloatArray = view.at_m + self._times * (view.tracked_m - view.at_m)
+        return shifted
+
+    def show(self, frame: int) -> None:
+        """Show the moment of a frame: the map, the path and the camera with its picture."""
+        view = self._view
+        whole = int(np.searchsorted(self.ends, view.until[frame], side="right"))
+        for index in range(min(whole, self._whole), max(whole, self._whole)):
+            self._pieces[index].visible = index < whole
+        self._whole = whole
+        self._show_line(self._solid, _segments(view.at_m[: frame + 1]))
+        self._show_line(self._faint, _segments(view.at_m[frame:]))
+        T = view.T_world_camera[frame]
+        known = bool(np.isfinite(T).all())
+        self._camera.visible = known
+        self._alone.visible = known and self._times * view.drift_m[frame] > 0.05 * self._size_m
+        if known:
+            self._put(self._camera, T, self.pictures.of(frame))
+        if self._alone.visible:
+            alone = view.T_world_tracked[frame].copy()
+            alone[:3, 3] = self._shifted()[frame]
+            move(self._alone, alone)
+
+    def _show_line(self, line: viser.LineSegmentsHandle, segments_m: FloatArray) -> None:
+        line.visible = bool(len(segments_m))
+        if len(segments_m):
+            line.points = segments_m
+
+    def choose(self, loop: LoopView | None) -> None:
+        """Show the cameras of a loop's two keyframes with their pictures; None hides them."""
+        frames = () if loop is None else sorted((loop.source, loop.target))
+        for camera in self._pair:
+            camera.visible = bool(frames)
+        for camera, name, frame in zip(self._pair, self._names, frames, strict=False):
+            camera.color = DELIVERED if loop is not None and loop.used else LOSS
+            name.text = f"frame {frame}"
+            self._put(camera, self._view.T_world_camera[frame], self.pictures.of(frame))
+
+    def _put(self, camera: viser.CameraFrustumHandle, T: FloatArray, picture: bytes | None) -> None:
+        place(camera, T)
+        if picture is not None:
+            camera.image = _rgb(picture)
+
+    def look(self, clients: Iterable[viser.ClientHandle]) -> None:
+        """Turn the view to the path and what it sees, from behind and above."""
+        for client in clients:
+            turn(client, *viewpoint(self._view, client.camera.fov, client.camera.aspect))
+
+
+def pieces(until: IntArray) -> IntArray:
+    """Return (P,) ascending ends of pieces of the map: each holds all points of a few frames.
+
+    Args:
+        until: (F,) number of points after each frame.
+    """
+    least = max(1, int(until[-1]) // PIECES)
+    ends = [0]
+    for end in until.tolist():
+        if end - ends[-1] >= least or (end == until[-1] and end > ends[-1]):
+            ends.append(end)
+    return np.array(ends[1:], int)
+
+
+def frustum_m(view: WalkView) -> float:
+    """Return the size of a frustum, so that it hides little of what the camera sees."""
+    nearest_m = np.nanpercentile(np.linalg.norm(view.points_m - np.nanmean(view.at_m, axis=0), axis=1), 10)
+    return min(FRUSTUM * float(nearest_m), MOST_FRUSTUM_M)
+
+
+def viewpoint(view: WalkView, fov_rad: float, aspect: float) -> tuple[FloatArray, FloatArray]:
+    """Return (3,) the point to look at and (3,) the place to look from, behind the camera and above it.
+
+    The whole map fits into a picture with this vertical field of view and this width over height.
+    """
+    gaze = np.nanmean(view.T_world_camera[:, :3, 2], axis=0)
+    level = np.array([gaze[0], gaze[1], 0.0]) / max(float(np.hypot(gaze[0], gaze[1])), 1e-9)
+    forward = np.cos(SLOPE_RAD) * level - np.sin(SLOPE_RAD) * np.array([0.0, 0.0, 1.0])
+    right = np.cross(forward, (0.0, 0.0, 1.0)) / np.cos(SLOPE_RAD)
+    axes = np.stack([right, np.cross(right, forward), forward])
+    at_m = view.at_m[np.isfinite(view.drift_m)]
+    seen_m = np.concatenate([view.points_m[:: 1 + len(view.points_m) // FITTED], at_m]) @ axes.T
+    low_m, high_m = np.percentile(seen_m, [1, 99], axis=0)
+    middle_m = 0.5 * (low_m + high_m)
+    across_m, up_m, away_m = (np.clip(seen_m, low_m, high_m) - middle_m).T
+    half = np.tan(0.5 * fov_rad) * MARGIN
+    back_m = np.maximum(np.abs(across_m) / (half * aspect), np.abs(up_m) / half) - away_m
+    center_m = middle_m @ axes
+    return center_m, center_m - float(np.percentile(back_m, 99)) * forward
+
+
+def _segments(at_m: FloatArray) -> FloatArray:
+    """Return (S, 2, 3) segments between (F, 3) positions in a row; none across gaps (NaN)."""
+    every = max(1, len(at_m) // MOST_SEGMENTS)
+    at_m = at_m[::every]
+    segments = np.stack([at_m[:-1], at_m[1:]], axis=1).astype(np.float32)
+    known: FloatArray = segments[np.isfinite(segments).all(axis=(1, 2))]
+    return known
+
+
+def _dashes(at_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the dashes and the gaps of a line through (F, 3) positions, each as (S, 2, 3) segments."""
+    segments = _segments(at_m)
+    length_m = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).cumsum()
+    dash = (2 * DASHES * length_m / max(float(length_m.max(initial=0.0)), 1e-9)).astype(int)
+    return segments[dash % 2 == 0], segments[dash % 2 == 1]
+
+
+def _rgb(jpeg: bytes) -> ByteArray:
+    """Return the (H, W, 3) image of a JPEG file."""
+    bgr: Any = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    rgb: ByteArray = bgr[..., ::-1]
+    return rgb

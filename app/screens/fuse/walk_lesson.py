@@ -1,0 +1,116 @@
+"""The lesson of the walk: the settings of its stops, the numbers of its texts, and its file."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from app.lesson.files import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, sets
+from app.screens.fuse.walk_numbers import loop_name
+from app.screens.fuse.walk_view import WalkView
+from app.window.tables import UNKNOWN, WAITING, number
+
+SHIPPED = LESSONS / "how-a-walk-becomes-a-room.md"
+
+
+@dataclass(frozen=True, slots=True)
+class WalkLook:
+    """The moment and the loop that a stop shows."""
+
+    moment: float | None = 1.0
+    """Share of the recording's frames that have been taken; None: the first lost one, or the end."""
+    loop: Literal["none", "largest", "last"] = "none"
+    """The loop that moved the camera farthest, the last in the list, or none."""
+    enlarged: bool = True
+    """Whether the drift is enlarged."""
+
+
+def _moment(text: str) -> float | None:
+    if text == "lost":
+        return None
+    if text in ("start", "end"):
+        return float(text == "end")
+    found = re.fullmatch(rf"{NUMBER} ?%", text)
+    if found is None or float(found[1]) > 100.0:
+        raise ValueError("try start, end, lost or a share of the frames, such as 40 %")
+    return float(found[1]) / 100.0
+
+
+SETTINGS: dict[str, Setting[WalkLook]] = {
+    "moment": sets("moment", _moment),
+    "loop": sets("loop", choice({name: name for name in ("none", "largest", "last")})),
+    "drift": sets("enlarged", choice({"enlarged": True, "true size": False})),
+}
+"""The settings of a stop, by their names in the file."""
+NUMBERS = (
+    *("frames", "keyframes", "seconds", "path", "lost", "times", "drift", "end_drift"),
+    *("loops", "found", "pair", "moved", "turned", "left", "overlap"),
+    *("first", "half", "points", "missed", "missed_before"),
+)
+"""Fields of the texts."""
+
+
+def frame_of(look: WalkLook, view: WalkView) -> int:
+    """Return the frame that a stop shows."""
+    if look.moment is None:
+        return view.lost[0][0] if view.lost else view.frames - 1
+    return round(look.moment * (view.frames - 1))
+
+
+def loop_of(look: WalkLook, view: WalkView) -> int:
+    """Return the index of the loop that a stop shows; -1 for none."""
+    return {"none": -1, "largest": min(0, len(view.loops) - 1), "last": len(view.loops) - 1}[look.loop]
+
+
+def numbers(scene: str, view: WalkView, surface: Any, times: int) -> Numbers:
+    """Return the fields' values.
+
+    Args:
+        scene: title of the scene.
+        view: the walk.
+        surface: the surfaces of the same recording; None while they are computed.
+        times: factor by which the drift is enlarged.
+    """
+    share = 100.0 * view.until / max(len(view.points_m), 1)
+    values = {
+        "frames": f"{view.frames:,}",
+        "keyframes": f"{len(view.keyframes):,}",
+        "seconds": number(float(view.times_s[-1]), 1, "s"),
+        "path": number(view.path_m, 1, "m"),
+        "lost": f"{sum(last - first + 1 for first, last in view.lost):,}",
+        "times": f"{times}",
+        "drift": number(float(np.nanmax(view.drift_m)), 1, "cm", 100.0),
+        "end_drift": number(float(view.drift_m[view.last]), 1, "cm", 100.0),
+        "loops": f"{view.used_loops:,}",
+        "found": f"{len(view.loops):,}",
+        "points": f"{view.map_points:,}",
+        "first": number(float(share[0]), 0, "%"),
+        "half": number(float(share[view.frames // 2]), 0, "%"),
+    }
+    return {SCENE: scene, **values, **_loop_numbers(view), **_surface_numbers(surface)}
+
+
+def _loop_numbers(view: WalkView) -> dict[str, str]:
+    if not view.loops:
+        return dict.fromkeys(("pair", "moved", "turned", "left", "overlap"), UNKNOWN)
+    loop = view.loops[0]
+    return {
+        "pair": loop_name(loop),
+        "moved": number(loop.moved_m, 1, "cm", 100.0),
+        "turned": f"{np.degrees(loop.turned_rad):.2f}°",
+        "left": number(loop.left_m, 1, "cm", 100.0),
+        "overlap": number(loop.overlap_share, 0, "%", 100.0),
+    }
+
+
+def _surface_numbers(surface: Any) -> dict[str, str]:
+    """Return the shares of rays that miss the surfaces after and before fusion."""
+    if surface is None or surface.before is None:
+        return dict.fromkeys(("missed", "missed_before"), WAITING)
+    return {
+        "missed": number(surface.after.quality.no_hit_ray_share, 1, "%", 100.0),
+        "missed_before": number(surface.before.quality.no_hit_ray_share, 1, "%", 100.0),
+    }
