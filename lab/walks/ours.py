@@ -12,7 +12,7 @@ from lab.walks.judging import Mesh, Program, Row, WalkAnswer, measured
 from packetmesh.progress import drain
 from pipeline.config import PRESETS
 from pipeline.recording.loops import iterate_loops, poses_by_tracking
-from pipeline.recording.places import iterate_joins
+from pipeline.recording.places import Places, iterate_joins
 from pipeline.recording.tracking import iterate_tracking
 from pipeline.recording.walk import iterate_walk
 from pipeline.surface.ball_pivoting import roll_or_nothing
@@ -43,7 +43,8 @@ def _looped(frames: FramesInMemory) -> WalkAnswer:
     track = drain(iterate_tracking(frames))
     if not track.clouds:
         return WalkAnswer((None,) * len(frames.times_s))
-    return WalkAnswer(drain(iterate_loops(drain(iterate_joins(frames, track)))).T_first_depth)
+    places = Places(frames)
+    return WalkAnswer(drain(iterate_loops(drain(iterate_joins(places, track)), places)).T_first_depth)
 
 
 def _mapped(frames: FramesInMemory) -> WalkAnswer:

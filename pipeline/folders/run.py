@@ -22,7 +22,7 @@ from pipeline.placement.outcome import NodeRegistration, NodeVerdict
 from pipeline.reconstruct import Reconstruction
 from pipeline.spec import Spec
 from pipeline.stages import dressed
-from pipeline.types import PointCloud, PointSource, SurfaceResult
+from pipeline.types import PointCloud, PointSource, RgbdFrame, SurfaceResult
 
 METRICS = "metrics.json"
 CLOUD_FILES = ("sensor.ply", "inferred.ply", "fused.ply")
@@ -132,6 +132,7 @@ def metrics_of(reconstruction: Reconstruction) -> dict[str, Any]:
                 "place": _place(verdict),
                 "notes": frame.notes,
             }
+            | _averaged(frame)
             for node, frame, verdict in zip(
                 reconstruction.nodes, reconstruction.rig.frames, placement.verdicts, strict=True
             )
@@ -157,6 +158,21 @@ def metrics_of(reconstruction: Reconstruction) -> dict[str, Any]:
         "truth": truth,
         "timings_s": reconstruction.timings_s,
         "peak_memory_bytes": peak_memory_bytes(),
+    }
+
+
+def _averaged(frame: RgbdFrame) -> dict[str, Any]:
+    """Return the numbers of a camera that stands; nothing for a single image."""
+    averaging = frame.averaging
+    if averaging is None:
+        return {}
+    return {
+        "averaged": {
+            "frames": averaging.frames,
+            "moving_share": averaging.moving_share,
+            "flickering_share": averaging.flickering_share,
+            "median_sd_m": averaging.median_sd_m,
+        }
     }
 
 

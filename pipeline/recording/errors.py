@@ -10,20 +10,23 @@ from pipeline.registration.residual import DegenerateError, weighted_procrustes
 from pipeline.types import FloatArray
 
 
-def ate_m(T_world_camera: Sequence[FloatArray | None], T_reference_camera: Sequence[FloatArray]) -> float:
+def ate_m(
+    T_world_camera: Sequence[FloatArray | None], T_reference_camera: Sequence[FloatArray | None]
+) -> float:
     """Return the absolute trajectory error: the RMSE of the positions after rigid alignment (Umeyama 1991).
 
     Args:
         T_world_camera: (4, 4) poses; None for frames without a pose, which are skipped.
-        T_reference_camera: as many poses in another world.
+        T_reference_camera: as many poses in another world, or None.
 
     Returns:
         Metres; NaN for fewer than three positions, or positions on one line.
     """
-    both = [(T, R) for T, R in zip(T_world_camera, T_reference_camera, strict=True) if T is not None]
+    pairs = zip(T_world_camera, T_reference_camera, strict=True)
+    both = [(T[:3, 3], R[:3, 3]) for T, R in pairs if T is not None and R is not None]
     if len(both) < 3:
         return float("nan")
-    own_m, other_m = (np.array([pair[k][:3, 3] for pair in both]) for k in range(2))
+    own_m, other_m = np.array(both).transpose(1, 0, 2)
     try:
         T = weighted_procrustes(own_m, other_m, np.ones(len(both)))
     except DegenerateError:

@@ -41,8 +41,9 @@ CONVENTIONS: dict[str, Callable[[FloatArray], FloatArray]] = {
 class Given:
     """Poses to start from."""
 
-    T_world_camera: tuple[FloatArray, ...] | None
-    """(4, 4) poses of the colour camera; None if there are none or they contradict the depth."""
+    T_world_camera: tuple[FloatArray | None, ...] | None
+    """(4, 4) poses of the colour camera, None where unknown; None if there are none or they contradict the
+    depth."""
     notes: tuple[str, ...] = ()
 
 
@@ -54,14 +55,14 @@ def checked_poses(recording: Recording) -> Given:
     written = recording.T_world_camera
     if written is None:
         return Given(None)
-    seen = _motions(recording)
+    seen = _motions(recording, written)
     if len(seen) < LEAST_PAIRS:
         note = (
             f"The poses of {recording.name} were not compared with its depth: it moves too little from frame "
             "to frame, or too much"
         )
         return Given(written, (note,))
-    apart = {name: _apart(seen, [read(T) for T in written]) for name, read in CONVENTIONS.items()}
+    apart = {name: _apart(seen, _read(written, read)) for name, read in CONVENTIONS.items()}
     limit = _limit(seen)
     size = {name: float(np.sum(one / limit)) for name, one in apart.items()}
     best, expected = min(size, key=lambda name: size[name]), next(iter(CONVENTIONS))
@@ -70,7 +71,7 @@ def checked_poses(recording: Recording) -> Given:
         if best == expected:
             return Given(written)
         note = f"The poses of {recording.name} agree with its depth only if read as {best}: they were read so"
-        return Given(tuple(CONVENTIONS[best](T) for T in written), (note,))
+        return Given(_read(written, CONVENTIONS[best]), (note,))
     shift_m, turn_deg = apart[best]
     note = (
         f"The poses of {recording.name} contradict its depth, by {100.0 * shift_m:.0f} cm and "
@@ -79,18 +80,26 @@ def checked_poses(recording: Recording) -> Given:
     return Given(None, (note,))
 
 
+def _read(
+    written: Sequence[FloatArray | None], read: Callable[[FloatArray], FloatArray]
+) -> tuple[FloatArray | None, ...]:
+    """Return written poses in a convention."""
+    return tuple(None if T is None else read(T) for T in written)
+
+
 def _limit(seen: Sequence[tuple[int, int, FloatArray]]) -> FloatArray:
     """Return (2,) largest median differences, metres and degrees, of poses that agree with motions."""
     motion = _size([T for _, _, T in seen])
     return np.array([NEAR_M, NEAR_DEG]) + NEAR_SHARE * motion
 
 
-def _motions(recording: Recording) -> list[tuple[int, int, FloatArray]]:
-    """Return (i, j, (4, 4) T_i_j of the colour camera) of frames whose depth images register."""
+def _motions(recording: Recording, written: Sequence[FloatArray | None]) -> list[tuple[int, int, FloatArray]]:
+    """Return (i, j, (4, 4) T_i_j of the colour camera) of frames with poses whose depth images register."""
     found: list[tuple[int, int, FloatArray]] = []
-    last = len(recording.times_s) - APART
-    for first in np.unique(np.linspace(0, last - 1, PAIRS).round().astype(int)) if last > 0 else ():
-        views = [recording.view(k) for k in (int(first), int(first) + APART)]
+    firsts = [k for k, T in enumerate(written[:-APART]) if T is not None and written[k + APART] is not None]
+    chosen = np.linspace(0, len(firsts) - 1, PAIRS).round().astype(int) if firsts else ()
+    for first in [firsts[k] for k in np.unique(chosen)]:
+        views = [recording.view(k) for k in (first, first + APART)]
         target, source = (organised(view.depth, view.camera) for view in views)
         if not len(target) or not len(source):
             continue
@@ -98,13 +107,21 @@ def _motions(recording: Recording) -> list[tuple[int, int, FloatArray]]:
         if one is not None and one.holds:
             T = views[0].T_color_depth @ one.T_target_source @ inverse(views[1].T_color_depth)
             if np.linalg.norm(T[:3, 3]) >= LEAST_M or _turn_deg(T) >= LEAST_DEG:
-                found.append((int(first), int(first) + APART, T))
+                found.append((first, first + APART, T))
     return found
 
 
-def _apart(seen: Sequence[tuple[int, int, FloatArray]], T_world_camera: Sequence[FloatArray]) -> FloatArray:
+def _apart(
+    seen: Sequence[tuple[int, int, FloatArray]], T_world_camera: Sequence[FloatArray | None]
+) -> FloatArray:
     """Return (2,) median differences of poses' motions from those seen, metres and degrees."""
-    return _size([inverse(T) @ inverse(T_world_camera[i]) @ T_world_camera[j] for i, j, T in seen])
+    apart = []
+    for i, j, T in seen:
+        one, other = T_world_camera[i], T_world_camera[j]
+        assert one is not None
+        assert other is not None
+        apart.append(inverse(T) @ inverse(one) @ other)
+    return _size(apart)
 
 
 def _size(motions: Sequence[FloatArray]) -> FloatArray:

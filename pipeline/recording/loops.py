@@ -7,14 +7,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from packetmesh.progress import Progress
-from pipeline.kernels.geometry import inverse, rotation_angle_rad
-from pipeline.recording.places import parts_of
-from pipeline.recording.tracking import TRACKING, WITHIN, Track, link, registered
-from pipeline.registration.graph.edges import PoseEdge
+from packetmesh.progress import Progress, part
+from pipeline.kernels.geometry import inverse
+from pipeline.recording.places import Places, parts_of
+from pipeline.recording.revisits import iterate_revisits
+from pipeline.recording.tracking import (
+    LEAST_AGREEMENT,
+    LEAST_OVERLAP,
+    LESS_AGREEMENT,
+    REPORTED,
+    TRACKING,
+    WITHIN,
+    Track,
+    link,
+    registered,
+)
+from pipeline.registration.graph.edges import PoseEdge, small_motion
 from pipeline.registration.graph.pose_graph import solve_pose_graph
 from pipeline.registration.organised import OrganisedCloud, shared_shares
-from pipeline.types import FloatArray, Link
+from pipeline.types import FloatArray, IntArray, Link
 
 LOOP_GATE_M = 0.3
 """Gate of a loop's registration: larger than in tracking, because drift may have grown."""
@@ -25,10 +36,22 @@ LEAST_PREDICTED = 0.4
 """Least overlap of two keyframes at their tracked poses for a trial."""
 MOST_TRIED = 8
 """Most loops tried for each keyframe, those of the largest predicted overlap."""
+MOST_LOOPS, LEAST_TRIED = 1000, 3
+"""About the most loops tried in a round: where keyframes are many, fewer for each, from other times."""
+MOST_COMPARED = 32
+"""Most earlier keyframes with which the overlap of each is predicted."""
 ROUNDS = 2
 """Number of rounds: the poses after the first one predict more loops."""
+DRIFTS = (3.0, 10.0, 30.0)
+"""Factors of tracking' errors that are tried where they contradict places recognised by colour."""
+OF_TRACKING = 1.5
+"""Weight of a link of tracking where links contradict each other, in loops: two loops outvote it."""
 GRAPH_POINTS = 200
 """About the number of a keyframe's points at which the pose graph measures errors."""
+
+
+Pair = tuple[int, int]
+"""Source and target of a link."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,29 +76,125 @@ class Trajectory:
     """Registrations of tracking, then those that close loops."""
 
 
-def iterate_loops(track: Track) -> Generator[Progress, None, Trajectory]:
+def iterate_loops(track: Track, places: Places | None = None) -> Generator[Progress, None, Trajectory]:
     """Close loops between the keyframes of the largest part, and reconcile all links by least squares.
 
     Frames of other parts have no pose.
+
+    Args:
+        track: the result of tracking.
+        places: the keyframes' colours, by which a place is recognised after much drift; None to do without.
     """
-    poses, clouds = _chain(track), track.clouds
-    links = [one for one in track.links if one.source in poses]
-    tried = {(one.source, one.target): one.T_target_source for one in links}
-    for _ in range(ROUNDS):
-        candidates = _candidates(poses, clouds, tried)
-        before = len(links)
+    loops = _Loops(track)
+    yield from part(_rounds(loops), "near", 0.0, 0.5, detail=True)
+    if places is not None:
+        found = yield from part(loops.iterate_revisits(places), "far", 0.5, 0.75, detail=True)
+        if found:
+            yield from part(_rounds(loops), "near", 0.75, 1.0, detail=True)
+    return Trajectory(tuple(_frame_poses(track, loops.poses)), loops.poses, tuple(loops.links))
+
+
+def _rounds(loops: _Loops) -> Generator[Progress, None, None]:
+    """Run ``ROUNDS`` rounds of loops between keyframes that are near each other."""
+    for turn in range(ROUNDS):
+        begin, end = turn / ROUNDS, (turn + 1) / ROUNDS
+        if not (yield from part(loops.iterate_round(), f"round {turn + 1}", begin, end, detail=True)):
+            break
+
+
+class _Loops:
+    """Poses and links of the largest part's keyframes while loops are closed."""
+
+    def __init__(self, track: Track) -> None:
+        self.poses = _chain(track)
+        self.links = [one for one in track.links if one.source in self.poses]
+        self._clouds = track.clouds
+        self._tried = {(one.source, one.target): one.T_target_source for one in self.links}
+        self._sure: set[Pair] = set()
+        """Pairs that were recognised by colour."""
+        self._explained: tuple[Pair | None, float] = (None, 1.0)
+        """Pair whose link is wrong, and factor of the errors of tracking."""
+
+    def iterate_round(self) -> Generator[Progress, None, bool]:
+        """Register keyframes that are near each other, then reconcile; returns False if there is no loop."""
+        candidates = yield from _candidates(self.poses, self._clouds, self._tried)
         for number, candidate in enumerate(candidates):
             if number % 10 == 0:
-                yield Progress(f"trying loop {number} of {len(candidates)}", number / len(candidates))
-            tried[candidate.source, candidate.target] = candidate.T_target_source
-            found = _closed(candidate, clouds)
+                share = 0.5 + 0.5 * number / len(candidates)
+                yield Progress(f"trying loop {number} of {len(candidates)}", share)
+            pair = candidate.source, candidate.target
+            self._tried[pair] = candidate.T_target_source
+            found = _closed(candidate, self._clouds)
             if found is not None:
-                tried[candidate.source, candidate.target] = found.T_target_source
-                links.append(found)
-        if len(links) == before and not any(one.loop for one in links):
-            break
-        poses, links = _reconciled(poses, links, clouds)
-    return Trajectory(tuple(_frame_poses(track, poses)), poses, tuple(links))
+                self._tried[pair] = found.T_target_source
+                self.links.append(found)
+        if not any(one.loop for one in self.links):
+            return False
+        self._reconcile()
+        return True
+
+    def iterate_revisits(self, places: Places) -> Generator[Progress, None, bool]:
+        """Close loops by colour, then reconcile; returns False if there is none."""
+        found = yield from iterate_revisits(places, self.poses, self._clouds)
+        linked = {(one.source, one.target) for one in self.links}
+        new = [one for one in found if (one.source, one.target) not in linked]
+        for one in new:
+            self._tried[one.source, one.target] = one.T_target_source
+            self._sure.add((one.source, one.target))
+        self.links += new
+        if new:
+            self._reconcile()
+        return bool(new)
+
+    def _reconcile(self) -> None:
+        """Set the poses by least squares over all links, and ``used`` of the links.
+
+        If places that were recognised contradict the path, one link of tracking may be wrong, which is then
+        not used; or the errors of all are larger than their pairs say, and are multiplied by one of
+        ``DRIFTS``. The first such explanation is taken that leaves the fewest links in doubt.
+        """
+        least = len(self.links) + 1
+        for explained in self._explanations():
+            solved, links = _reconciled(self.poses, self.links, self._clouds, *explained)
+            doubts = sum(self._in_doubt(one, solved) for one in links if not one.used)
+            if doubts < least:
+                least, poses, best, self._explained = doubts, solved, links, explained
+            if not doubts:
+                break
+        self.poses, self.links = poses, best
+
+    def _explanations(self) -> Iterator[tuple[Pair | None, float]]:
+        """Yield pairs whose link may be wrong, and factors of tracking's errors; those of before first."""
+        yield self._explained
+        sure = next((one for one in self.links if (one.source, one.target) in self._sure), None)
+        if sure is None:
+            return
+        wrong = self._wrong_link(sure)
+        if wrong is not None:
+            yield wrong, 1.0
+        for drift in DRIFTS:
+            yield None, drift
+
+    def _wrong_link(self, sure: Link) -> Pair | None:
+        """Return the pair of tracking whose keyframes agree best if its link alone makes up for a loop."""
+        poses, best, most = self.poses, None, LEAST_AGREEMENT
+        change = poses[sure.target] @ sure.T_target_source @ inverse(poses[sure.source])
+        for one in self.links:
+            if one.loop or not sure.target <= one.target < one.source <= sure.source:
+                continue
+            T = inverse(poses[one.target]) @ change @ poses[one.source]
+            overlap, agreeing = shared_shares(self._clouds[one.source], self._clouds[one.target], T, WITHIN)
+            if overlap >= LEAST_OVERLAP and agreeing >= most:
+                best, most = (one.source, one.target), agreeing
+        return best
+
+    def _in_doubt(self, unused: Link, poses: Mapping[int, FloatArray]) -> bool:
+        """Return whether a link should be used: recognised by colour, or of tracking without better poses."""
+        source, target = unused.source, unused.target
+        T = inverse(poses[target]) @ poses[source]
+        overlap, agreeing = shared_shares(self._clouds[source], self._clouds[target], T, WITHIN)
+        agrees = overlap >= LEAST_OVERLAP and agreeing >= LESS_AGREEMENT
+        return (source, target) in self._sure or not (agrees or unused.loop)
 
 
 def _chain(track: Track) -> dict[int, FloatArray]:
@@ -99,28 +218,57 @@ def _candidates(
     poses: Mapping[int, FloatArray],
     clouds: Mapping[int, OrganisedCloud],
     tried: Mapping[tuple[int, int], FloatArray],
-) -> list[_Candidate]:
+) -> Generator[Progress, None, list[_Candidate]]:
     """Return pairs of keyframes that should show the same place, for each the ``MOST_TRIED`` best.
 
     A pair that was tried before is tried again only if its start pose has moved by ``MOVED_M``.
     """
-    numbers = list(poses)
-    found: list[_Candidate] = []
+    numbers, found = list(poses), list[_Candidate]()
+    T = np.array([poses[number] for number in numbers])
     for later, source in enumerate(numbers):
+        if later % REPORTED == 0:
+            yield Progress(f"comparing keyframe {later} of {len(numbers)}", 0.5 * later / len(numbers))
         own = []
-        for target in numbers[: max(0, later - 1)]:
-            T = inverse(poses[target]) @ poses[source]
-            if np.linalg.norm(T[:3, 3]) > NEAR_M or np.degrees(rotation_angle_rad(T[:3, :3])) > NEAR_DEG:
-                continue
+        for place in _nearest(T, later):
+            target, T_start = numbers[place], inverse(T[place]) @ T[later]
             before = tried.get((source, target))
-            if before is not None and np.linalg.norm(T[:3, 3] - before[:3, 3]) < MOVED_M:
+            if before is not None and np.linalg.norm(T_start[:3, 3] - before[:3, 3]) < MOVED_M:
                 continue
-            predicted, _ = shared_shares(clouds[source], clouds[target], T, WITHIN)
+            predicted, _ = shared_shares(clouds[source], clouds[target], T_start, WITHIN)
             if predicted >= LEAST_PREDICTED:
-                own.append(_Candidate(source, target, T, predicted))
-        own.sort(key=lambda candidate: -candidate.predicted)
-        found += own[:MOST_TRIED]
+                own.append(_Candidate(source, target, T_start, predicted))
+        found += _best(own, len(numbers))
     return found
+
+
+def _best(candidates: Sequence[_Candidate], keyframes: int) -> list[_Candidate]:
+    """Return a keyframe's candidates of the largest predicted overlap, in this order.
+
+    Where not all keyframes can have ``MOST_TRIED``, targets that follow each other in time count as one.
+    """
+    ordered = sorted(candidates, key=lambda candidate: -candidate.predicted)
+    most = min(MOST_TRIED, max(LEAST_TRIED, MOST_LOOPS // keyframes))
+    if most == MOST_TRIED or len(ordered) <= most:
+        return ordered[:MOST_TRIED]
+    ranks = {one.target: rank for rank, one in enumerate(sorted(candidates, key=lambda one: one.target))}
+    chosen: list[_Candidate] = []
+    for one in ordered:
+        if len(chosen) < most and all(abs(ranks[one.target] - ranks[own.target]) > 1 for own in chosen):
+            chosen.append(one)
+    return chosen
+
+
+def _nearest(T: FloatArray, later: int) -> IntArray:
+    """Return the places of earlier keyframes, but the last one, that are near in place and direction.
+
+    At most ``MOST_COMPARED``, those whose shift and turn together are least.
+    """
+    motion = small_motion(np.linalg.inv(T[: max(0, later - 1)]) @ T[later])
+    turn_deg = np.degrees(np.linalg.norm(motion[:, :3], axis=1))
+    shift_m = np.linalg.norm(motion[:, 3:], axis=1)
+    near = np.flatnonzero((shift_m <= NEAR_M) & (turn_deg <= NEAR_DEG))
+    apart = shift_m[near] / NEAR_M + turn_deg[near] / NEAR_DEG
+    return np.sort(near[np.argsort(apart, kind="stable")[:MOST_COMPARED]])
 
 
 def _closed(candidate: _Candidate, clouds: Mapping[int, OrganisedCloud]) -> Link | None:
@@ -134,15 +282,26 @@ def _closed(candidate: _Candidate, clouds: Mapping[int, OrganisedCloud]) -> Link
 
 
 def _reconciled(
-    poses: Mapping[int, FloatArray], links: Sequence[Link], clouds: Mapping[int, OrganisedCloud]
+    poses: Mapping[int, FloatArray],
+    links: Sequence[Link],
+    clouds: Mapping[int, OrganisedCloud],
+    wrong: Pair | None = None,
+    drift: float = 1.0,
 ) -> tuple[dict[int, FloatArray], list[Link]]:
-    """Return the keyframes' poses by least squares over all links, and the links with ``used`` set."""
+    """Return the keyframes' poses by least squares over all links, and the links with ``used`` set.
+
+    The link of the pair ``wrong`` is not used; the errors of tracking's links are multiplied by ``drift``.
+    """
     numbers = list(poses)
     places = {number: place for place, number in enumerate(numbers)}
-    edges = [
-        PoseEdge(places[one.source], places[one.target], one.T_target_source, one.information)
-        for one in links
-    ]
+    edges = []
+    for one in links:
+        information = one.information if one.loop else one.information / drift**2
+        ends = places[one.source], places[one.target]
+        strength = 1.0 if one.loop else OF_TRACKING
+        edges.append(
+            PoseEdge(*ends, one.T_target_source, information, strength, (one.source, one.target) != wrong)
+        )
     points_m = [clouds[k].points_m[:: max(1, len(clouds[k]) // GRAPH_POINTS)] for k in numbers]
     graph = solve_pose_graph(points_m, edges)
     solved = dict(zip(numbers, graph.T_reference_node, strict=True))

@@ -1,31 +1,39 @@
-"""Joining the parts of a recording, between which the camera was lost, by colour features."""
+"""Keyframes recognised by their colours, and the parts of a recording joined by them (SPEC 10.2)."""
 
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import replace
 
-from packetmesh.errors import PacketMeshError
+import cv2
+import numpy as np
+
+from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.progress import Progress
 from pipeline.acquisition import back_project
 from pipeline.config import RegistrationConfig
-from pipeline.kernels.geometry import inverse
+from pipeline.kernels.geometry import inverse, scaled
 from pipeline.recording.recording import Recording
-from pipeline.recording.tracking import TRACKING, Track, link, registered
-from pipeline.registration.colour import LiftedFeatures, lifted_features, match_score
+from pipeline.recording.tracking import TRACKING, Registered, Track, link, registered
+from pipeline.registration.colour import LiftedFeatures, colour_start, lifted_features, match_score
 from pipeline.registration.finding.evidence import Judge
 from pipeline.registration.finding.search import search
-from pipeline.registration.finding.starts import by_colour
+from pipeline.registration.finding.starts import Way, by_colour, by_surfaces
 from pipeline.registration.finding.surface import Surface
 from pipeline.registration.graph.loops import Groups
+from pipeline.registration.organised import OrganisedCloud
 from pipeline.types import FloatArray, Link, RgbdFrame
 
 COMPARED = 8
 """Most keyframes of a part that are compared with those of another part."""
 TRIED = 3
-"""Most pairs of keyframes that are registered to join two parts."""
+"""Most pairs of keyframes that are registered to join two parts, by colour and then by their surfaces."""
+MOST_PARTS = 12
+"""Most parts, the largest first, that are looked for in the largest one."""
 GATE_M = 0.1
 """Gate of the registration from the pose that was found."""
+WIDTH_PX = 320
+"""Approximate width of the images in which keyframes are recognised."""
 
 
 def parts_of(keyframes: Sequence[int], links: Iterable[Link]) -> list[list[int]]:
@@ -38,72 +46,130 @@ def parts_of(keyframes: Sequence[int], links: Iterable[Link]) -> list[list[int]]
     return sorted(parts.values(), key=lambda part: -len(part))
 
 
-def iterate_joins(recording: Recording, track: Track) -> Generator[Progress, None, Track]:
+def iterate_joins(places: Places, track: Track) -> Generator[Progress, None, Track]:
     """Link the parts of a track whose relative pose has a sure verdict.
 
     Args:
-        recording: the frames.
+        places: the keyframes' colours.
         track: the result of tracking.
     """
-    places = _Places(recording)
     links = list(track.links)
     main, *others = parts_of(list(track.clouds), links)
+    others = others[:MOST_PARTS]
     for number, part in enumerate(others):
-        yield Progress(f"looking for part {number + 1} of {len(others)}", number / len(others))
-        found = _join(places, track, main, part)
+        found = yield from _join(places, track, main, part, number, len(others))
         if found is not None:
             links.append(found)
             main = sorted([*main, *part])
     return replace(track, links=tuple(links))
 
 
-class _Places:
-    """Reads keyframes and keeps their colour features."""
+class Places:
+    """Reads keyframes in colour, and keeps their features."""
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
-        self._features: dict[int, LiftedFeatures] = {}
-        self.T_color_depth = recording.view(0).T_color_depth
+        self._features: dict[int, LiftedFeatures | None] = {}
+        self._T_color_depth = recording.view(0).T_color_depth
 
-    def frame(self, number: int) -> RgbdFrame:
-        return self._recording.frame(number)
-
-    def features(self, number: int) -> LiftedFeatures:
+    def features(self, number: int) -> LiftedFeatures | None:
+        """Return the features of a frame; None if its images cannot be read."""
         if number not in self._features:
-            self._features[number] = lifted_features(self.frame(number))
+            try:
+                self._features[number] = lifted_features(self._frame(number))
+            except InputError:
+                self._features[number] = None
         return self._features[number]
 
-    def pose(self, source: int, target: int) -> FloatArray | None:
-        """Return the depth camera's pose T_target_source if the verdict on it is sure."""
-        clouds = [back_project(self.frame(number)) for number in (source, target)]
-        judge = Judge(Surface(clouds[0]), Surface(clouds[1]))
-        start = by_colour(self.features(source), self.features(target))
+    def score(self, source: int, target: int) -> float:
+        """Return how many features of two frames look alike; 0 if images cannot be read."""
+        one, other = self.features(source), self.features(target)
+        return 0.0 if one is None or other is None else match_score(one, other)
+
+    def start(self, source: int, target: int) -> FloatArray | None:
+        """Return the depth camera's pose T_target_source on which colour features agree, unchecked."""
+        one, other = self.features(source), self.features(target)
+        if one is None or other is None:
+            return None
+        T = colour_start(one, other).T_target_source
+        return None if T is None else self._of_depth(T)
+
+    def pose(self, source: int, target: int, way: Way = "colour") -> FloatArray | None:
+        """Return the depth camera's pose T_target_source if the verdict on it is sure.
+
+        Args:
+            source: number of a frame.
+            target: number of another.
+            way: kind of features from which the search starts.
+        """
+        one, other = self.features(source), self.features(target)
+        if one is None or other is None:
+            return None
+        moving, fixed = (back_project(self._frame(number)) for number in (source, target))
         try:
-            found = search(clouds[0], clouds[1], [start], judge, RegistrationConfig())
+            judge = Judge(Surface(moving), Surface(fixed))
+            start = by_colour(one, other) if way == "colour" else by_surfaces(moving, fixed, True)
+            found = search(moving, fixed, [start], judge, RegistrationConfig())
         except PacketMeshError:
             return None
-        if not found.verdict.sure:
-            return None
-        return inverse(self.T_color_depth) @ found.candidate.T_target_source @ self.T_color_depth
+        return self._of_depth(found.candidate.T_target_source) if found.verdict.sure else None
+
+    def _frame(self, number: int) -> RgbdFrame:
+        return shrunk(self._recording.frame(number))
+
+    def _of_depth(self, T_target_source: FloatArray) -> FloatArray:
+        """Return the depth camera's motion for one of the colour camera."""
+        T: FloatArray = inverse(self._T_color_depth) @ T_target_source @ self._T_color_depth
+        return T
 
 
-def _join(places: _Places, track: Track, main: list[int], part: list[int]) -> Link | None:
-    """Return a registration of two keyframes of two parts; None if no pair has a sure verdict that holds."""
-    pairs = [
-        (match_score(places.features(source), places.features(target)), source, target)
-        for source in _spread(part)
-        for target in _spread(main)
-    ]
-    for _, source, target in sorted(pairs, key=lambda pair: -pair[0])[:TRIED]:
-        T = places.pose(source, target)
-        if T is None:
-            continue
-        found = registered(track.clouds[source], track.clouds[target], replace(TRACKING, gate_m=GATE_M), T)
-        if found is not None and found.holds:
+def shrunk(frame: RgbdFrame) -> RgbdFrame:
+    """Return a frame with every n-th row and column of its depth, about ``WIDTH_PX`` wide."""
+    step = max(1, round(frame.intrinsics.width_px / WIDTH_PX))
+    if step == 1 or frame.depth.z_m.shape != frame.rgb.shape[:2]:
+        return frame
+    height_px, width_px = (size // step for size in frame.rgb.shape[:2])
+    rgb = np.ascontiguousarray(frame.rgb[: height_px * step, : width_px * step])
+    small = cv2.resize(rgb, (width_px, height_px), interpolation=cv2.INTER_AREA)
+    middle = slice(step // 2, None, step)
+    z_m = np.ascontiguousarray(frame.depth.z_m[middle, middle][:height_px, :width_px])
+    camera = replace(scaled(frame.intrinsics, 1.0 / step), width_px=width_px, height_px=height_px)
+    depth = replace(frame.depth, z_m=z_m)
+    return replace(frame, rgb=np.asarray(small, np.uint8), depth=depth, intrinsics=camera)
+
+
+def registered_from(
+    T_target_source: FloatArray | None, source: OrganisedCloud, target: OrganisedCloud
+) -> Registered | None:
+    """Register two keyframes from a pose that was found; None without a pose, or if it does not hold."""
+    if T_target_source is None:
+        return None
+    found = registered(source, target, replace(TRACKING, gate_m=GATE_M), T_target_source)
+    return found if found is not None and found.holds else None
+
+
+def spread(numbers: Sequence[int], most: int) -> list[int]:
+    """Return at most ``most`` of some numbers, evenly."""
+    return list(numbers[:: max(1, -(-len(numbers) // most))])
+
+
+def _join(
+    places: Places, track: Track, main: Sequence[int], part: Sequence[int], number: int, parts: int
+) -> Generator[Progress, None, Link | None]:
+    """Return a registration of two keyframes of two parts; None if no pair has a sure verdict that holds.
+
+    Pairs that look alike are tried by colour, then by their surfaces; of equal ones those near in time first.
+    """
+    yield Progress(f"looking for part {number + 1} of {parts}", number / parts)
+    pairs = [(source, target) for source in spread(part, COMPARED) for target in spread(main, COMPARED)]
+    order = {pair: (-places.score(*pair), abs(pair[0] - pair[1])) for pair in pairs}
+    best = sorted(pairs, key=lambda pair: order[pair])[:TRIED]
+    ways: tuple[Way, ...] = ("colour", "surfaces")
+    for k, (way, (source, target)) in enumerate([(way, pair) for way in ways for pair in best]):
+        done = (number + k / (len(ways) * len(best))) / parts
+        yield Progress(f"looking for part {number + 1} of {parts}", done)
+        T = places.pose(source, target, way)
+        found = registered_from(T, track.clouds[source], track.clouds[target])
+        if found is not None:
             return link(source, target, found, loop=True)
     return None
-
-
-def _spread(numbers: list[int]) -> list[int]:
-    """Return at most ``COMPARED`` of some numbers, evenly."""
-    return numbers[:: max(1, -(-len(numbers) // COMPARED))]

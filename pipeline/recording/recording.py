@@ -22,8 +22,8 @@ class Recording(Protocol):
         ...
 
     @property
-    def T_world_camera(self) -> tuple[FloatArray, ...] | None:
-        """(4, 4) poses of the colour camera that came with the frames; None if they are unknown."""
+    def T_world_camera(self) -> tuple[FloatArray | None, ...] | None:
+        """(4, 4) poses of the colour camera that came with the frames; None if none is known."""
         ...
 
     @property

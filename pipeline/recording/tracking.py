@@ -5,7 +5,8 @@ Each frame is registered to the last keyframe; once it shows little of that, it 
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator, Sequence
+import time
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 
@@ -17,6 +18,8 @@ from pipeline.config import RegistrationConfig
 from pipeline.importing.recorded import DepthView
 from pipeline.kernels.geometry import inverse, orthonormal, rigid, rotation_angle_rad, rotation_exp
 from pipeline.kernels.threads import threads
+from pipeline.recording.checkpoint import EVERY_S, Checkpoint, State
+from pipeline.recording.clouds import KeyframeClouds
 from pipeline.recording.recording import Recording
 from pipeline.registration.graph.edges import registration_information, small_motion
 from pipeline.registration.organised import (
@@ -69,7 +72,7 @@ class Track:
 
     frames: tuple[Tracked | None, ...]
     """One for each frame; None where the camera was lost."""
-    clouds: dict[int, OrganisedCloud]
+    clouds: Mapping[int, OrganisedCloud]
     """The keyframes' points by frame number, in order of time."""
     links: tuple[Link, ...]
     """Registrations of each keyframe to an earlier one."""
@@ -103,7 +106,9 @@ class Registered:
 
 
 def iterate_tracking(
-    recording: Recording, T_world_camera: Sequence[FloatArray] | None = None
+    recording: Recording,
+    T_world_camera: Sequence[FloatArray | None] | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> Generator[Progress, None, Track]:
     """Find the pose of every frame relative to its keyframe.
 
@@ -113,17 +118,28 @@ def iterate_tracking(
 
     Args:
         recording: the frames.
-        T_world_camera: (4, 4) given pose of the colour camera at each frame; None if they are unknown.
+        T_world_camera: (4, 4) given pose of the colour camera at each frame, None where it is unknown; None
+            without any.
+        checkpoint: where the state is written every ``EVERY_S``, and read in the beginning.
     """
-    count, given = len(recording.times_s), None
+    count, given = len(recording.times_s), list[FloatArray | None]()
     if T_world_camera is not None:
         T_color_depth = recording.view(0).T_color_depth
-        given = [T @ T_color_depth for T in T_world_camera]
-    tracker = _Tracker(given)
-    for k, view in read_ahead(recording, range(count)):
+        given = [None if T is None else T @ T_color_depth for T in T_world_camera]
+    tracker, first = _Tracker(given), 0
+    if checkpoint is not None and (state := checkpoint.read()) is not None:
+        yield from tracker.iterate_restoring(recording, state)
+        first = len(tracker.track().frames)
+    written_s = time.monotonic()
+    for k, view in read_ahead(recording, range(first, count)):
         if k % REPORTED == 0:
             yield Progress(f"tracking frame {k} of {count}", k / count)
         tracker.follow(k, organised(view.depth, view.camera))
+        if checkpoint is not None and time.monotonic() - written_s >= EVERY_S:
+            checkpoint.write(tracker.state())
+            written_s = time.monotonic()
+    if checkpoint is not None and checkpoint.path.exists():
+        checkpoint.write(tracker.state())
     return tracker.track()
 
 
@@ -144,10 +160,10 @@ def read_ahead(recording: Recording, numbers: Iterable[int]) -> Iterator[tuple[i
 class _Tracker:
     """State of tracking: the keyframe, the pose in it, and the last motion."""
 
-    def __init__(self, given: Sequence[FloatArray] | None) -> None:
-        """Begin; ``given`` are poses of the depth camera that came with the recording."""
+    def __init__(self, given: Sequence[FloatArray | None]) -> None:
+        """Begin; ``given`` are poses of the depth camera that came with the recording, if any did."""
         self._given = given
-        self._clouds: dict[int, OrganisedCloud] = {}
+        self._clouds = KeyframeClouds()
         self._frames: list[Tracked | None] = []
         self._links: list[Link] = []
         self._keyframe = -1
@@ -182,11 +198,53 @@ class _Tracker:
         """Return the result."""
         return Track(tuple(self._frames), self._clouds, tuple(self._links))
 
+    def state(self) -> State:
+        """Return all that following goes on from, without the points."""
+        none = Tracked(-1, np.eye(4))
+        frames = [one or none for one in self._frames]
+        return {
+            "keyframe_of": np.array([one.keyframe for one in frames]),
+            "T_keyframe_frame": np.array([one.T_keyframe_frame for one in frames]).reshape(-1, 4, 4),
+            "keyframes": np.array(list(self._clouds), int),
+            "pairs": np.array([(one.source, one.target) for one in self._links], int).reshape(-1, 2),
+            "T_target_source": np.array([one.T_target_source for one in self._links]).reshape(-1, 4, 4),
+            "information": np.array([one.information for one in self._links]).reshape(-1, 6, 6),
+            "shares": np.array([(one.overlap_share, one.agreeing_share) for one in self._links]).reshape(
+                -1, 2
+            ),
+            "now": np.array([self._keyframe, self._last]),
+            "pose_motion": np.array([self._pose, self._motion]),
+        }
+
+    def iterate_restoring(self, recording: Recording, state: State) -> Generator[Progress, None, None]:
+        """Set a state that ``state`` returned; keyframes are read again, and frames without a pose."""
+        poses = zip(state["keyframe_of"].tolist(), state["T_keyframe_frame"], strict=True)
+        self._frames = [None if keyframe < 0 else Tracked(keyframe, T) for keyframe, T in poses]
+        keyframes = set(state["keyframes"].tolist())
+        again = [k for k, one in enumerate(self._frames) if one is None or k in keyframes]
+        for number, (k, view) in enumerate(read_ahead(recording, again)):
+            if number % REPORTED == 0:
+                yield Progress(f"reading keyframe {k} again", k / len(recording.times_s))
+            if k in keyframes:
+                self._clouds.add(k, organised(view.depth, view.camera))
+        parts = (state[name] for name in ("pairs", "T_target_source", "information", "shares"))
+        for (source, target), T, information, shares in zip(*parts, strict=True):
+            overlap, agreeing = shares.tolist()
+            self._links.append(Link(int(source), int(target), T, information, overlap, agreeing))
+        self._keyframe, self._last = state["now"].tolist()
+        self._pose, self._motion = state["pose_motion"]
+
     def _predicted(self, k: int) -> FloatArray:
         """Predict a frame's pose in the keyframe, from given poses or by constant velocity."""
-        if self._given is not None:
-            return self._pose @ inverse(self._given[self._last]) @ self._given[k]
-        return self._pose @ self._motion
+        given = self._given_motion(k)
+        return self._pose @ (self._motion if given is None else given)
+
+    def _given_motion(self, k: int) -> FloatArray | None:
+        """Return a frame's pose in the last tracked one by given poses; None where one is unknown."""
+        if not self._given:
+            return None
+        before, now = self._given[self._last], self._given[k]
+        return None if before is None or now is None else inverse(before) @ now
 
     def _search(self, k: int, cloud: OrganisedCloud) -> None:
         """Look for a frame among the keyframes, the last ones first."""
@@ -204,8 +262,9 @@ class _Tracker:
         if k - self._last <= PATIENCE:
             self._frames.append(None)
             return
-        if self._given is not None:  # as good as the poses that came with the recording
-            T = self._predicted(k)
+        given = self._given_motion(k)
+        if given is not None:  # as good as the poses that came with the recording
+            T = self._pose @ given
             self._links.append(Link(k, self._keyframe, T, GIVEN_INFORMATION, 0.0, 0.0))
         self._begin(k, cloud)
 
@@ -215,7 +274,7 @@ class _Tracker:
         self._begin(k, cloud)
 
     def _begin(self, k: int, cloud: OrganisedCloud) -> None:
-        self._clouds[k] = cloud
+        self._clouds.add(k, cloud)
         self._frames.append(Tracked(k, np.eye(4)))
         self._keyframe, self._pose, self._last = k, np.eye(4), k
 

@@ -10,16 +10,18 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress, part
 from pipeline.importing.upright import upright
-from pipeline.kernels.geometry import LEVEL_POSE, apply, inverse, project
+from pipeline.kernels.geometry import LEVEL_POSE, inverse
+from pipeline.recording.checkpoint import checkpoint_of
 from pipeline.recording.errors import ate_m
 from pipeline.recording.given import checked_poses
 from pipeline.recording.loops import Trajectory, iterate_loops, poses_by_tracking
-from pipeline.recording.places import iterate_joins
+from pipeline.recording.photographs import iterate_photographs
+from pipeline.recording.places import Places, iterate_joins, spread
 from pipeline.recording.recording import Recording
 from pipeline.recording.tracking import REPORTED, WITHIN, Track, iterate_tracking, read_ahead
 from pipeline.recording.volume import Volume, voxel_for
-from pipeline.registration.organised import OrganisedCloud, shared_shares
-from pipeline.types import FloatArray, IntArray, PointCloud, RgbdFrame, Rig, Walk
+from pipeline.registration.organised import shared_shares
+from pipeline.types import FloatArray, IntArray, PointCloud, Rig, Walk
 
 LEAST_FRAMES = 2
 LEAST_OBSERVATIONS = 2
@@ -28,10 +30,10 @@ FEW_FRAMES = 10
 """With fewer frames that have a pose, one observation is enough."""
 SHOWN = 0.7
 """Share of each keyframe that one of the chosen views sees, unless there are too many views."""
-MOST_VIEWS, FARTHEST_VIEW_M = 12, 2.0
-"""Most keyframes whose colours are used; those farther apart are not compared."""
-SAME_DEPTH = 0.02
-"""Largest difference of a point's depth from the measured one, as a share, at a view that colours it."""
+MOST_VIEWS, MOST_COMPARED = 12, 96
+"""Most keyframes that become nodes, and from which they are chosen."""
+FARTHEST_VIEW_M, FACING = 2.0, 0.5
+"""Keyframes farther apart, or with more than 60 degrees (its cosine) between their axes, are not compared."""
 
 
 def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
@@ -44,49 +46,34 @@ def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
         raise InputError(f"{recording.name} has too few frames: a recording needs {LEAST_FRAMES}")
     yield Progress("reading the first frames", 0.0)
     given = checked_poses(recording)
-    tracking = iterate_tracking(recording, given.T_world_camera)
+    checkpoint = checkpoint_of(recording, given.T_world_camera)
+    tracking = iterate_tracking(recording, given.T_world_camera, checkpoint)
     track = yield from part(tracking, "tracking", 0.0, 0.45, detail=True)
     if not track.clouds:
         raise InputError(f"No frame of {recording.name} has enough depth; check its depth images and scale")
-    track = yield from part(iterate_joins(recording, track), "parts", 0.45, 0.47, detail=True)
-    trajectory = yield from part(iterate_loops(track), "loops", 0.47, 0.55, detail=True)
+    places = Places(recording)
+    track = yield from part(iterate_joins(places, track), "parts", 0.45, 0.47, detail=True)
+    trajectory = yield from part(iterate_loops(track, places), "loops", 0.47, 0.55, detail=True)
     T_world_first, turned = _world(recording, given.T_world_camera, trajectory)
     T_world_depth = [None if T is None else T_world_first @ T for T in trajectory.T_first_depth]
     steps = iterate_map(recording, T_world_depth)
-    points, first, voxel_m = yield from part(steps, "mapping", 0.55, 0.95, detail=True)
+    points, first, voxel_m = yield from part(steps, "mapping", 0.55, 0.93, detail=True)
     T_depth_color = inverse(recording.view(0).T_color_depth)
     poses = tuple(None if T is None else T @ T_depth_color for T in T_world_depth)
     tracked = tuple(
         None if T is None else T_world_first @ T @ T_depth_color for T in poses_by_tracking(track)
     )
-    frames, unreadable = yield from _photographed(recording, poses, views_of(trajectory, track))
-    colored = replace(points, colors=colors_of(points, frames))
-    notes = (*recording.notes, *given.notes, *_corrected(poses, given.T_world_camera), *turned, *unreadable)
     keyframes, links = tuple(trajectory.keyframes), trajectory.links
+    views = yield from part(iterate_views(trajectory, track), "views", 0.93, 0.95, detail=True)
+    reading = iterate_photographs(recording, poses, views, keyframes, points)
+    seen = yield from part(reading, "photographs", 0.95, 1.0, detail=True)
+    corrected = _corrected(poses, given.T_world_camera)
+    notes = (*recording.notes, *given.notes, *corrected, *turned, *seen.notes)
+    if checkpoint is not None:
+        checkpoint.delete()
+    colored = replace(points, colors=seen.colors)
     walk = Walk(recording.times_s, poses, keyframes, links, colored, voxel_m, first, tracked, notes)
-    return Rig(recording.name, tuple(frames), walk=walk)
-
-
-def _photographed(
-    recording: Recording, T_world_camera: Sequence[FloatArray | None], numbers: Sequence[int]
-) -> Generator[Progress, None, tuple[list[RgbdFrame], list[str]]]:
-    """Read some frames, which get their poses; returns them, and a sentence on each that cannot be read.
-
-    Raises:
-        InputError: none can be read.
-    """
-    frames, unreadable = [], []
-    for number in numbers:
-        yield Progress(f"reading frame {number}", 0.95)
-        T = T_world_camera[number]
-        assert T is not None
-        try:
-            frames.append(replace(recording.frame(number), T_world_camera=T, pose_known=True))
-        except InputError as error:
-            unreadable.append(f"{error}: frame {number} gives no colours")
-    if not frames:
-        raise InputError(unreadable[0])
-    return frames, unreadable
+    return Rig(recording.name, seen.views, walk=walk)
 
 
 def iterate_map(
@@ -115,7 +102,7 @@ def iterate_map(
 
 
 def _corrected(
-    T_world_camera: Sequence[FloatArray | None], given: Sequence[FloatArray] | None
+    T_world_camera: Sequence[FloatArray | None], given: Sequence[FloatArray | None] | None
 ) -> tuple[str, ...]:
     """Return a sentence on how far the camera's path is from that of the given poses."""
     if given is None:
@@ -138,29 +125,42 @@ def voxel_edge_m(recording: Recording, numbers: Sequence[int]) -> float:
 
 
 def _world(
-    recording: Recording, given: Sequence[FloatArray] | None, trajectory: Trajectory
+    recording: Recording, given: Sequence[FloatArray | None] | None, trajectory: Trajectory
 ) -> tuple[FloatArray, tuple[str, ...]]:
-    """Return (4, 4) T_world_first in the world of given poses or another, with z up; and a note if turned."""
-    first = next(iter(trajectory.keyframes))
-    T: FloatArray = (LEVEL_POSE if given is None else given[first]) @ recording.view(first).T_color_depth
+    """Return (4, 4) T_world_first in the world of given poses or another, with z up; and a note if turned.
+
+    The first keyframe with a given pose gets that one.
+    """
+    T: FloatArray = LEVEL_POSE @ recording.view(next(iter(trajectory.keyframes))).T_color_depth
+    note: tuple[str, ...] = ()
+    for number, T_first_depth in trajectory.keyframes.items():
+        own = None if given is None else given[number]
+        if own is not None:
+            T = own @ recording.view(number).T_color_depth @ inverse(T_first_depth)
+            note = ("The world of the given poses was turned so that z is up",)
+            break
     turn = upright([T @ pose for pose in trajectory.keyframes.values()])
-    if turn is None:
-        return T, ()
-    return turn @ T, () if given is None else ("The world of the given poses was turned so that z is up",)
+    return (T, ()) if turn is None else (turn @ T, note)
 
 
-def views_of(trajectory: Trajectory, track: Track) -> list[int]:
+def iterate_views(trajectory: Trajectory, track: Track) -> Generator[Progress, None, list[int]]:
     """Choose keyframes until each keyframe shares ``SHOWN`` with one of them, at most ``MOST_VIEWS``.
 
-    Those that most others share with come first.
+    Those that most others share with come first. Of many keyframes ``MOST_COMPARED`` are compared.
     """
-    numbers = list(trajectory.keyframes)
+    numbers = spread(list(trajectory.keyframes), MOST_COMPARED)
+    T = np.array([trajectory.keyframes[number] for number in numbers])
     shown = np.eye(len(numbers), dtype=bool)
-    for i, source in enumerate(numbers):
-        for j, target in enumerate(numbers):
-            T = inverse(trajectory.keyframes[target]) @ trajectory.keyframes[source]
-            if i != j and np.linalg.norm(T[:3, 3]) <= FARTHEST_VIEW_M:
-                shown[i, j] = _looks_there(track.clouds[source], track.clouds[target], T)
+    for j, target in enumerate(numbers):
+        if j % REPORTED == 0:
+            yield Progress(f"choosing views, keyframe {target}", j / len(numbers))
+        T_target_source = inverse(T[j]) @ T
+        near = np.linalg.norm(T_target_source[:, :3, 3], axis=1) <= FARTHEST_VIEW_M
+        for i in np.flatnonzero(near & (T_target_source[:, 2, 2] >= FACING)):
+            if i != j:
+                shares = track.clouds[numbers[i]], track.clouds[target], T_target_source[i]
+                overlap, agreeing = shared_shares(*shares, WITHIN)
+                shown[i, j] = overlap * agreeing >= SHOWN
     chosen: list[int] = []
     left = np.ones(len(numbers), bool)
     while left.any() and len(chosen) < MOST_VIEWS:
@@ -168,44 +168,3 @@ def views_of(trajectory: Trajectory, track: Track) -> list[int]:
         chosen.append(best)
         left &= ~shown[:, best]
     return [numbers[place] for place in sorted(chosen)]
-
-
-def _looks_there(source: OrganisedCloud, target: OrganisedCloud, T_target_source: FloatArray) -> bool:
-    """Return whether the target sees ``SHOWN`` of the source."""
-    if T_target_source[2, 2] < 0.5:  # the optical axes are more than 60 degrees apart
-        return False
-    overlap, agreeing = shared_shares(source, target, T_target_source, WITHIN)
-    return overlap * agreeing >= SHOWN
-
-
-def colors_of(points: PointCloud, frames: Sequence[RgbdFrame]) -> np.ndarray:
-    """Return (N, 3) RGB of points, the mean over the views that measured them; grey where none did.
-
-    A view's weight is the cosine of incidence over the squared distance.
-    """
-    total, weights = np.zeros((len(points), 3)), np.zeros(len(points))
-    for frame in frames:
-        own_m = apply(inverse(frame.T_world_camera), points.points_m)
-        ahead = np.flatnonzero(own_m[:, 2] > 0.05)
-        pixels = project(frame.intrinsics, own_m[ahead])
-        pixels = np.nan_to_num(np.rint(pixels), nan=-1.0).astype(int)
-        size = frame.intrinsics.width_px, frame.intrinsics.height_px
-        inside = np.all((pixels >= 0) & (pixels < size), axis=1)
-        rows, (u, v) = ahead[inside], pixels[inside].T
-        z_m = own_m[rows, 2]
-        seen = np.abs(frame.depth.z_m[v, u] - z_m) <= SAME_DEPTH * z_m
-        rows, u, v = rows[seen], u[seen], v[seen]
-        distance_m = np.linalg.norm(own_m[rows], axis=1)
-        facing = (
-            -np.einsum(
-                "ni,ni->n", np.asarray(points.normals)[rows] @ frame.T_world_camera[:3, :3], own_m[rows]
-            )
-            / distance_m
-        )
-        weight = np.maximum(facing, 0.05) / distance_m**2
-        total[rows] += weight[:, None] * frame.rgb[v, u]
-        weights[rows] += weight
-    known = weights > 0.0
-    colors = np.full((len(points), 3), 128, np.uint8)
-    colors[known] = np.rint(total[known] / weights[known, None]).astype(np.uint8)
-    return colors

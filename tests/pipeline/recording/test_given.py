@@ -86,6 +86,36 @@ def test_a_recording_without_poses_has_none():
     assert checked_poses(in_the_living_room(around(6))).T_world_camera is None
 
 
+def test_poses_of_some_frames_are_compared_and_begin_the_others():
+    """Every third frame has a pose, OpenGL's; the first one has none."""
+    truth = around(40)
+    some = [T @ OPENGL if k % 3 == 1 else None for k, T in enumerate(truth)]
+    recording = written(some)
+    given = checked_poses(recording)
+    assert [T is not None for T in given.T_world_camera] == [k % 3 == 1 for k in range(40)]
+    np.testing.assert_allclose(given.T_world_camera[1], truth[1], atol=1e-9)
+    assert "OpenGL" in given.notes[0]
+    walk = drain(iterate_walk(recording)).walk
+    for T, true in zip(walk.T_world_camera, truth, strict=True):
+        np.testing.assert_allclose(T, true, atol=0.01)
+    assert any("given poses by 0." in note for note in walk.notes)
+
+
+def test_a_jump_is_not_followed_by_poses_that_are_missing_there():
+    """Poses of the frames before the jump say nothing about it: a part begins that colours do not join."""
+    truth = around(30)
+    away = [
+        truth[14] @ moved([0, 1, 0], 170.0, [0, 0, 0]) @ moved([0, 1, 0], 1.0 * k, [0, 0, 0])
+        for k in range(10)
+    ]
+    some = [*truth[:15], *[None] * 10]
+    recording = replace(written(some), T_true=[*truth[:15], *away])
+    walk = drain(iterate_walk(recording)).walk
+    assert all(T is not None for T in walk.T_world_camera[:15])
+    assert all(T is None for T in walk.T_world_camera[15:])
+    assert ate_m(walk.T_world_camera, recording.T_true) < 0.005
+
+
 def test_a_path_says_how_far_it_is_from_the_given_poses():
     """Every other pose is 1 cm up and every other one 1 cm down."""
     truth = around(40)

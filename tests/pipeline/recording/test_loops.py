@@ -12,6 +12,9 @@ from pipeline.recording.loops import (
     LEAST_PREDICTED,
     LOOP_GATE_M,
     Trajectory,
+    _best,
+    _Candidate,
+    _nearest,
     iterate_loops,
 )
 from pipeline.recording.tracking import (
@@ -240,3 +243,20 @@ def test_a_tracked_walk_closes(ring):
     assert turns_deg.max() < 0.1
     assert any(one.loop for one in trajectory.links)
     assert all(one.used for one in trajectory.links)
+
+
+def test_of_many_keyframes_fewer_loops_are_tried_and_from_different_times():
+    """Targets 0, 10, 20, ... by falling overlap: of 600 keyframes each has three, no two in a row."""
+    own = [_Candidate(900, 10 * k, np.eye(4), 0.9 - 0.01 * k) for k in range(10)]
+    assert [one.target for one in _best(own[::-1], 100)] == [10 * k for k in range(8)]
+    assert [one.target for one in _best(own[::-1], 600)] == [0, 20, 40]
+    assert [one.target for one in _best(own[::-1], 200)] == [0, 20, 40, 60, 80]
+    assert [one.target for one in _best(own[:2], 600)] == [0, 10]
+
+
+def test_the_nearest_earlier_keyframes_are_compared():
+    """Those of .9 m and 45 degrees, without the one before; at most 32, the nearest in place and angle."""
+    T = np.array([moved([0, 1, 0], 0.5 * k, [0.01 * k, 0, 0]) for k in range(101)])
+    assert _nearest(T, 100).tolist() == list(range(67, 99))
+    assert _nearest(T[::11], 9).tolist() == [1, 2, 3, 4, 5, 6, 7]
+    assert _nearest(T, 1).tolist() == []

@@ -16,11 +16,15 @@ from pipeline.merging import merge_map
 from pipeline.nodes import infer_depth, nothing_inferred, prepare_node
 from pipeline.placement.walked import place_walked
 from pipeline.recording.errors import ate_m
-from pipeline.recording.walk import MOST_VIEWS, colors_of, iterate_walk
+from pipeline.recording.loops import Trajectory
+from pipeline.recording.photographs import Blend
+from pipeline.recording.tracking import Track
+from pipeline.recording.walk import MOST_VIEWS, iterate_views, iterate_walk
+from pipeline.registration.organised import organised
 from pipeline.sources import Recorded
 from pipeline.spec import Spec
 from pipeline.types import PointCloud, PointSource
-from tests.pipeline.recording.rendered import around, color_at, in_the_living_room, moved
+from tests.pipeline.recording.rendered import CAMERA, around, color_at, in_the_living_room, moved
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +35,13 @@ def recording():
 @pytest.fixture(scope="module")
 def rig(recording):
     return drain(iterate_walk(recording))
+
+
+def colors_of(points, frames):
+    blend = Blend(points)
+    for frame in frames:
+        blend.add(frame)
+    return blend.colors
 
 
 def in_the_true_world(rig, recording, points_m):
@@ -242,3 +253,17 @@ def test_ate_is_the_rmse_after_alignment():
         T[2, 3] = 0.1 * T[0, 3] * T[1, 3]  # alternately up and down: no rigid motion helps
     assert ate_m(out, square) == pytest.approx(0.1)
     assert np.isnan(ate_m(truth[:2], truth[:2]))
+
+
+def test_views_are_chosen_from_some_of_many_keyframes(recording, monkeypatch):
+    """Two places, each seen by twenty keyframes: one view of each is enough."""
+    monkeypatch.setattr("pipeline.recording.walk.MOST_COMPARED", 10)
+    here, there = recording.T_true[0], recording.T_true[0] @ moved([0, 1, 0], 90.0, [0, 0, 0])
+    both = replace(recording, T_true=[here, there])
+    clouds = [organised(both.view(k).depth, CAMERA) for k in range(2)]
+    poses = {k: inverse(here) @ both.T_true[k // 20] for k in range(40)}
+    track = Track((None,) * 40, {k: clouds[k // 20] for k in range(40)}, ())
+    reports = []
+    views = drain(iterate_views(Trajectory((None,) * 40, poses, ()), track), reports.append)
+    assert [k // 20 for k in views] == [0, 1]
+    assert len(reports) == 1

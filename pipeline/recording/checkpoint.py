@@ -1,0 +1,96 @@
+"""The state of tracking on disk, from which a run that was killed goes on (SPEC 10.1)."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import time
+import zipfile
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from packetmesh.errors import InputError
+from packetmesh.files import atomic_path
+from pipeline.importing.recorded import FolderRecording
+from pipeline.importing.recorded_bag import BagRecording
+from pipeline.recording.recording import Recording
+from pipeline.types import FloatArray
+
+VERSION = 1
+"""Raised when tracking changes, so that older states are not read."""
+EVERY_S = 10.0
+"""Time from one writing to the next."""
+OLD_S = 14 * 86400.0
+"""States that were not written for so long are deleted."""
+State = Mapping[str, NDArray[Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class Checkpoint:
+    """The file with the state of one recording's tracking."""
+
+    path: Path
+
+    def read(self) -> State | None:
+        """Return the state; None if there is none, or if it is damaged."""
+        try:
+            with np.load(self.path, allow_pickle=False) as stored:
+                return {name: stored[name] for name in stored.files}
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile):
+            return None
+
+    def write(self, state: State) -> None:
+        """Replace the state; a disk that is full does not stop the tracking."""
+        with suppress(InputError), atomic_path(self.path) as temporary, temporary.open("wb") as file:
+            np.savez(file, allow_pickle=False, **state)
+
+    def delete(self) -> None:
+        """Delete the state, and those of other recordings that are old."""
+        with suppress(OSError):
+            self.path.unlink(missing_ok=True)
+            for other in self.path.parent.glob("*.npz"):
+                if time.time() - other.stat().st_mtime > OLD_S:
+                    other.unlink(missing_ok=True)
+
+
+def checkpoint_of(recording: Recording, given: Sequence[FloatArray | None] | None) -> Checkpoint | None:
+    """Return the checkpoint of a recording on disk, named by all that decides its tracking; else None.
+
+    Args:
+        recording: the frames.
+        given: (4, 4) poses from which tracking starts, if there are any.
+    """
+    if isinstance(recording, FolderRecording):
+        place, scale = recording.folder, recording.sequence.units_per_metre
+    elif isinstance(recording, BagRecording):
+        place, scale = recording.path, float("nan")
+    else:
+        return None
+    digest = hashlib.sha256(repr((VERSION, np.__version__, str(place.resolve()), scale)).encode())
+    for path in sorted(place.rglob("*")) if place.is_dir() else [place]:
+        with suppress(OSError):
+            stat = path.stat()
+            digest.update(repr((path.name, stat.st_size, stat.st_mtime_ns)).encode())
+    view = recording.view(0)
+    for values in (recording.times_s, view.depth.z_m, view.camera.matrix, view.T_color_depth):
+        digest.update(np.ascontiguousarray(values).tobytes())
+    for T in given or ():
+        digest.update(b"none" if T is None else np.ascontiguousarray(T).tobytes())
+    return Checkpoint(cache_folder() / "tracking" / f"{digest.hexdigest()[:32]}.npz")
+
+
+def cache_folder() -> Path:
+    """Return the folder for files that may be deleted at any time, by the habit of the system."""
+    if "XDG_CACHE_HOME" in os.environ:
+        return Path(os.environ["XDG_CACHE_HOME"]) / "packetmesh"
+    if sys.platform == "win32" and "LOCALAPPDATA" in os.environ:
+        return Path(os.environ["LOCALAPPDATA"]) / "packetmesh" / "cache"
+    home = Path(os.path.expanduser("~"))
+    return home / ("Library/Caches" if sys.platform == "darwin" else ".cache") / "packetmesh"

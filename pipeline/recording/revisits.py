@@ -1,0 +1,122 @@
+"""Places that a camera comes back to with so much drift that only their colours tell (SPEC 10.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping
+
+from packetmesh.progress import Progress
+from pipeline.kernels.geometry import inverse
+from pipeline.recording.places import Places, registered_from, spread
+from pipeline.recording.tracking import (
+    LEAST_AGREEMENT,
+    LEAST_OVERLAP,
+    TRACKING,
+    WITHIN,
+    link,
+    registered,
+)
+from pipeline.registration.organised import OrganisedCloud, shared_shares
+from pipeline.types import FloatArray, Link
+
+COMPARED = 32
+"""Most keyframes whose colours are compared, evenly spread over the recording."""
+APART = 3
+"""Least distance in time of two keyframes that are compared, in keyframes."""
+LEAST_SCORE = 8.0
+"""Least number of features that look alike."""
+OF_EACH, TRIED = 2, 12
+"""Most pairs of each keyframe and of all that are registered, those that look most alike."""
+ENOUGH = 5
+"""After so many pairs that count, the others are left to the geometric loops."""
+
+
+def iterate_revisits(
+    places: Places, poses: Mapping[int, FloatArray], clouds: Mapping[int, OrganisedCloud]
+) -> Generator[Progress, None, list[Link]]:
+    """Find keyframes that show one place though their poses say otherwise, by their colours.
+
+    A pair counts if the verdict on its pose is sure, if it holds as in tracking, and if a neighbour of one
+    of the two, where the pair's pose puts it, holds too. The neighbours' registrations are links as well.
+
+    Args:
+        places: the keyframes' colours.
+        poses: (4, 4) poses of the keyframes so far, in order of time.
+        clouds: the keyframes' points.
+    """
+    pairs = yield from _alike(places, poses, clouds)
+    found: dict[tuple[int, int], Link] = {}
+    count = 0
+    for number, (source, target) in enumerate(pairs):
+        share = number / len(pairs)
+        yield Progress(f"comparing places {number + 1} of {len(pairs)}", 0.5 + 0.5 * share)
+        new = _closed(places, poses, clouds, source, target)
+        for one in new:
+            found.setdefault((one.source, one.target), one)
+        count += bool(new)
+        if count == ENOUGH:
+            break
+    return list(found.values())
+
+
+def _alike(
+    places: Places, poses: Mapping[int, FloatArray], clouds: Mapping[int, OrganisedCloud]
+) -> Generator[Progress, None, list[tuple[int, int]]]:
+    """Return pairs of keyframes that look alike and are not neighbours by their poses, the best first."""
+    order = {number: place for place, number in enumerate(poses)}
+    numbers = spread(list(poses), COMPARED)
+    scores: dict[tuple[int, int], float] = {}
+    for later, source in enumerate(numbers):
+        yield Progress(f"looking at keyframe {source}", 0.5 * later / len(numbers))
+        for target in numbers[:later]:
+            if order[source] - order[target] < APART or _together(poses, clouds, source, target):
+                continue
+            score = places.score(source, target)
+            if score >= LEAST_SCORE:
+                scores[source, target] = score
+    chosen: list[tuple[int, int]] = []
+    for pair in sorted(scores, key=lambda pair: -scores[pair]):
+        if all(sum(number in other for other in chosen) < OF_EACH for number in pair):
+            chosen.append(pair)
+    return chosen[:TRIED]
+
+
+def _together(
+    poses: Mapping[int, FloatArray], clouds: Mapping[int, OrganisedCloud], source: int, target: int
+) -> bool:
+    """Return whether two keyframes show one place at their poses, so that nothing is to be found."""
+    T = inverse(poses[target]) @ poses[source]
+    overlap, agreeing = shared_shares(clouds[source], clouds[target], T, WITHIN)
+    return overlap >= LEAST_OVERLAP and agreeing >= LEAST_AGREEMENT
+
+
+def _closed(
+    places: Places,
+    poses: Mapping[int, FloatArray],
+    clouds: Mapping[int, OrganisedCloud],
+    source: int,
+    target: int,
+) -> list[Link]:
+    """Return the registration of two keyframes and those of their neighbours; none if it is in doubt."""
+    if registered_from(places.start(source, target), clouds[source], clouds[target]) is None:
+        return []
+    found = registered_from(places.pose(source, target), clouds[source], clouds[target])
+    if found is None:
+        return []
+    confirming = []
+    order = list(poses)
+    for pair in _beside(order, source, target):
+        T_source, T_target = (
+            inverse(poses[own]) @ poses[at] for own, at in zip((source, target), pair, strict=True)
+        )
+        T = inverse(T_target) @ found.T_target_source @ T_source
+        one = registered(clouds[pair[0]], clouds[pair[1]], TRACKING, T)
+        if one is not None and one.holds:
+            confirming.append(link(*pair, one, loop=True))
+    return [link(source, target, found, loop=True), *confirming] if confirming else []
+
+
+def _beside(order: list[int], source: int, target: int) -> list[tuple[int, int]]:
+    """Return the pairs in which one of the two is replaced by its neighbour in time."""
+    i, j = order.index(source), order.index(target)
+    pairs = [(i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)]
+    return [(order[a], order[b]) for a, b in pairs if a < len(order) and 0 <= b < a]
