@@ -16,6 +16,7 @@ def bench(
     out: Path,
     only: tuple[str, ...] = (),
     problems: Path | None = None,
+    recording: Path | None = None,
     load_s: float = 60.0,
     json: bool = False,
 ) -> None:
@@ -28,6 +29,8 @@ def bench(
         problems: Solve registration problems instead: a folder of lists and clouds in the form of the
             point-clouds-registration-benchmark (arXiv 2003.12841); writes problems.csv, a row for each
             problem and method.
+        recording: Follow the camera of a recording instead, by ours and by other programs: a folder of TUM,
+            7-Scenes or another form that has poses, which are the truth and no program gets.
         load_s: Duration of the cases `load` and `soak`, which run thirty browsers, in seconds.
         json: Print the results as one JSON object.
     """
@@ -40,6 +43,16 @@ def bench(
         write_json(out / "problems.json", report)
         if json:
             print_json(report)
+        return
+    if recording is not None:
+        from lab.benchmarks.recording import compared
+
+        followed = compared([recording], 1, out / "recordings")
+        for note in followed.notes:
+            say(note)
+        write_json(out / "recording.json", followed.record())
+        if json:
+            print_json(followed.record())
         return
     served = {kind: partial(_browsers, kind, load_s) for kind in ("load", "soak")}
     results = {}

@@ -10,7 +10,7 @@ import numpy as np
 from lab.benchmarks.benchmark import Benchmark
 from lab.trials import iterate_trials
 from lab.walks.held_out import CACHE, WalkTask, held_out_walks
-from lab.walks.judging import JUDGED_TO_M, LOST_SHARE, Row
+from lab.walks.judging import JUDGED_TO_M, LOST_SHARE, Row, reference_of
 from lab.walks.ours import OURS, OWN, measure_own
 from lab.walks.peers import WALK_PEERS, available_walk_peers, measure_peer
 from packetmesh.progress import drain
@@ -37,7 +37,22 @@ def benchmark(
 
     Walks and answers that are in the folder are not made again.
     """
-    paths = held_out_walks(walks, frames, width_px, folder)
+    return compared(held_out_walks(walks, frames, width_px, folder), every, folder)
+
+
+def compared(paths: Sequence[Path], every: int, folder: Path) -> Benchmark:
+    """Follow the camera of some walks by every program; answers that are in ``folder`` are not made again.
+
+    Args:
+        paths: rendered walks, or recordings with poses, which are the truth then.
+        every: step between frames.
+        folder: folder of the answers.
+
+    Raises:
+        InputError: a path is no usable recording, or has no poses.
+    """
+    for path in paths:
+        reference_of(path)
     rows = _answers(tuple(OWN), measure_own, paths, every, folder)
     rows += _answers(available_walk_peers(), measure_peer, paths, every, folder)
     groups = summary(rows)

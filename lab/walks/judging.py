@@ -6,15 +6,18 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from lab.walks.held_out import FramesInMemory, WalkTask, frames_in_memory
-from lab.walks.walk import WalkTruth, read_truth
-from packetmesh.errors import PacketMeshError
+from lab.walks.walk import TRUTH, WalkTruth, read_truth
+from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.memory import peak_memory_bytes
+from pipeline.folders.walk import path_m
+from pipeline.importing.recorded import open_recording
 from pipeline.kernels.geometry import apply, inverse, rigid
 from pipeline.kernels.rays import Camera, hit_depths, tensor, triangle_scene
 from pipeline.recording.errors import ate_m
@@ -81,33 +84,55 @@ def measured(task: WalkTask, program: Program) -> Row:
     mesh = None if answer.surface is None else answer.surface()
     surface_s = None if mesh is None else time.perf_counter() - started
     peak_bytes = peak_memory_bytes()
-    truth = read_truth(task.folder)
+    T_true, room = reference_of(task.folder)
     return {
         "program": task.program,
         "walk": task.folder.name,
         "every": task.every,
         "frames": len(frames.times_s),
-        **trajectory_errors(poses, frames.times_s, truth, task.every),
+        **trajectory_errors(poses, frames.times_s, T_true, task.every),
         "elapsed_s": elapsed_s,
         "frames_s": len(frames.times_s) / elapsed_s,
         "surface_s": surface_s,
         "peak_memory_bytes": peak_bytes,
-        **map_errors(poses, answer.points_m, mesh, frames.frames[0].intrinsics, truth, task.every),
+        **map_errors(poses, answer.points_m, mesh, frames.frames[0].intrinsics, room, task.every),
     }
 
 
+def reference_of(folder: Path) -> tuple[list[FloatArray | None], WalkTruth | None]:
+    """Return the true pose of each frame of a walk, and the room if the walk is rendered.
+
+    Of any other recording the poses that came with it are the truth.
+
+    Raises:
+        InputError: it has no poses.
+    """
+    if (folder / TRUTH).exists():
+        truth = read_truth(folder)
+        return list(truth.T_world_camera), truth
+    poses = open_recording(folder).T_world_camera
+    if poses is None:
+        raise InputError(
+            f"{folder} has no poses to compare with; try `packetmesh reconstruct --recording {folder}`"
+        )
+    return list(poses), None
+
+
 def trajectory_errors(
-    T_world_camera: Sequence[FloatArray | None], times_s: FloatArray, truth: WalkTruth, every: int
+    T_world_camera: Sequence[FloatArray | None],
+    times_s: FloatArray,
+    T_true_camera: Sequence[FloatArray | None],
+    every: int,
 ) -> Row:
     """Return ATE, also as a share of the true path, RPE, frames without a pose, and whether it is lost."""
-    T_true = list(truth.T_world_camera[::every])
-    path_m = float(np.linalg.norm(np.diff(truth.T_world_camera[:, :3, 3], axis=0), axis=1).sum())
+    T_true = T_true_camera[::every]
+    length_m = path_m(tuple(T_true_camera))
     error_m = ate_m(T_world_camera, T_true)
     without = sum(T is None for T in T_world_camera)
     return {
-        "path_m": path_m,
+        "path_m": length_m,
         "ate_m": error_m,
-        "ate_share": error_m / path_m,
+        "ate_share": error_m / length_m,
         "rpe_m": rpe_m(T_world_camera, T_true, times_s),
         "without_pose": without,
         "lost": not error_m <= LOST_M or without > LOST_SHARE * len(T_world_camera),
@@ -116,7 +141,7 @@ def trajectory_errors(
 
 def rpe_m(
     T_world_camera: Sequence[FloatArray | None],
-    T_reference_camera: Sequence[FloatArray],
+    T_reference_camera: Sequence[FloatArray | None],
     times_s: FloatArray,
     apart_s: float = RPE_S,
 ) -> float:
@@ -124,7 +149,7 @@ def rpe_m(
 
     Args:
         T_world_camera: (4, 4) poses; None where there is none, which does not count.
-        T_reference_camera: as many poses in another world.
+        T_reference_camera: as many poses in another world, or None.
         times_s: (N,) their times.
         apart_s: time from a pose to the one that it is compared with.
 
@@ -135,9 +160,9 @@ def rpe_m(
     for k, later in enumerate(np.searchsorted(times_s, times_s + apart_s - 1e-3)):
         if later >= len(times_s):
             break
-        a, b = T_world_camera[k], T_world_camera[later]
-        if a is not None and b is not None:
-            motion = inverse(T_reference_camera[k]) @ T_reference_camera[later]
+        a, b, c, d = (poses[i] for poses in (T_world_camera, T_reference_camera) for i in (k, later))
+        if a is not None and b is not None and c is not None and d is not None:
+            motion = inverse(c) @ d
             apart_m.append((inverse(motion) @ inverse(a) @ b)[:3, 3])
     return float(np.sqrt(np.mean(np.sum(np.square(apart_m), axis=1)))) if apart_m else float("nan")
 
@@ -147,17 +172,18 @@ def map_errors(
     points_m: FloatArray | None,
     mesh: Mesh | None,
     camera: CameraIntrinsics,
-    truth: WalkTruth,
+    truth: WalkTruth | None,
     every: int,
 ) -> Row:
     """Return the median distance of the map's points to the true surface, and shares of true depth met.
 
     The map is moved by the mean difference of true and estimated poses. Rays are those of the true poses of
-    every ``JUDGED_EVERY``-th frame of the walk. All values are None without a map or without poses.
+    every ``JUDGED_EVERY``-th frame of the walk. All values are None without a map, a true
+    surface or poses.
     """
     shares: dict[str, float | None] = {f"within_{near_m * 100:.0f}cm": None for near_m in NEAR_M}
-    T = to_truth(T_world_camera, list(truth.T_world_camera[::every]))
-    if T is None or points_m is None or mesh is None or not len(points_m):
+    T = None if truth is None else to_truth(T_world_camera, list(truth.T_world_camera[::every]))
+    if truth is None or T is None or points_m is None or mesh is None or not len(points_m):
         return {"map_points": None, "map_median_m": None, "triangles": None, **shares}
     some_m = points_m[:: max(1, -(-len(points_m) // MOST_POINTS))]
     room = triangle_scene(truth.vertices_m, truth.triangles)

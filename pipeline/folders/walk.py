@@ -84,8 +84,8 @@ def walk_metrics(walk: Walk, elapsed_s: float) -> dict[str, Any]:
 def walk_sentences(walk: Walk, shown: int) -> list[str]:
     """Return a summary and a sentence on lost frames; ``shown`` keyframes are the nodes of the rig."""
     summary = (
-        f"A recording of {len(walk.times_s)} frames over {path_m(walk.T_world_camera):.1f} m; its colours "
-        f"are those of {shown} of its {len(walk.keyframes)} keyframe{'s' * (len(walk.keyframes) != 1)}"
+        f"A recording of {len(walk.times_s)} frames over {path_m(walk.T_world_camera):.1f} m; its nodes are "
+        f"{shown} of its {len(walk.keyframes)} keyframe{'s' * (len(walk.keyframes) != 1)}"
     )
     return [summary, *lost_sentences(lost_spans(walk.T_world_camera), len(walk.times_s))]
 

@@ -1,16 +1,18 @@
 """Walks: every program answers on one, and trajectories, maps and summaries are judged as they should be."""
 
+import shutil
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from lab.benchmarks.recording import summary
+from lab.benchmarks.recording import compared, summary
 from lab.walks.held_out import FIRST_ROOM, WalkTask, frames_in_memory, held_out_walks
 from lab.walks.judging import Mesh, map_errors, rpe_m, to_truth, trajectory_errors
-from lab.walks.ours import OURS, OWN, solve_own
+from lab.walks.ours import OURS, OURS_TRACKING, OWN, solve_own
 from lab.walks.peers import available_walk_peers, solve_peer
-from lab.walks.walk import kinect, read_truth
+from lab.walks.walk import TRUE_POSES, TRUTH, kinect, read_truth
+from packetmesh.errors import InputError
 from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
 from pipeline.recording.loops import poses_by_tracking
 from pipeline.recording.tracking import Track, Tracked
@@ -61,11 +63,24 @@ def test_the_true_room_and_poses_have_no_errors_in_another_world(walk):
     assert (row["within_2cm"], row["within_5cm"]) == (1.0, 1.0)
     away = Mesh(mesh.vertices_m + 100.0, mesh.triangles)
     assert map_errors(poses, mesh.vertices_m, away, kinect(WIDTH_PX), truth, 1)["within_5cm"] == 0.0
-    errors = trajectory_errors(poses, np.arange(FRAMES) / 30.0, truth, 1)
+    errors = trajectory_errors(poses, np.arange(FRAMES) / 30.0, list(truth.T_world_camera), 1)
     assert errors["ate_m"] < 1e-9
     assert not errors["lost"]
     few = [*poses[:4], *[None] * (FRAMES - 4)]
-    assert trajectory_errors(few, np.arange(FRAMES) / 30.0, truth, 1)["lost"]
+    assert trajectory_errors(few, np.arange(FRAMES) / 30.0, list(truth.T_world_camera), 1)["lost"]
+
+
+def test_a_recording_of_others_is_judged_by_its_poses_which_no_program_gets(walk, tmp_path):
+    own = tmp_path / "own"
+    shutil.copytree(walk, own, ignore=shutil.ignore_patterns(TRUTH, TRUE_POSES))
+    with pytest.raises(InputError, match="own has no poses to compare with; try"):
+        compared([own], 1, tmp_path)
+    shutil.copy(walk / TRUE_POSES, own / "groundtruth.txt")
+    assert frames_in_memory(own, 1).T_world_camera is None
+    rows = [solve_own(WalkTask(OURS_TRACKING, folder, 1)) for folder in (walk, own)]
+    assert rows[1]["ate_m"] == pytest.approx(rows[0]["ate_m"], rel=1e-3)
+    assert rows[1]["path_m"] == pytest.approx(rows[0]["path_m"], rel=1e-3)
+    assert rows[1]["map_median_m"] is None
 
 
 def test_a_steady_drift_is_the_relative_error_over_a_second():

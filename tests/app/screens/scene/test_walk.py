@@ -12,5 +12,5 @@ def test_the_scene_screen_shows_keyframes_and_says_what_became_of_the_frames(sto
     render_walk(random_room(5_000_001), 8, kinect(160), tmp_path / "walk")
     view = drain(scene_job(store, Spec(Recorded(str(tmp_path / "walk")))))
     assert view.notes[0].startswith("A recording of 8 frames over 0.")
-    assert f"; its colours are those of {len(view.nodes)} of " in view.notes[0]
+    assert f"; its nodes are {len(view.nodes)} of its " in view.notes[0]
     assert all(node.name.startswith("frame_0000") for node in view.nodes)
