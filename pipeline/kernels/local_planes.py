@@ -58,10 +58,10 @@ def shared_normals(tree: KdTree, neighbours: int, rows: IntArray) -> FloatArray:
     place = np.empty(len(tree), np.int64)
     place[tree.order] = np.arange(len(tree))
     queries = np.sort(place[rows])
-    while len(queries):
-        axes, near, apart = _planes(tree, min(neighbours, len(tree)), queries)
-        _give(axes, near, apart, squared, normals)
-        queries = np.flatnonzero(np.isinf(squared))
+    count = min(neighbours, len(tree))
+    _give(*_planes(tree, count, queries), squared, normals)
+    alone = np.flatnonzero(np.isinf(squared))
+    normals[alone] = _planes(tree, count, alone)[0]
     ordered = np.empty_like(normals)
     ordered[tree.order] = normals
     return ordered

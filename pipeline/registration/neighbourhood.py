@@ -19,6 +19,8 @@ _log = logging.getLogger(__name__)
 NORMAL_NEIGHBOURS, SHARED_NEIGHBOURS, SPACING_NEIGHBOURS = 20, 40, 4
 SHARING = 8
 """About how many points share a normal in a registration."""
+FEW_POINTS = 5000
+"""Clouds up to this size get a plane for each point: 40 neighbours would reach around corners."""
 SPACING_SAMPLE = 4096
 """Number of points whose spacing gives the median."""
 _UNIT_TOLERANCE = 1e-3
@@ -28,8 +30,8 @@ _UNIT_TOLERANCE = 1e-3
 class Normals:
     """Unit normals of a cloud's points, oriented towards a camera at the origin; computed at first use.
 
-    Neighbours share a normal: that of the plane through the 40 points nearest to one in eight, drawn at
-    random. A registration by them is as accurate as one by a plane for each point (SPEC 4.1).
+    In large clouds neighbours share a normal: that of the plane through the 40 points nearest to one in
+    eight, drawn at random. A registration by them is as accurate as one by a plane for each point (SPEC 4.1).
     """
 
     def __init__(
@@ -44,9 +46,11 @@ class Normals:
     @cached_property
     def all(self) -> FloatArray:
         """(N, 3) unit normals."""
-        return _completed(self._known, self._points_m, self._shared)
+        return _completed(self._known, self._points_m, self._computed)
 
-    def _shared(self) -> FloatArray:
+    def _computed(self) -> FloatArray:
+        if len(self._points_m) <= FEW_POINTS:
+            return patch_normals(self._tree_of(), NORMAL_NEIGHBOURS)
         rows = drawn_rows(self._points_m, -(-len(self._points_m) // SHARING))
         return shared_normals(self._tree_of(), SHARED_NEIGHBOURS, rows)
 
