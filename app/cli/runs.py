@@ -98,7 +98,8 @@ def iterate_run(
     metrics = metrics_of(result) | ({} if report is None else {"import": asdict(report)})
     clear_run_folder(out)
     if isinstance(rig, Recorded) and result.rig.walk is not None:
-        yield from part(iterate_keyframes(rig.open(), result.rig.walk, out), "keyframes", 0.95, 1.0)
+        recording = yield from part(rig.iterate_open(), "files", 0.9, 0.95, detail=True)
+        yield from part(iterate_keyframes(recording, result.rig.walk, out), "keyframes", 0.95, 1.0)
     else:
         delete_keyframes(out)
     write_reconstruction_report(result, metrics, out / REPORT)
@@ -210,7 +211,7 @@ def reconstruct_one(task: RigTask) -> RigOutcome:
 
 
 def _source_of(task: RigTask) -> FileSource:
-    """Return the images of a task: all frames of a recording, or a rig, as which one frame counts, too.
+    """Return the source of a task: a recording, or a rig. One of a single frame is imported as a rig.
 
     Raises:
         InputError: a recording that cannot be used.

@@ -18,6 +18,7 @@ from packetmesh.files import atomic_path, write_json
 from packetmesh.progress import Progress
 from pipeline.importing.arkit import Y_DOWN
 from pipeline.importing.colmap_model import CENTRE_PX
+from pipeline.importing.rig_folder import new_folder
 from pipeline.io.images import write_color, write_depth_mm
 from pipeline.kernels.geometry import apply, inverse, project
 from pipeline.kernels.straight_view import straight_depth, straight_image, straight_view
@@ -48,15 +49,17 @@ class _Written:
 
 
 def delete_keyframes(folder: Path) -> None:
-    """Delete the keyframes of an earlier run from its folder."""
-    shutil.rmtree(folder / FOLDER, ignore_errors=True)
+    """Delete the keyframes of an earlier run, complete or interrupted, from its folder."""
+    for path in (folder / FOLDER, *folder.glob(f".{FOLDER}-*")):
+        shutil.rmtree(path, ignore_errors=True)
 
 
 def iterate_keyframes(recording: Recording, walk: Walk, folder: Path) -> Generator[Progress, None, Path]:
     """Write ``folder``/keyframes with images/, depth/, transforms.json, and sparse/ as COLMAP's text model.
 
-    Images have no distortion; depth has whole millimetres and the pixels of its colour image. Keyframes that
-    cannot be read are left out.
+    It is written completely or not at all, and replaces that of an earlier run. Images have no distortion;
+    depth has whole millimetres and the pixels of its colour image. Keyframes that cannot be read are left
+    out.
 
     Args:
         recording: the frames.
@@ -69,6 +72,21 @@ def iterate_keyframes(recording: Recording, walk: Walk, folder: Path) -> Generat
     out = folder / FOLDER
     delete_keyframes(folder)
     cloud = walk.map.select(np.arange(0, len(walk.map), max(1, -(-len(walk.map) // MOST_POINTS))))
+    with new_folder(out) as unfinished:
+        written = yield from _iterate_images(recording, walk, unfinished, cloud)
+        write_json(unfinished / "transforms.json", _transforms(written))
+        _write_model(unfinished / "sparse", written, cloud)
+    return out
+
+
+def _iterate_images(
+    recording: Recording, walk: Walk, out: Path, cloud: PointCloud
+) -> Generator[Progress, None, list[_Written]]:
+    """Write the images of the keyframes that have a pose and can be read.
+
+    Raises:
+        InputError: there are none.
+    """
     written: list[_Written] = []
     unreadable = ""
     for done, number in enumerate(walk.keyframes):
@@ -84,9 +102,7 @@ def iterate_keyframes(recording: Recording, walk: Walk, folder: Path) -> Generat
         written.append(_write(out, frame, cloud))
     if not written:
         raise InputError(unreadable or f"No keyframe of {recording.name} has a pose; try a longer recording")
-    write_json(out / "transforms.json", _transforms(written))
-    _write_model(out / "sparse", written, cloud)
-    return out
+    return written
 
 
 def straight(frame: RgbdFrame) -> RgbdFrame:

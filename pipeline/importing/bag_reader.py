@@ -75,9 +75,9 @@ def enter_bag(path: Path, stack: ExitStack) -> BagReader:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    from pipeline.importing.mcap_reader import McapReader
-
     if path.suffix == ".mcap" and path.is_file() and _is_of_another_profile(path):
+        from pipeline.importing.mcap_reader import McapReader
+
         return stack.enter_context(McapReader(path))
     reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
     return RosReader(stack.enter_context(reader))

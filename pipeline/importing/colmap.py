@@ -18,6 +18,7 @@ from pipeline.importing.colmap_model import Model, ModelImage, read_text_model
 from pipeline.importing.sequence import DEPTH_SUFFIXES, Candidate, Sequence, named_inside
 from pipeline.io.depth_scale import usual_scale
 from pipeline.io.images import read_depth_units, read_depth_values
+from pipeline.io.intrinsics import check_camera
 from pipeline.kernels.geometry import inverse
 from pipeline.types import CameraIntrinsics, FloatArray
 
@@ -57,6 +58,8 @@ def read_colmap(folder: Path, intrinsics: Path | None) -> Sequence:
     cameras, notes = model.cameras, list[str]()
     if intrinsics is not None:
         cameras = {most: camera_of(folder, ours[0][1], intrinsics, None, "")[0]}
+    for number in sorted({image.camera for image, _, _ in ours}):
+        check_camera(f"Camera {number} of {model.files['cameras']}", cameras[number])
     camera = cameras.get(most, cameras[ours[0][0].camera])
     total = len(model.images)
     if len(ours) < total:

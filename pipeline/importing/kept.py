@@ -32,6 +32,7 @@ class KeptReport:
 
     kind: str
     folder: str
+    """The recording."""
     candidates: int
     """Number of frames of the recording."""
     frames: int
@@ -78,7 +79,7 @@ def iterate_keep(
         writer.finish(writer.camera)
     notes = [*recording.notes]
     if left_out:
-        notes.append(f"{len(left_out)} frames were left out, the first because: {left_out[0]}")
+        notes.append(f"{len(left_out)} of {count} frames were left out, the first because: {left_out[0]}")
     if writer.too_far:
         notes.append(f"{writer.too_far} depths beyond {FARTHEST_M:.1f} m, the form's largest, were left out")
     return KeptReport(recording.kind, str(path), count, count - len(left_out), tuple(dict.fromkeys(notes)))

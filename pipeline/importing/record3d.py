@@ -32,6 +32,7 @@ from packetmesh.files import (
 from pipeline.importing.arkit import Y_DOWN
 from pipeline.importing.cameras import camera_of
 from pipeline.importing.found_poses import found_poses
+from pipeline.importing.lzfse_data import BLOCK, stated_size, unpack_lzfse
 from pipeline.importing.pairing import color_folder, paired, pose_indices, require, thinned
 from pipeline.importing.sequence import Candidate, Sequence, posed
 from pipeline.importing.stored import StoredImage
@@ -44,9 +45,7 @@ from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
 SUFFIX = ".r3d"
 _METADATA = ("metadata.json", "metadata")
 _MAX_METADATA_BYTES = 100 * MAX_TEXT_BYTES
-_FRAME = re.compile(r"rgbd/(\d+)\.(jpg|depth|conf)")
-_LZFSE = b"bvx"
-"""First bytes of every block of LZFSE."""
+_FRAME = re.compile(r"rgbd/(\d{1,9})\.(jpg|depth|conf)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,31 +125,37 @@ def read_r3d(file: Path, intrinsics: Path | None) -> Sequence:
 def _read_package(package: _Package, metadata_name: str, intrinsics: Path | None) -> Sequence:
     """Read a capture whose depth and confidence are compressed."""
     text = package.read(metadata_name, _MAX_METADATA_BYTES)
-    metadata = _metadata(text_in(text, "replace"), f"{metadata_name} of {package.place}")
-    found: dict[int, set[str]] = {}
+    metadata = _metadata(text_in(text, "replace"), f"of {package.place}")
+    found: dict[int, dict[str, str]] = {}
     for name in package.names:
         if match := _FRAME.fullmatch(name):
-            found.setdefault(int(match[1]), set()).add(match[2])
-    numbers, rare = thinned(sorted(k for k, kinds in found.items() if kinds >= {"jpg", "depth"}))
+            found.setdefault(int(match[1]), {})[match[2]] = name
+    complete = sorted(k for k, names in found.items() if names.keys() >= {"jpg", "depth"})
+    numbers, rare = thinned(complete)
     require(numbers, package.place, "rgbd/0.jpg and rgbd/0.depth")
-    missing = len(found) - sum(kinds >= {"jpg", "depth"} for kinds in found.values())
+    missing = len(found) - len(complete)
     lacks = f"{missing} of {len(found)} frames of {package.place} lack an image and were left out"
-    first_rgb = _photograph(package, numbers[0])
+    first_rgb = _photograph(package, found[numbers[0]]["jpg"])
     metadata = _resized(metadata, first_rgb.shape[1], first_rgb.shape[0])
-    images = {
-        k: Candidate(
-            StoredImage(package.place, f"rgbd/{k}.jpg", partial(_photograph, package, k)),
-            StoredImage(package.place, f"rgbd/{k}.depth", partial(_depth, package, k, metadata)),
-            confidence=StoredImage(package.place, f"rgbd/{k}.conf", partial(_levels, package, k, metadata))
-            if "conf" in found[k]
-            else None,
-        )
-        for k in numbers
-    }
+    images = {k: _candidate(package, found[k], metadata) for k in numbers}
     notes = (*((lacks,) if missing else ()), *rare)
     if any(candidate.confidence for candidate in images.values()):
         notes += (CONFIDENCE_NOTE,)
     return _sequence(package.place, images, metadata, metadata_name, intrinsics, notes)
+
+
+def _candidate(package: _Package, names: dict[str, str], metadata: _Metadata) -> Candidate:
+    """Return the images of a frame; ``names`` has the names of its files by suffix."""
+    readers = {
+        "jpg": partial(_photograph, package),
+        "depth": partial(_pixels, package, dtype=np.dtype("<f4"), metadata=metadata),
+        "conf": partial(_pixels, package, dtype=np.dtype(np.uint8), metadata=metadata),
+    }
+    stored = {
+        suffix: StoredImage(package.place, name, partial(readers[suffix], name))
+        for suffix, name in names.items()
+    }
+    return Candidate(stored["jpg"], stored["depth"], confidence=stored.get("conf"))
 
 
 def _sequence(
@@ -175,7 +180,7 @@ def _sequence(
             )
             for k, candidate in images.items()
         ],
-        f"poses in {metadata_name}",
+        f"pose in {metadata_name}",
         poses,
     )
     camera = metadata.camera
@@ -196,6 +201,8 @@ def _metadata(text: str, name: str) -> _Metadata:
         poses = np.array(values.get("poses") or [], dtype=np.float64).reshape(-1, 7)
         times = np.array(values.get("frameTimestamps") or [], dtype=np.float64).reshape(-1)
         shape = (int(values["dh"]), int(values["dw"])) if values.get("dw") and values.get("dh") else None
+        if shape is not None and min(shape) < 1:
+            raise ValueError
         if not len(times) and values.get("fps"):
             times = np.arange(len(poses)) / float(values["fps"])
     except (KeyError, TypeError, ValueError, OverflowError):
@@ -225,42 +232,28 @@ def _from_arkit(row: FloatArray) -> FloatArray:
     return T @ Y_DOWN
 
 
-def _photograph(package: _Package, number: int) -> ByteArray:
+def _photograph(package: _Package, name: str) -> ByteArray:
     """Read (H, W, 3) RGB."""
-    name = f"rgbd/{number}.jpg"
     return color_in(package.read(name, MAX_IMAGE_BYTES), f"{name} in {package.place}")
 
 
-def _depth(package: _Package, number: int, metadata: _Metadata) -> NDArray[np.float32]:
-    """Read (H, W) depth, metres."""
-    return _pixels(package, f"rgbd/{number}.depth", np.dtype("<f4"), metadata)
-
-
-def _levels(package: _Package, number: int, metadata: _Metadata) -> NDArray[np.uint8]:
-    """Read (H, W) levels of confidence, 0 to 2."""
-    return _pixels(package, f"rgbd/{number}.conf", np.dtype(np.uint8), metadata)
-
-
 def _pixels(package: _Package, name: str, dtype: np.dtype[Any], metadata: _Metadata) -> NDArray[Any]:
-    import lzfse
-
+    """Read (H, W) depth, metres, or levels of confidence, 0 to 2."""
     data = package.read(name, MAX_IMAGE_BYTES)
-    damaged = InputError(f"{name} in {package.place} is truncated or damaged; try to export it again")
-    known = metadata.depth_shape
-    if data.startswith(_LZFSE):
-        try:
-            data = lzfse.decompress(data)
-        except lzfse.error:
-            raise damaged from None
-    elif known is not None and len(data) != known[0] * known[1] * dtype.itemsize:
+    shape, compressed = metadata.depth_shape, data.startswith(BLOCK)
+    size_bytes = stated_size(data) if compressed else len(data)
+    if shape is None:
+        shape = _proportional(size_bytes // dtype.itemsize, metadata.camera)
+    elif not compressed and size_bytes != shape[0] * shape[1] * dtype.itemsize:
         raise InputError(
             f"{name} in {package.place} has an unknown compression, not LZFSE; try Record3D's export as EXR "
             "and JPG images"
         )
-    shape = known or _proportional(len(data) // dtype.itemsize, metadata.camera)
-    if shape is None or len(data) != shape[0] * shape[1] * dtype.itemsize:
-        raise damaged
-    return np.frombuffer(data, dtype).reshape(shape)
+    if shape is not None and size_bytes == shape[0] * shape[1] * dtype.itemsize:
+        unpacked = unpack_lzfse(data) if compressed else data
+        if len(unpacked) == size_bytes:
+            return np.frombuffer(unpacked, dtype).reshape(shape)
+    raise InputError(f"{name} in {package.place} is truncated or damaged; try to export it again")
 
 
 def _proportional(pixels: int, camera: CameraIntrinsics) -> tuple[int, int] | None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from packetmesh.errors import InputError
+from packetmesh.files import remedy
 from pipeline.io.calibrations import FILES
 from pipeline.io.extrinsics import write_extrinsics
 from pipeline.io.images import write_color, write_depth_mm
@@ -57,7 +58,7 @@ def new_folder(out: Path) -> Iterator[Path]:
             out.rmdir()
         sibling.rename(out)
     except OSError as error:
-        raise InputError(f"{out} cannot be written ({error.strerror or error}); try another folder") from None
+        raise InputError(f"{out} cannot be written ({error.strerror or error}); {remedy(error)}") from None
     finally:
         shutil.rmtree(sibling, ignore_errors=True)
 

@@ -73,7 +73,7 @@ def contents_of(file: Path) -> Contents:
         stamps: dict[int, list[int]] = {stream.index: [] for stream in streams}
         jumps: dict[int, list[int]] = {stream.index: [] for stream in streams}
         for packet in container.demux(streams):
-            if packet.pts is not None and packet.size:
+            if packet.pts is not None and packet.size and not packet.is_discard:
                 stamps[packet.stream_index].append(packet.pts)
                 if packet.is_keyframe:
                     jumps[packet.stream_index].append(packet.pts)

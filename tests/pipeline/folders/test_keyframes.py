@@ -1,6 +1,8 @@
 """Keyframes for other programs: pycolmap reads the model, and the import reads both forms back."""
 
+import errno
 import json
+import os
 import shutil
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
@@ -12,6 +14,7 @@ import pytest
 
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
+from pipeline.folders import keyframes
 from pipeline.folders.keyframes import delete_keyframes, iterate_keyframes, straight
 from pipeline.importing import iterate_import
 from pipeline.importing.upright import upright
@@ -132,10 +135,22 @@ def test_a_keyframe_that_cannot_be_read_is_left_out(tmp_path):
     assert [own["file_path"] for own in frames] == ["images/frame_00002.jpg"]
 
 
+def test_nothing_remains_of_keyframes_that_do_not_fit_on_the_disk(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(keyframes, "_write_model", full)
+    with pytest.raises(InputError, match=r"keyframes cannot be written .*delete something there"):
+        written(tmp_path)
+    assert not list((tmp_path / "run").iterdir())
+
+
 def test_keyframes_of_an_earlier_run_are_deleted(tmp_path):
     folder, _ = written(tmp_path)
+    (tmp_path / "run" / ".keyframes-0123abcd" / "images").mkdir(parents=True)  # of a killed process
     (folder / "images" / "frame_00099.jpg").write_bytes(b"old")
     written(tmp_path)
     assert not (folder / "images" / "frame_00099.jpg").exists()
+    assert [path.name for path in (tmp_path / "run").iterdir()] == ["keyframes"]
     delete_keyframes(tmp_path / "run")
     assert not folder.exists()

@@ -91,6 +91,11 @@ def test_a_camera_of_two_radial_terms_keeps_them(tmp_path):
     [
         ("cameras.txt", "1 FOV 40 30 1 1 1 1 1\n", "image_undistorter"),
         ("cameras.txt", "1 PINHOLE 40 30 1 1\n", "numbers"),
+        (
+            "cameras.txt",
+            "1 PINHOLE 40 30 0 30 20 15\n",
+            "Camera 1 of .* has focal lengths 0 and 30 px",
+        ),
         ("cameras.txt", "2 PINHOLE 40 30 30 30 20 15\n", "no camera 1"),
         ("images.txt", "1 2 3\n\n", "where an image is expected"),
         ("images.txt", "1 0 0 0 0 0 0 0 1 room/view_0.png\n\n", "no rotation"),

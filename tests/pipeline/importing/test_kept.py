@@ -82,7 +82,7 @@ def test_what_the_form_cannot_hold_is_said(tmp_path):
     report, found = kept(tmp_path / "scenes", tmp_path / "out")
     assert (report.candidates, report.frames, len(found.times_s)) == (3, 2, 2)
     assert "100 depths beyond 13.1 m, the form's largest, were left out" in report.notes
-    assert any(note.startswith("1 frames were left out, the first because:") for note in report.notes)
+    assert any(note.startswith("1 of 3 frames were left out, the first because:") for note in report.notes)
     assert not found.view(0).depth.valid[20:, 30:].any()
     np.testing.assert_array_equal(found.frame(1).rgb, orbit(3).frames[2].rgb)
 

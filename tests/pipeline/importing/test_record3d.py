@@ -1,5 +1,6 @@
 """Record3D's .r3d: a ZIP of photographs with compressed depth and confidence."""
 
+import re
 import sys
 import zipfile
 from contextlib import suppress
@@ -112,6 +113,19 @@ def test_uncompressed_depth_is_read(tmp_path):
     np.testing.assert_array_equal(open_recording(file).view(1).depth.z_m, written.frames[1].depth.z_m)
 
 
+def test_names_may_have_leading_zeros(tmp_path):
+    written = orbit(3)
+    file = write_r3d(tmp_path / "capture", written)
+    with zipfile.ZipFile(file) as archive:
+        kept = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, data in kept.items():
+            archive.writestr(re.sub(r"rgbd/(\d)\.", r"rgbd/000\1.", name), data)
+    recording = open_recording(file)
+    np.testing.assert_array_equal(recording.view(2).depth.z_m, written.frames[2].depth.z_m)
+    assert recording.frame(1).rgb.shape == (90, 120, 3)
+
+
 def test_frames_without_an_image_are_left_out_and_the_others_keep_their_poses(tmp_path):
     written = orbit(4)
     file = write_r3d(tmp_path / "capture", written)
@@ -136,6 +150,7 @@ def test_frames_without_an_image_are_left_out_and_the_others_keep_their_poses(tm
         (["rgbd/0.depth"], lambda data: data[:60], "rgbd/0.depth in .* is truncated or damaged"),
         (["rgbd/0.depth"], lambda _: b"\x04\x22\x4d\x18 something", "has an unknown compression"),
         (["rgbd/0.depth"], lambda _: lzfse.compress(bytes(16)), "rgbd/0.depth in .* is truncated or damaged"),
+        (["metadata"], lambda data: data.replace(b'"dw": 40', b'"dw": -40'), "not in Record3D's format"),
     ],
 )
 def test_a_damaged_part_gets_a_sentence(tmp_path, names, change, says):

@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 
+import av
 import numpy as np
 import pytest
 
@@ -87,3 +88,23 @@ def test_frames_of_a_film_are_decoded_from_the_last_whole_one(tmp_path):
         frame = reader.frame(track, k)
         assert frame.shape == (32, 48, 3)
         assert np.abs(frame.astype(int) - 2 * k).max() <= 3
+
+
+def test_images_before_the_cut_of_a_film_are_no_frames(tmp_path):
+    """A film that was cut without encoding it again begins at a whole image, and its edit list at the cut."""
+    whole, cut = tmp_path / "whole.mp4", tmp_path / "rgb.mp4"
+    write_video(whole, [np.full((32, 48, 3), k, np.uint8) for k in range(0, 200, 2)])
+    with av.open(str(whole)) as source, av.open(str(cut), "w") as target:
+        film = source.streams.video[0]
+        stamps = contents_of(whole).tracks[0].stamps
+        first, begin = stamps[24], stamps[30]  # 24 and 36 are whole images
+        copied = target.add_stream_from_template(film)
+        for packet in source.demux(film):
+            if packet.size and packet.pts >= first:
+                packet.stream, packet.pts, packet.dts = copied, packet.pts - begin, packet.dts - begin
+                target.mux(packet)
+    (track,) = contents_of(cut).tracks
+    assert len(track.stamps) == 70
+    reader = TrackReader(cut, (track,), decoded=True)
+    for k in (0, 5, 69, 40):
+        assert np.abs(reader.frame(track, k).astype(int) - 2 * (30 + k)).max() <= 3
