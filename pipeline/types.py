@@ -116,7 +116,7 @@ class Averaging:
     frames: int
     """Number of depth images that were averaged."""
     available: int
-    """Most that could be."""
+    """Most that could be averaged."""
     moving_share: float
     """Share of the pixels that moved, which have no depth."""
     flickering_share: float
@@ -258,6 +258,11 @@ class Link:
     """Whether it closes a loop; else tracking made it."""
     used: bool = True
     """False for a registration that contradicts the others."""
+
+    @property
+    def pair(self) -> tuple[int, int]:
+        """Source and target."""
+        return self.source, self.target
 
 
 @dataclass(frozen=True, slots=True)

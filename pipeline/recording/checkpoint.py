@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-import time
-import zipfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -17,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from packetmesh.errors import InputError
-from packetmesh.files import atomic_path
+from packetmesh.files import BROKEN_ZIP, atomic_path
 from pipeline.importing.recorded import FolderRecording
 from pipeline.importing.recorded_bag import BagRecording
 from pipeline.recording.recording import Recording
@@ -43,7 +41,7 @@ class Checkpoint:
         try:
             with np.load(self.path, allow_pickle=False) as stored:
                 return {name: stored[name] for name in stored.files}
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile):
+        except BROKEN_ZIP:
             return None
 
     def write(self, state: State) -> None:
@@ -54,31 +52,34 @@ class Checkpoint:
     def delete(self) -> None:
         """Delete the state, and those of other recordings that are old."""
         with suppress(OSError):
-            self.path.unlink(missing_ok=True)
+            written_s = self.path.stat().st_mtime
+            self.path.unlink()
             for other in self.path.parent.glob("*.npz"):
-                if time.time() - other.stat().st_mtime > OLD_S:
+                if written_s - other.stat().st_mtime > OLD_S:
                     other.unlink(missing_ok=True)
 
 
 def checkpoint_of(recording: Recording, given: Sequence[FloatArray | None] | None) -> Checkpoint | None:
     """Return the checkpoint of a recording on disk, named by all that decides its tracking; else None.
 
+    The first image with depth, in metres, stands for the depth scale and the camera.
+
     Args:
         recording: the frames.
         given: (4, 4) poses from which tracking starts, if there are any.
     """
-    if isinstance(recording, FolderRecording):
-        place, scale = recording.folder, recording.sequence.units_per_metre
-    elif isinstance(recording, BagRecording):
-        place, scale = recording.path, float("nan")
-    else:
+    if not isinstance(recording, FolderRecording | BagRecording):
         return None
-    digest = hashlib.sha256(repr((VERSION, np.__version__, str(place.resolve()), scale)).encode())
+    place = recording.folder if isinstance(recording, FolderRecording) else recording.path
+    digest = hashlib.sha256(repr((VERSION, np.__version__, str(place.resolve()))).encode())
     for path in sorted(place.rglob("*")) if place.is_dir() else [place]:
         with suppress(OSError):
             stat = path.stat()
             digest.update(repr((path.name, stat.st_size, stat.st_mtime_ns)).encode())
-    view = recording.view(0)
+    views = (recording.view(k) for k in range(len(recording.times_s)))
+    view = next((view for view in views if view.depth.valid.any()), None)
+    if view is None:
+        return None
     for values in (recording.times_s, view.depth.z_m, view.camera.matrix, view.T_color_depth):
         digest.update(np.ascontiguousarray(values).tobytes())
     for T in given or ():

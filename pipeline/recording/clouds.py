@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +31,7 @@ class KeyframeClouds(Mapping[int, OrganisedCloud]):
 
     def __init__(self) -> None:
         self._packed: dict[int, _Packed] = {}
-        self._used: OrderedDict[int, OrganisedCloud] = OrderedDict()
+        self._unpacked = lru_cache(KEPT)(lambda number: _unpacked(self._packed[number]))
 
     def add(self, number: int, cloud: OrganisedCloud) -> None:
         """Store a keyframe's cloud, rounded to float32."""
@@ -41,13 +41,7 @@ class KeyframeClouds(Mapping[int, OrganisedCloud]):
         self._packed[number] = _Packed(points_m, normals, cloud.rows >= 0, z_m, cloud.camera)
 
     def __getitem__(self, number: int) -> OrganisedCloud:
-        cloud = self._used.get(number)
-        if cloud is None:
-            cloud = self._used[number] = _unpacked(self._packed[number])
-            if len(self._used) > KEPT:
-                self._used.popitem(last=False)
-        self._used.move_to_end(number)
-        return cloud
+        return self._unpacked(number)
 
     def __iter__(self) -> Iterator[int]:
         return iter(self._packed)

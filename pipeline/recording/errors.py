@@ -10,6 +10,16 @@ from pipeline.registration.residual import DegenerateError, weighted_procrustes
 from pipeline.types import FloatArray
 
 
+def path_note(
+    T_world_camera: Sequence[FloatArray | None], T_reference_camera: Sequence[FloatArray | None], of: str
+) -> tuple[str, ...]:
+    """Return a sentence on how far a path is from ``of``, another one; none where ``ate_m`` is NaN."""
+    apart_m = ate_m(T_world_camera, T_reference_camera)
+    if np.isnan(apart_m):
+        return ()
+    return (f"The path differs from {of} by {100.0 * apart_m:.1f} cm (RMSE, aligned)",)
+
+
 def ate_m(
     T_world_camera: Sequence[FloatArray | None], T_reference_camera: Sequence[FloatArray | None]
 ) -> float:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.kernels.geometry import inverse, rotation_angle_rad
-from pipeline.recording.recording import Recording
+from pipeline.recording.recording import Recording, spread
 from pipeline.recording.tracking import TRACKING, registered
 from pipeline.registration.organised import organised
 from pipeline.types import FloatArray
@@ -97,8 +97,7 @@ def _motions(recording: Recording, written: Sequence[FloatArray | None]) -> list
     """Return (i, j, (4, 4) T_i_j of the colour camera) of frames with poses whose depth images register."""
     found: list[tuple[int, int, FloatArray]] = []
     firsts = [k for k, T in enumerate(written[:-APART]) if T is not None and written[k + APART] is not None]
-    chosen = np.linspace(0, len(firsts) - 1, PAIRS).round().astype(int) if firsts else ()
-    for first in [firsts[k] for k in np.unique(chosen)]:
+    for first in spread(firsts, PAIRS):
         views = [recording.view(k) for k in (first, first + APART)]
         target, source = (organised(view.depth, view.camera) for view in views)
         if not len(target) or not len(source):

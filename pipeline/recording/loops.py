@@ -13,14 +13,12 @@ from pipeline.recording.places import Places, parts_of
 from pipeline.recording.revisits import iterate_revisits
 from pipeline.recording.tracking import (
     LEAST_AGREEMENT,
-    LEAST_OVERLAP,
     LESS_AGREEMENT,
     REPORTED,
-    TRACKING,
     WITHIN,
     Track,
-    link,
-    registered,
+    agreement_at,
+    loop_link,
 )
 from pipeline.registration.graph.edges import PoseEdge, small_motion
 from pipeline.registration.graph.pose_graph import solve_pose_graph
@@ -30,6 +28,7 @@ from pipeline.types import FloatArray, IntArray, Link
 LOOP_GATE_M = 0.3
 """Gate of a loop's registration: larger than in tracking, because drift may have grown."""
 MOVED_M = 0.1
+"""Change of a pair's start pose after which it is tried again."""
 NEAR_M, NEAR_DEG = 0.9, 45.0
 """Distance and angle of keyframes that may show the same place."""
 LEAST_PREDICTED = 0.4
@@ -37,13 +36,13 @@ LEAST_PREDICTED = 0.4
 MOST_TRIED = 8
 """Most loops tried for each keyframe, those of the largest predicted overlap."""
 MOST_LOOPS, LEAST_TRIED = 1000, 3
-"""About the most loops tried in a round: where keyframes are many, fewer for each, from other times."""
+"""Loops tried in a round, about: where keyframes are many, fewer for each, but three, from other times."""
 MOST_COMPARED = 32
 """Most earlier keyframes with which the overlap of each is predicted."""
 ROUNDS = 2
 """Number of rounds: the poses after the first one predict more loops."""
 DRIFTS = (3.0, 10.0, 30.0)
-"""Factors of tracking' errors that are tried where they contradict places recognised by colour."""
+"""Factors of tracking's errors that are tried where they contradict places recognised by colour."""
 OF_TRACKING = 1.5
 """Weight of a link of tracking where links contradict each other, in loops: two loops outvote it."""
 GRAPH_POINTS = 200
@@ -91,7 +90,7 @@ def iterate_loops(track: Track, places: Places | None = None) -> Generator[Progr
         found = yield from part(loops.iterate_revisits(places), "far", 0.5, 0.75, detail=True)
         if found:
             yield from part(_rounds(loops), "near", 0.75, 1.0, detail=True)
-    return Trajectory(tuple(_frame_poses(track, loops.poses)), loops.poses, tuple(loops.links))
+    return Trajectory(_frame_poses(track, loops.poses), loops.poses, tuple(loops.links))
 
 
 def _rounds(loops: _Loops) -> Generator[Progress, None, None]:
@@ -109,7 +108,7 @@ class _Loops:
         self.poses = _chain(track)
         self.links = [one for one in track.links if one.source in self.poses]
         self._clouds = track.clouds
-        self._tried = {(one.source, one.target): one.T_target_source for one in self.links}
+        self._tried = {one.pair: one.T_target_source for one in self.links}
         self._sure: set[Pair] = set()
         """Pairs that were recognised by colour."""
         self._explained: tuple[Pair | None, float] = (None, 1.0)
@@ -118,15 +117,17 @@ class _Loops:
     def iterate_round(self) -> Generator[Progress, None, bool]:
         """Register keyframes that are near each other, then reconcile; returns False if there is no loop."""
         candidates = yield from _candidates(self.poses, self._clouds, self._tried)
+        candidates = [one for one in candidates if (one.source, one.target) not in self._sure]
         for number, candidate in enumerate(candidates):
             if number % 10 == 0:
                 share = 0.5 + 0.5 * number / len(candidates)
                 yield Progress(f"trying loop {number} of {len(candidates)}", share)
             pair = candidate.source, candidate.target
             self._tried[pair] = candidate.T_target_source
-            found = _closed(candidate, self._clouds)
+            found = loop_link(self._clouds, *pair, candidate.T_target_source, LOOP_GATE_M)
             if found is not None:
                 self._tried[pair] = found.T_target_source
+                self.links = [one for one in self.links if not (one.loop and one.pair == pair)]
                 self.links.append(found)
         if not any(one.loop for one in self.links):
             return False
@@ -136,11 +137,11 @@ class _Loops:
     def iterate_revisits(self, places: Places) -> Generator[Progress, None, bool]:
         """Close loops by colour, then reconcile; returns False if there is none."""
         found = yield from iterate_revisits(places, self.poses, self._clouds)
-        linked = {(one.source, one.target) for one in self.links}
-        new = [one for one in found if (one.source, one.target) not in linked]
+        linked = {one.pair for one in self.links}
+        new = [one for one in found if one.pair not in linked]
         for one in new:
-            self._tried[one.source, one.target] = one.T_target_source
-            self._sure.add((one.source, one.target))
+            self._tried[one.pair] = one.T_target_source
+            self._sure.add(one.pair)
         self.links += new
         if new:
             self._reconcile()
@@ -166,7 +167,7 @@ class _Loops:
     def _explanations(self) -> Iterator[tuple[Pair | None, float]]:
         """Yield pairs whose link may be wrong, and factors of tracking's errors; those of before first."""
         yield self._explained
-        sure = next((one for one in self.links if (one.source, one.target) in self._sure), None)
+        sure = next((one for one in self.links if one.pair in self._sure), None)
         if sure is None:
             return
         wrong = self._wrong_link(sure)
@@ -183,18 +184,18 @@ class _Loops:
             if one.loop or not sure.target <= one.target < one.source <= sure.source:
                 continue
             T = inverse(poses[one.target]) @ change @ poses[one.source]
-            overlap, agreeing = shared_shares(self._clouds[one.source], self._clouds[one.target], T, WITHIN)
-            if overlap >= LEAST_OVERLAP and agreeing >= most:
-                best, most = (one.source, one.target), agreeing
+            agreeing = agreement_at(self._clouds[one.source], self._clouds[one.target], T)
+            others = [own for own in self.links if own is not one]
+            if agreeing >= most and len(parts_of(list(poses), others)) == 1:
+                best, most = one.pair, agreeing
         return best
 
     def _in_doubt(self, unused: Link, poses: Mapping[int, FloatArray]) -> bool:
         """Return whether a link should be used: recognised by colour, or of tracking without better poses."""
         source, target = unused.source, unused.target
         T = inverse(poses[target]) @ poses[source]
-        overlap, agreeing = shared_shares(self._clouds[source], self._clouds[target], T, WITHIN)
-        agrees = overlap >= LEAST_OVERLAP and agreeing >= LESS_AGREEMENT
-        return (source, target) in self._sure or not (agrees or unused.loop)
+        agrees = agreement_at(self._clouds[source], self._clouds[target], T) >= LESS_AGREEMENT
+        return unused.pair in self._sure or not (agrees or unused.loop)
 
 
 def _chain(track: Track) -> dict[int, FloatArray]:
@@ -237,23 +238,23 @@ def _candidates(
             predicted, _ = shared_shares(clouds[source], clouds[target], T_start, WITHIN)
             if predicted >= LEAST_PREDICTED:
                 own.append(_Candidate(source, target, T_start, predicted))
-        found += _best(own, len(numbers))
+        found += _best(own, numbers)
     return found
 
 
-def _best(candidates: Sequence[_Candidate], keyframes: int) -> list[_Candidate]:
+def _best(candidates: Sequence[_Candidate], keyframes: Sequence[int]) -> list[_Candidate]:
     """Return a keyframe's candidates of the largest predicted overlap, in this order.
 
-    Where not all keyframes can have ``MOST_TRIED``, targets that follow each other in time count as one.
+    Where not all keyframes can have ``MOST_TRIED``, two targets next to each other in time count as one.
     """
     ordered = sorted(candidates, key=lambda candidate: -candidate.predicted)
-    most = min(MOST_TRIED, max(LEAST_TRIED, MOST_LOOPS // keyframes))
+    most = min(MOST_TRIED, max(LEAST_TRIED, MOST_LOOPS // len(keyframes)))
     if most == MOST_TRIED or len(ordered) <= most:
         return ordered[:MOST_TRIED]
-    ranks = {one.target: rank for rank, one in enumerate(sorted(candidates, key=lambda one: one.target))}
+    places = {number: place for place, number in enumerate(keyframes)}
     chosen: list[_Candidate] = []
     for one in ordered:
-        if len(chosen) < most and all(abs(ranks[one.target] - ranks[own.target]) > 1 for own in chosen):
+        if len(chosen) < most and all(abs(places[one.target] - places[own.target]) > 1 for own in chosen):
             chosen.append(one)
     return chosen
 
@@ -269,16 +270,6 @@ def _nearest(T: FloatArray, later: int) -> IntArray:
     near = np.flatnonzero((shift_m <= NEAR_M) & (turn_deg <= NEAR_DEG))
     apart = shift_m[near] / NEAR_M + turn_deg[near] / NEAR_DEG
     return np.sort(near[np.argsort(apart, kind="stable")[:MOST_COMPARED]])
-
-
-def _closed(candidate: _Candidate, clouds: Mapping[int, OrganisedCloud]) -> Link | None:
-    """Register two keyframes from their poses; None if they do not show the same place."""
-    source, target = candidate.source, candidate.target
-    config = replace(TRACKING, gate_m=LOOP_GATE_M)
-    found = registered(clouds[source], clouds[target], config, candidate.T_target_source)
-    if found is None or not found.holds:
-        return None
-    return link(source, target, found, loop=True)
 
 
 def _reconciled(
@@ -299,9 +290,7 @@ def _reconciled(
         information = one.information if one.loop else one.information / drift**2
         ends = places[one.source], places[one.target]
         strength = 1.0 if one.loop else OF_TRACKING
-        edges.append(
-            PoseEdge(*ends, one.T_target_source, information, strength, (one.source, one.target) != wrong)
-        )
+        edges.append(PoseEdge(*ends, one.T_target_source, information, strength, one.pair != wrong))
     points_m = [clouds[k].points_m[:: max(1, len(clouds[k]) // GRAPH_POINTS)] for k in numbers]
     graph = solve_pose_graph(points_m, edges)
     solved = dict(zip(numbers, graph.T_reference_node, strict=True))
@@ -311,14 +300,12 @@ def _reconciled(
 
 def poses_by_tracking(track: Track) -> tuple[FloatArray | None, ...]:
     """Return (4, 4) poses of all frames along the links of tracking alone, as in ``Trajectory``."""
-    return tuple(_frame_poses(track, _chain(track)))
+    return _frame_poses(track, _chain(track))
 
 
-def _frame_poses(track: Track, poses: Mapping[int, FloatArray]) -> Iterator[FloatArray | None]:
-    """Yield the pose of every frame, which hangs on its keyframe."""
-    for frame in track.frames:
-        yield (
-            None
-            if frame is None or frame.keyframe not in poses
-            else (poses[frame.keyframe] @ frame.T_keyframe_frame)
-        )
+def _frame_poses(track: Track, poses: Mapping[int, FloatArray]) -> tuple[FloatArray | None, ...]:
+    """Return the pose of every frame, which hangs on its keyframe."""
+    return tuple(
+        None if one is None or one.keyframe not in poses else poses[one.keyframe] @ one.T_keyframe_frame
+        for one in track.frames
+    )

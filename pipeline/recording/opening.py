@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,7 +17,7 @@ from pipeline.config import MOST_FRAMES
 from pipeline.importing.recorded import DepthView
 from pipeline.io.depth_to_color import register_depth
 from pipeline.kernels.geometry import inverse, pixel_rays, project
-from pipeline.recording.recording import Recording
+from pipeline.recording.recording import Recording, spread
 from pipeline.recording.still import Vote, inverse_depth, voted
 from pipeline.recording.tracking import REPORTED, read_ahead
 from pipeline.recording.walk import LEAST_FRAMES, iterate_walk
@@ -31,6 +33,9 @@ in standard deviations of one pixel: the change of a square's mean has a sixth o
 AT_REST = 0.5
 """Least share of the squares that do not change: with Kinect's noise, walks have .4 and less after three
 frames, and the frames of a real SR300 .9 until it begins to move."""
+SMALL_PX, TEXTURED, ALIKE = 160, 4.0, 0.7
+"""Width at which photographs are compared; least standard deviation of a square with texture, grey levels;
+least correlation of a square that does not change. A slide without a turn shows in the photographs only."""
 CLIPPED_SD = 6.0
 """A pixel counts for no larger change."""
 MOVED_M = 0.1
@@ -60,17 +65,50 @@ def iterate_recording(recording: Recording, frames: int = MOST_FRAMES) -> Genera
 
 
 def stands(recording: Recording) -> bool:
-    """Return whether the camera is at rest, by depth: in every compared frame most squares of the first one
-    keep their distance. Frames without depth are not compared.
+    """Return whether the camera is at rest: in every compared frame most squares of the first one keep their
+    distance, and those of its photograph their texture. Frames without depth are not compared.
     """
     count = len(recording.times_s)
     if count < LEAST_FRAMES or _walks_by_poses(recording):
         return False
-    numbers = np.unique(np.linspace(0, count - 1, COMPARED + 1).round().astype(int))
-    views = (recording.view(int(k)) for k in numbers)
-    first = next((view for view in views if view.depth.valid.any()), None)
-    shares = [] if first is None else [unchanged_share(first, v) for v in views if v.depth.valid.any()]
-    return bool(shares) and min(shares) >= AT_REST
+    compared = (recording.view(k) for k in spread(range(count), COMPARED + 1))
+    views = [view for view in compared if view.depth.valid.any()]
+    shares = [unchanged_share(views[0], other) for other in views[1:]]
+    return bool(shares) and min(shares) >= AT_REST and _same_photographs(recording)
+
+
+def _same_photographs(recording: Recording) -> bool:
+    """Return whether a few photographs show the same; those that cannot be read are not compared."""
+    small = []
+    for number in spread(range(len(recording.times_s)), PHOTOGRAPHS + 1):
+        with suppress(InputError):
+            small.append(_small(recording.frame(number).rgb))
+    return all(alike_share(small[0], other) >= AT_REST for other in small[1:])
+
+
+def _small(rgb: ByteArray) -> FloatArray:
+    """Return an (h, w) grey image ``SMALL_PX`` wide, in which noise is averaged."""
+    height_px = round(rgb.shape[0] * SMALL_PX / rgb.shape[1])
+    grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY).astype(np.float32)
+    small: FloatArray = cv2.resize(grey, (SMALL_PX, height_px), interpolation=cv2.INTER_AREA)
+    return small
+
+
+def alike_share(first: FloatArray, other: FloatArray) -> float:
+    """Return the share of the first grey image's textured squares that correlate with the other's.
+
+    A change of exposure does not matter. It is 1 without texture, and 0 for other sizes.
+    """
+    if first.shape != other.shape:
+        return 0.0
+    one, two = (_squares(image) for image in (first, other))
+    one, two = (squares - squares.mean(axis=1, keepdims=True) for squares in (one, two))
+    textured = one.std(axis=1) >= TEXTURED
+    if not textured.any():
+        return 1.0
+    lengths = np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1)
+    correlation = np.einsum("sp,sp->s", one, two) / np.maximum(lengths, 1e-6)
+    return float(np.mean(correlation[textured] >= ALIKE))
 
 
 def _walks_by_poses(recording: Recording) -> bool:
@@ -104,32 +142,62 @@ def _squares(image: NDArray[Any]) -> NDArray[Any]:
 
 
 def iterate_still(recording: Recording, frames: int) -> Generator[Progress, None, RgbdFrame]:
-    """Average the first frames of a camera that stands; colours are the median of three of them.
+    """Average the first frames with depth of a camera that stands; colours are the median of three of them.
 
     Raises:
-        InputError: a photograph cannot be read, or nothing keeps its depth.
+        InputError: no frame has depth, no photograph can be read, or nothing keeps its depth.
     """
     available = min(len(recording.times_s), MOST_FRAMES)
-    count = min(frames, available)
-    view = recording.view(0)
-    stack = np.zeros((count, *view.depth.z_m.shape), np.float32)
-    for k, view in read_ahead(recording, range(count)):
-        if k % REPORTED == 0:
-            yield Progress(f"reading frame {k} of {count}", k / count)
-        if view.depth.z_m.shape == stack.shape[1:]:
-            stack[k] = inverse_depth(view.depth)
-    yield Progress(f"averaging {count} frames", 0.9)
+    numbers, stack = yield from _iterate_stack(recording, min(frames, available))
+    yield Progress(f"averaging {len(numbers)} frames", 0.9)
+    view = recording.view(numbers[0])
     vote = voted(stack, view.noise)
     if not vote.depth.valid.any():
         raise InputError(f"No pixel of {recording.name} keeps its depth; try recording.frames=1")
-    numbers = np.unique(np.linspace(0, count - 1, PHOTOGRAPHS).round().astype(int))
-    photographs = [recording.frame(int(k)) for k in numbers]
+    photographs, damaged = _photographs(recording, numbers)
     depth, sd_m = _on_color(vote, view, photographs[0])
     shares = float(vote.moving.mean()), float(vote.flickering.mean())
-    averaging = Averaging(sd_m, count, available, *shares)
-    notes = (*recording.notes, _sentence(averaging, len(recording.times_s)), *photographs[0].notes)
+    averaging = Averaging(sd_m, len(numbers), available, *shares)
+    sentence = _sentence(averaging, len(recording.times_s))
+    notes = (*recording.notes, sentence, *photographs[0].notes, *damaged)
     rgb = _median_color([frame.rgb for frame in photographs])
     return replace(photographs[0], name=NAME, rgb=rgb, depth=depth, averaging=averaging, notes=notes)
+
+
+def _iterate_stack(
+    recording: Recording, count: int
+) -> Generator[Progress, None, tuple[list[int], FloatArray]]:
+    """Read the first ``count`` frames with depth; returns their N numbers and (N, H, W) 1/z."""
+    stack = np.zeros((count, *recording.view(0).depth.z_m.shape), np.float32)
+    numbers: list[int] = []
+    for k, view in read_ahead(recording, range(len(recording.times_s))):
+        if k % REPORTED == 0:
+            yield Progress(f"reading frame {k}", 0.9 * len(numbers) / count)
+        if view.depth.valid.any() and view.depth.z_m.shape == stack.shape[1:]:
+            stack[len(numbers)] = inverse_depth(view.depth)
+            numbers.append(k)
+        if len(numbers) == count:
+            break
+    if not numbers:
+        raise InputError(f"No frame of {recording.name} has depth; check its depth images and scale")
+    return numbers, stack[: len(numbers)]
+
+
+def _photographs(recording: Recording, numbers: Sequence[int]) -> tuple[list[RgbdFrame], list[str]]:
+    """Read ``PHOTOGRAPHS`` of some frames, evenly chosen; returns a note on each that cannot be read.
+
+    Raises:
+        InputError: none of them can be read.
+    """
+    found, notes = list[RgbdFrame](), list[str]()
+    for number in spread(numbers, PHOTOGRAPHS):
+        try:
+            found.append(recording.frame(number))
+        except InputError as error:
+            notes.append(f"{error}: frame {number} gives no colours")
+    if not found:
+        raise InputError(notes[0])
+    return found, notes
 
 
 def _median_color(photographs: list[ByteArray]) -> ByteArray:

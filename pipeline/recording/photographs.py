@@ -10,8 +10,7 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.kernels.geometry import apply, inverse, project
-from pipeline.recording.places import spread
-from pipeline.recording.recording import Recording
+from pipeline.recording.recording import Recording, spread
 from pipeline.types import ByteArray, FloatArray, PointCloud, RgbdFrame
 
 MOST_COLORING = 96

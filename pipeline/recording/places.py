@@ -13,15 +13,14 @@ from packetmesh.progress import Progress
 from pipeline.acquisition import back_project
 from pipeline.config import RegistrationConfig
 from pipeline.kernels.geometry import inverse, scaled
-from pipeline.recording.recording import Recording
-from pipeline.recording.tracking import TRACKING, Registered, Track, link, registered
+from pipeline.recording.recording import Recording, spread
+from pipeline.recording.tracking import Track, loop_link
 from pipeline.registration.colour import LiftedFeatures, colour_start, lifted_features, match_score
 from pipeline.registration.finding.evidence import Judge
 from pipeline.registration.finding.search import search
 from pipeline.registration.finding.starts import Way, by_colour, by_surfaces
 from pipeline.registration.finding.surface import Surface
 from pipeline.registration.graph.loops import Groups
-from pipeline.registration.organised import OrganisedCloud
 from pipeline.types import FloatArray, Link, RgbdFrame
 
 COMPARED = 8
@@ -30,8 +29,8 @@ TRIED = 3
 """Most pairs of keyframes that are registered to join two parts, by colour and then by their surfaces."""
 MOST_PARTS = 12
 """Most parts, the largest first, that are looked for in the largest one."""
-GATE_M = 0.1
-"""Gate of the registration from the pose that was found."""
+FOUND_GATE_M = 0.1
+"""Gate of the registration from a pose that was found."""
 WIDTH_PX = 320
 """Approximate width of the images in which keyframes are recognised."""
 
@@ -138,21 +137,6 @@ def shrunk(frame: RgbdFrame) -> RgbdFrame:
     return replace(frame, rgb=np.asarray(small, np.uint8), depth=depth, intrinsics=camera)
 
 
-def registered_from(
-    T_target_source: FloatArray | None, source: OrganisedCloud, target: OrganisedCloud
-) -> Registered | None:
-    """Register two keyframes from a pose that was found; None without a pose, or if it does not hold."""
-    if T_target_source is None:
-        return None
-    found = registered(source, target, replace(TRACKING, gate_m=GATE_M), T_target_source)
-    return found if found is not None and found.holds else None
-
-
-def spread(numbers: Sequence[int], most: int) -> list[int]:
-    """Return at most ``most`` of some numbers, evenly."""
-    return list(numbers[:: max(1, -(-len(numbers) // most))])
-
-
 def _join(
     places: Places, track: Track, main: Sequence[int], part: Sequence[int], number: int, parts: int
 ) -> Generator[Progress, None, Link | None]:
@@ -169,7 +153,7 @@ def _join(
         done = (number + k / (len(ways) * len(best))) / parts
         yield Progress(f"looking for part {number + 1} of {parts}", done)
         T = places.pose(source, target, way)
-        found = registered_from(T, track.clouds[source], track.clouds[target])
+        found = loop_link(track.clouds, source, target, T, FOUND_GATE_M)
         if found is not None:
-            return link(source, target, found, loop=True)
+            return found
     return None

@@ -1,8 +1,11 @@
-"""Protocol of a recording: frames of one camera in order of time."""
+"""Protocol of a recording: frames of one camera in order of time; and the even choice of some of them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
+
+import numpy as np
 
 from pipeline.importing.recorded import DepthView
 from pipeline.types import FloatArray, RgbdFrame
@@ -38,3 +41,9 @@ class Recording(Protocol):
     def frame(self, index: int) -> RgbdFrame:
         """Read colour and depth of a frame on one pixel grid."""
         ...
+
+
+def spread(numbers: Sequence[int], most: int) -> list[int]:
+    """Return at most ``most`` of some numbers, two or more, evenly: with the first and the last."""
+    places = np.linspace(0, len(numbers) - 1, most).round().astype(int)
+    return [numbers[place] for place in np.unique(places)] if numbers else []

@@ -6,16 +6,10 @@ from collections.abc import Generator, Mapping
 
 from packetmesh.progress import Progress
 from pipeline.kernels.geometry import inverse
-from pipeline.recording.places import Places, registered_from, spread
-from pipeline.recording.tracking import (
-    LEAST_AGREEMENT,
-    LEAST_OVERLAP,
-    TRACKING,
-    WITHIN,
-    link,
-    registered,
-)
-from pipeline.registration.organised import OrganisedCloud, shared_shares
+from pipeline.recording.places import FOUND_GATE_M, Places
+from pipeline.recording.recording import spread
+from pipeline.recording.tracking import GATE_M, LEAST_AGREEMENT, agreement_at, loop_link
+from pipeline.registration.organised import OrganisedCloud
 from pipeline.types import FloatArray, Link
 
 COMPARED = 32
@@ -49,9 +43,9 @@ def iterate_revisits(
     for number, (source, target) in enumerate(pairs):
         share = number / len(pairs)
         yield Progress(f"comparing places {number + 1} of {len(pairs)}", 0.5 + 0.5 * share)
-        new = _closed(places, poses, clouds, source, target)
+        new = _confirmed(places, poses, clouds, source, target)
         for one in new:
-            found.setdefault((one.source, one.target), one)
+            found.setdefault(one.pair, one)
         count += bool(new)
         if count == ENOUGH:
             break
@@ -85,11 +79,10 @@ def _together(
 ) -> bool:
     """Return whether two keyframes show one place at their poses, so that nothing is to be found."""
     T = inverse(poses[target]) @ poses[source]
-    overlap, agreeing = shared_shares(clouds[source], clouds[target], T, WITHIN)
-    return overlap >= LEAST_OVERLAP and agreeing >= LEAST_AGREEMENT
+    return agreement_at(clouds[source], clouds[target], T) >= LEAST_AGREEMENT
 
 
-def _closed(
+def _confirmed(
     places: Places,
     poses: Mapping[int, FloatArray],
     clouds: Mapping[int, OrganisedCloud],
@@ -97,22 +90,19 @@ def _closed(
     target: int,
 ) -> list[Link]:
     """Return the registration of two keyframes and those of their neighbours; none if it is in doubt."""
-    if registered_from(places.start(source, target), clouds[source], clouds[target]) is None:
-        return []
-    found = registered_from(places.pose(source, target), clouds[source], clouds[target])
+    if loop_link(clouds, source, target, places.start(source, target), FOUND_GATE_M) is None:
+        return []  # the verdict takes longer
+    found = loop_link(clouds, source, target, places.pose(source, target), FOUND_GATE_M)
     if found is None:
         return []
+    correction = poses[target] @ found.T_target_source @ inverse(poses[source])
     confirming = []
-    order = list(poses)
-    for pair in _beside(order, source, target):
-        T_source, T_target = (
-            inverse(poses[own]) @ poses[at] for own, at in zip((source, target), pair, strict=True)
-        )
-        T = inverse(T_target) @ found.T_target_source @ T_source
-        one = registered(clouds[pair[0]], clouds[pair[1]], TRACKING, T)
-        if one is not None and one.holds:
-            confirming.append(link(*pair, one, loop=True))
-    return [link(source, target, found, loop=True), *confirming] if confirming else []
+    for later, earlier in _beside(list(poses), source, target):
+        T = inverse(poses[earlier]) @ correction @ poses[later]
+        one = loop_link(clouds, later, earlier, T, GATE_M)
+        if one is not None:
+            confirming.append(one)
+    return [found, *confirming] if confirming else []
 
 
 def _beside(order: list[int], source: int, target: int) -> list[tuple[int, int]]:

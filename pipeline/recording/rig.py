@@ -15,6 +15,7 @@ from pipeline.io.poses import read_pose_noted
 from pipeline.io.rigs import is_pair, is_rig, load_node, nodes_in
 from pipeline.io.truth import read_truth
 from pipeline.recording.opening import iterate_still, stands
+from pipeline.recording.walk import LEAST_FRAMES
 from pipeline.types import AnyPath, RgbdFrame, Rig
 
 
@@ -61,11 +62,13 @@ def iterate_recorded_rig(
 def _iterate_node(node: Path, frames: int, depth_scale: float | None) -> Generator[Progress, None, RgbdFrame]:
     """Average the recording of a node, and read its pose."""
     files = node_files(node)
-    for name in sorted(files.keys() - {"intrinsics", "pose"}):
-        raise InputError(f"{node} has {FILES[name]}, which recordings do not use; try to move it away")
-    steps = iterate_opening(node, depth_scale)
+    unused = sorted(files.keys() - {"intrinsics", "pose"})
+    if unused:
+        raise InputError(f"{node} has {FILES[unused[0]]}, which recordings do not use; try to move it away")
+    intrinsics = None if is_recording(node) else files.get("intrinsics")
+    steps = iterate_opening(node, depth_scale, intrinsics)
     recording = yield from part(steps, "opening", 0.0, 0.2, detail=True)
-    if not stands(recording):
+    if len(recording.times_s) >= LEAST_FRAMES and not stands(recording):
         raise InputError(
             f"The camera of {node} does not stand still, as a rig's cameras must; for it alone, try "
             f"`packetmesh reconstruct --recording {node}`"

@@ -47,8 +47,6 @@ class Vote:
     """(H, W) True where the spread of three and more exceeds ``WITHIN_SD``, and next to regions of such."""
     flickering: BoolArray
     """(H, W) True for pixels that less than ``FLICKERS_BELOW`` of the frames measured."""
-    frames: int
-    """Number N of depth images."""
 
 
 def inverse_depth(depth: DepthMap) -> FloatArray:
@@ -79,7 +77,7 @@ def voted(inverse: FloatArray, noise: DepthNoise) -> Vote:
     known = (counts > 0) & ~moving & ~dropped
     z_m = np.where(known, 1.0 / np.where(known, mean, 1.0), np.nan).astype(np.float32)
     sd_m = (np.sqrt(variance) * z_m**2).astype(np.float32)
-    return Vote(DepthMap(z_m), sd_m, np.where(known, counts, 0), moving, flickering, len(inverse))
+    return Vote(DepthMap(z_m), sd_m, np.where(known, counts, 0), moving, flickering)
 
 
 def _with_neighbours(spread: BoolArray) -> BoolArray:

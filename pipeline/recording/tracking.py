@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -114,7 +114,7 @@ def iterate_tracking(
 
     The start is the motion from the frame before, or that of given poses. A frame that does not register to
     its keyframe is tried against the last ones; until one fits, frames have no pose. If none fits for
-    ``PATIENCE`` frames, a new part begins. Only given poses join it to the others.
+    ``PATIENCE`` frames, a new part begins. Of tracking, only given poses join it to the others.
 
     Args:
         recording: the frames.
@@ -206,7 +206,7 @@ class _Tracker:
             "keyframe_of": np.array([one.keyframe for one in frames]),
             "T_keyframe_frame": np.array([one.T_keyframe_frame for one in frames]).reshape(-1, 4, 4),
             "keyframes": np.array(list(self._clouds), int),
-            "pairs": np.array([(one.source, one.target) for one in self._links], int).reshape(-1, 2),
+            "pairs": np.array([one.pair for one in self._links], int).reshape(-1, 2),
             "T_target_source": np.array([one.T_target_source for one in self._links]).reshape(-1, 4, 4),
             "information": np.array([one.information for one in self._links]).reshape(-1, 6, 6),
             "shares": np.array([(one.overlap_share, one.agreeing_share) for one in self._links]).reshape(
@@ -217,7 +217,10 @@ class _Tracker:
         }
 
     def iterate_restoring(self, recording: Recording, state: State) -> Generator[Progress, None, None]:
-        """Set a state that ``state`` returned; keyframes are read again, and frames without a pose."""
+        """Set a state that ``state`` returned; keyframes are read again.
+
+        So are frames without a pose, for the recording's note on images that cannot be read.
+        """
         poses = zip(state["keyframe_of"].tolist(), state["T_keyframe_frame"], strict=True)
         self._frames = [None if keyframe < 0 else Tracked(keyframe, T) for keyframe, T in poses]
         keyframes = set(state["keyframes"].tolist())
@@ -328,6 +331,27 @@ def steadied(T_target_source: FloatArray, information: FloatArray, T_predicted: 
     step = np.linalg.solve(information + prior, prior @ apart)
     moved: FloatArray = T_target_source @ rigid(rotation_exp(step[:3]), step[3:])
     return moved
+
+
+def agreement_at(source: OrganisedCloud, target: OrganisedCloud, T_target_source: FloatArray) -> float:
+    """Return the share of what both measured that agrees at a pose; 0 if that is too little to say."""
+    overlap, agreeing = shared_shares(source, target, T_target_source, WITHIN)
+    return agreeing if overlap >= LEAST_OVERLAP else 0.0
+
+
+def loop_link(
+    clouds: Mapping[int, OrganisedCloud],
+    source: int,
+    target: int,
+    T_target_source: FloatArray | None,
+    gate_m: float,
+) -> Link | None:
+    """Register two keyframes from a pose; None without one, or if they do not show the same place."""
+    if T_target_source is None:
+        return None
+    config = replace(TRACKING, gate_m=gate_m)
+    found = registered(clouds[source], clouds[target], config, T_target_source)
+    return link(source, target, found, loop=True) if found is not None and found.holds else None
 
 
 def link(source: int, target: int, found: Registered, loop: bool = False) -> Link:

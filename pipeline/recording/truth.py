@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from pipeline.importing.tum import poses_at
-from pipeline.recording.errors import ate_m
+from pipeline.recording.errors import path_note
 from pipeline.types import Rig
 
 
@@ -24,10 +22,7 @@ def with_true_path(rig: Rig, file: Path) -> Rig:
     """
     if rig.walk is None:
         return rig
-    true = poses_at(file, np.asarray(rig.walk.times_s))
-    poses = [T if k in true else None for k, T in enumerate(rig.walk.T_world_camera)]
-    apart_m = ate_m(poses, [true.get(k, np.eye(4)) for k in range(len(poses))])
-    if np.isnan(apart_m):
-        return rig
-    note = f"The path differs from the true one by {100.0 * apart_m:.1f} cm (RMSE, aligned)"
-    return replace(rig, walk=replace(rig.walk, notes=(*rig.walk.notes, note)))
+    walk = rig.walk
+    true = poses_at(file, walk.times_s)
+    notes = path_note(walk.T_world_camera, [true.get(k) for k in range(len(walk.times_s))], "the true one")
+    return replace(rig, walk=replace(walk, notes=(*walk.notes, *notes)))

@@ -35,6 +35,7 @@ STEEPEST = 4.0
 _SIDE, _VOXELS, _PADDED = 8, 512, 11
 """Side and size of a block; side with the voxels for its crossings and slopes: 1 before, 2 after."""
 _MOST = 65535
+"""Largest number of observations and of an image."""
 _FIRST_BLOCKS, _RANGE, _NEAR_PX, _ONE = 1024, 1 << 20, 3, np.float32(1.0)
 """Room for blocks at first; bound of their coordinates, 21 bits each; pixels for the slope of the depth."""
 

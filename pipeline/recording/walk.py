@@ -12,12 +12,12 @@ from packetmesh.progress import Progress, part
 from pipeline.importing.upright import upright
 from pipeline.kernels.geometry import LEVEL_POSE, inverse
 from pipeline.recording.checkpoint import checkpoint_of
-from pipeline.recording.errors import ate_m
+from pipeline.recording.errors import path_note
 from pipeline.recording.given import checked_poses
 from pipeline.recording.loops import Trajectory, iterate_loops, poses_by_tracking
 from pipeline.recording.photographs import iterate_photographs
-from pipeline.recording.places import Places, iterate_joins, spread
-from pipeline.recording.recording import Recording
+from pipeline.recording.places import Places, iterate_joins
+from pipeline.recording.recording import Recording, spread
 from pipeline.recording.tracking import REPORTED, WITHIN, Track, iterate_tracking, read_ahead
 from pipeline.recording.volume import Volume, voxel_for
 from pipeline.registration.organised import shared_shares
@@ -67,7 +67,8 @@ def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
     views = yield from part(iterate_views(trajectory, track), "views", 0.93, 0.95, detail=True)
     reading = iterate_photographs(recording, poses, views, keyframes, points)
     seen = yield from part(reading, "photographs", 0.95, 1.0, detail=True)
-    corrected = _corrected(poses, given.T_world_camera)
+    given_poses = given.T_world_camera or [None] * len(poses)
+    corrected = path_note(poses, given_poses, "that of the given poses")
     notes = (*recording.notes, *given.notes, *corrected, *turned, *seen.notes)
     if checkpoint is not None:
         checkpoint.delete()
@@ -99,18 +100,6 @@ def iterate_map(
     least = LEAST_OBSERVATIONS if len(numbers) >= FEW_FRAMES else 1
     points, first = volume.dated_points(least)
     return points, np.array(numbers)[first], voxel_m
-
-
-def _corrected(
-    T_world_camera: Sequence[FloatArray | None], given: Sequence[FloatArray | None] | None
-) -> tuple[str, ...]:
-    """Return a sentence on how far the camera's path is from that of the given poses."""
-    if given is None:
-        return ()
-    apart_m = ate_m(T_world_camera, given)
-    if np.isnan(apart_m):
-        return ()
-    return (f"The path differs from that of the given poses by {100.0 * apart_m:.1f} cm (RMSE, aligned)",)
 
 
 def voxel_edge_m(recording: Recording, numbers: Sequence[int]) -> float:

@@ -15,6 +15,7 @@ from pipeline.recording.checkpoint import Checkpoint, cache_folder, checkpoint_o
 from pipeline.recording.tracking import Track, iterate_tracking
 from pipeline.recording.walk import iterate_walk
 from tests.pipeline.recording.rendered import around, in_the_living_room, moved
+from tests.pipeline.recording.standing import wall, write_tum
 
 
 @pytest.fixture(autouse=True)
@@ -113,6 +114,14 @@ def test_the_state_belongs_to_these_files_and_settings(walk, tmp_path):
     os.utime(image, ns=(1, 1))
     assert own != checkpoint_of(open_recording(folder), None)
     assert checkpoint_of(in_the_living_room(around(3)), None) is None
+
+
+def test_the_depth_scale_counts_although_the_first_image_is_empty(tmp_path):
+    depths_m = wall(4)
+    depths_m[0][:] = np.nan
+    folder = write_tum(tmp_path / "walk", depths_m)
+    one, other = (checkpoint_of(open_recording(folder, scale), None) for scale in (5000.0, 1234.0))
+    assert one != other
 
 
 def test_a_finished_walk_leaves_no_state(walk, cache):

@@ -210,7 +210,8 @@ def test_each_pair_is_tried_once_if_it_is_near_and_looks_the_same_way(ring, monk
         assert config == replace(TRACKING, gate_m=LOOP_GATE_M)
         tried.append((places[id(source)], places[id(target)], start))
 
-    for name, value in (("registered", counted), ("MOST_TRIED", 2), ("NEAR_M", 0.5), ("NEAR_DEG", 28.0)):
+    monkeypatch.setattr("pipeline.recording.tracking.registered", counted)
+    for name, value in (("MOST_TRIED", 2), ("NEAR_M", 0.5), ("NEAR_DEG", 28.0)):
         monkeypatch.setattr(f"pipeline.recording.loops.{name}", value)
     closed(track)
     poses, pairs, refused = along(track), [pair[:2] for pair in tried], [0, 0, 0]
@@ -234,6 +235,24 @@ def test_each_pair_is_tried_once_if_it_is_near_and_looks_the_same_way(ring, monk
     assert len(set(pairs)) == len(pairs) < len(shares)
 
 
+def test_a_rejected_loop_that_is_found_again_counts_once(ring, monkeypatch):
+    """Two that agree with each other would outvote a link of tracking."""
+    track, truth = ring
+    right = chain(list(track.clouds.values()), truth, np.eye(4))
+    T = inverse(truth[0]) @ truth[2] @ moved([0, 1, 0], 0.0, [0.2, 0, 0])
+    wrong, tried = Link(20, 0, T, INFORMATION, 0.5, 0.95, loop=True), []
+
+    def found(clouds, source, target, T_target_source, gate_m):
+        tried.append((source, target))
+        return wrong if (source, target) == wrong.pair else None
+
+    monkeypatch.setattr("pipeline.recording.loops.loop_link", found)
+    trajectory = closed(right)
+    assert tried.count(wrong.pair) == 2
+    assert [one.used for one in trajectory.links] == [*[True] * 11, False]
+    assert errors(list(trajectory.keyframes.values()), truth)[0].max() < 1e-6
+
+
 def test_a_tracked_walk_closes(ring):
     """Tracking and loops together, from the images alone."""
     walk = in_the_living_room(around(24), noise_m=0.002)
@@ -248,10 +267,16 @@ def test_a_tracked_walk_closes(ring):
 def test_of_many_keyframes_fewer_loops_are_tried_and_from_different_times():
     """Targets 0, 10, 20, ... by falling overlap: of 600 keyframes each has three, no two in a row."""
     own = [_Candidate(900, 10 * k, np.eye(4), 0.9 - 0.01 * k) for k in range(10)]
-    assert [one.target for one in _best(own[::-1], 100)] == [10 * k for k in range(8)]
-    assert [one.target for one in _best(own[::-1], 600)] == [0, 20, 40]
-    assert [one.target for one in _best(own[::-1], 200)] == [0, 20, 40, 60, 80]
-    assert [one.target for one in _best(own[:2], 600)] == [0, 10]
+    assert [one.target for one in _best(own[::-1], range(0, 1000, 10))] == [10 * k for k in range(8)]
+    assert [one.target for one in _best(own[::-1], range(0, 6000, 10))] == [0, 20, 40]
+    assert [one.target for one in _best(own[::-1], range(0, 2000, 10))] == [0, 20, 40, 60, 80]
+    assert [one.target for one in _best(own[:2], range(0, 6000, 10))] == [0, 10]
+
+
+def test_of_many_keyframes_targets_of_different_times_are_all_tried():
+    """Two targets without a keyframe between them that is a candidate are still of different times."""
+    own = [_Candidate(900, target, np.eye(4), 0.9) for target in (0, 300, 310, 600)]
+    assert [one.target for one in _best(own, range(0, 6000, 10))] == [0, 300, 600]
 
 
 def test_the_nearest_earlier_keyframes_are_compared():

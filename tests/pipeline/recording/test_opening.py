@@ -2,17 +2,25 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.acquisition import back_project
+from pipeline.importing.recorded import open_recording
 from pipeline.kernels.geometry import inverse
-from pipeline.recording.opening import iterate_recording, iterate_still, stands, unchanged_share
+from pipeline.recording.opening import (
+    alike_share,
+    iterate_recording,
+    iterate_still,
+    stands,
+    unchanged_share,
+)
 from pipeline.types import CameraIntrinsics, DepthMap
 from tests.pipeline.recording.rendered import around, in_the_living_room, moved
-from tests.pipeline.recording.standing import LAW, Frames, pictures, standing, wall
+from tests.pipeline.recording.standing import LAW, Frames, pictures, standing, wall, write_tum
 
 
 def poses_at_rest(frames):
@@ -46,6 +54,37 @@ def test_someone_who_walks_by_does_not_move_the_camera():
     for k in range(3, 9):
         recording.depths_m[k][:, 10 * k : 10 * k + 50] = 1.0
     assert stands(recording)
+
+
+def texture(seed=0):
+    """Smooth noise, wider than a picture."""
+    noise = np.random.default_rng(seed).uniform(0.0, 255.0, (120, 300)).astype(np.float32)
+    return np.repeat(cv2.GaussianBlur(noise, (0, 0), 2.0)[..., None], 3, axis=2) * 2.0 - 127.0
+
+
+def with_pictures(pictures):
+    return Frames(wall(len(pictures)), [np.clip(one, 0.0, 255.0).astype(np.uint8) for one in pictures])
+
+
+def test_a_camera_that_slides_along_a_wall_is_seen_by_its_photographs():
+    image = texture()
+    assert stands(with_pictures([image[:, :160]] * 12))
+    assert not stands(with_pictures([image[:, 3 * k : 160 + 3 * k] for k in range(12)]))
+
+
+def test_a_lamp_or_another_exposure_does_not_move_the_camera():
+    image = texture()[:, :160]
+    assert stands(with_pictures([60.0 + (0.4 + 0.03 * k) * (image - 60.0) for k in range(12)]))
+    covered = [image.copy() for _ in range(12)]
+    for k, one in enumerate(covered):
+        one[:, 8 * k : 8 * k + 40] = texture(1)[:, :40]
+    assert stands(with_pictures(covered))
+
+
+def test_photographs_of_a_bare_wall_decide_nothing():
+    assert alike_share(np.full((120, 160), 100.0), np.full((120, 160), 50.0)) == 1.0
+    assert alike_share(texture()[:, :160, 0], texture(1)[:, :160, 0]) < 0.1
+    assert alike_share(texture()[:, :160, 0], texture()[:, :80, 0]) == 0.0
 
 
 def test_a_scene_that_moves_as_a_whole_is_a_walk():
@@ -154,3 +193,31 @@ def test_a_recording_in_which_everything_moves_gives_a_sentence():
     recording.depths_m = [depth_m * (1.0 + 0.1 * (k % 4)) for k, depth_m in enumerate(recording.depths_m)]
     with pytest.raises(InputError, match=r"keeps its depth; try recording\.frames=1"):
         drain(iterate_still(recording, 12))
+
+
+def test_frames_without_depth_or_colours_are_not_used(tmp_path):
+    """The first two frames have no depth; of the three photographs chosen then the last one is damaged."""
+    depths_m = wall(8)
+    depths_m[0][:] = depths_m[1][:] = np.nan
+    write_tum(tmp_path / "still", depths_m)
+    image = tmp_path / "still" / "rgb" / "0007.png"
+    image.write_bytes(image.read_bytes()[:60])
+    frame = drain(iterate_still(open_recording(tmp_path / "still"), 64))
+    assert (frame.averaging.frames, frame.averaging.available) == (6, 8)
+    assert frame.averaging.flickering_share == 0.0
+    assert any("6 of 8 frames were averaged" in note for note in frame.notes)
+    assert [note.endswith("frame 7 gives no colours") for note in frame.notes][-1]
+    assert drain(iterate_still(open_recording(tmp_path / "still"), 1)).depth.valid.any()
+
+
+def test_without_any_photograph_or_depth_there_is_a_sentence(tmp_path):
+    write_tum(tmp_path / "still", wall(4))
+    recording = open_recording(tmp_path / "still")
+    for image in (tmp_path / "still" / "rgb").iterdir():
+        image.write_bytes(b"damaged")
+    with pytest.raises(InputError, match=r"0000\.png is neither .*frame 0 gives no colours"):
+        drain(iterate_still(recording, 4))
+    blind = standing(4)
+    blind.depths_m = [np.full_like(depth_m, np.nan) for depth_m in blind.depths_m]
+    with pytest.raises(InputError, match=r"No frame of frames has depth"):
+        drain(iterate_still(blind, 4))

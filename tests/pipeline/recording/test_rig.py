@@ -1,5 +1,6 @@
 """A rig whose nodes hold recordings of cameras that stand."""
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from packetmesh.settings import with_settings
 from pipeline.config import PipelineConfig, RecordingConfig
+from pipeline.io.intrinsics import write_intrinsics
 from pipeline.io.poses import write_pose
 from pipeline.io.rigs import save_rig
 from pipeline.kernels.geometry import look_at
@@ -17,7 +19,7 @@ from pipeline.recording.rig import holds_recordings, iterate_recorded_rig
 from pipeline.sources import Calibrated, Demo, Recorded, RigFolder
 from pipeline.spec import Spec, key
 from pipeline.stages import open_rig
-from pipeline.types import Rig
+from pipeline.types import CameraIntrinsics, Rig
 from tests.pipeline.recording.standing import standing, wall, write_tum
 
 POSE = look_at([1.0, 2.0, 1.5], [0.0, 0.0, 1.0])
@@ -71,6 +73,25 @@ def test_files_that_would_be_ignored_are_named(rig):
     (rig / "node_00" / "depth_correction.json").write_text("{}")
     with pytest.raises(InputError, match=r"node_00 has depth_correction\.json.*move it away"):
         drain(iterate_recorded_rig(rig, 5))
+
+
+def test_a_recording_of_one_frame_stands(tmp_path):
+    write_tum(tmp_path / "rig" / "node_00", wall(1))
+    assert drain(iterate_recorded_rig(tmp_path / "rig", 5)).frames[0].averaging.frames == 1
+
+
+def test_intrinsics_of_a_node_are_used_for_the_recording_in_it(tmp_path):
+    """Of a bag, they are refused."""
+    own = CameraIntrinsics.pinhole(200.0, 201.0, 80.0, 60.0, 160, 120)
+    node = tmp_path / "rig" / "node_00"
+    inner = write_tum(node / "walk", wall(3))
+    write_intrinsics(node / "intrinsics.json", own)
+    frame = drain(iterate_recorded_rig(tmp_path / "rig", 5)).frames[0]
+    np.testing.assert_allclose(frame.intrinsics.matrix, own.matrix)
+    shutil.rmtree(inner)
+    (node / "walk.bag").write_bytes(b"#ROSBAG V2.0")
+    with pytest.raises(InputError, match="try without intrinsics"):
+        drain(iterate_recorded_rig(tmp_path / "rig", 5))
 
 
 def test_another_calibration_is_refused(rig, tmp_path):
