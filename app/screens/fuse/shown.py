@@ -76,7 +76,7 @@ class ShownChoice:
 
         Args:
             single: whether the scene has one node, so that no two nodes can race.
-            walk: whether it is a recording.
+            walk: whether it is a recording, whose keyframes have no poses before registration.
         """
         self._offer(single, walk)
         requested, self._requested, self._known = self._requested, "", True
@@ -85,7 +85,7 @@ class ShownChoice:
 
     def _offer(self, single: bool, walk: bool) -> None:
         races = [name for name, mode in RACES.items() if mode != "nodes" or not single]
-        options = (WALK,) * walk + (*races, RESULT, BEFORE)
+        options = (WALK, *races, RESULT) if walk else (*races, RESULT, BEFORE)
         if self._handle.options != options:
             self._handle.options = options
             self._choose(options[0])

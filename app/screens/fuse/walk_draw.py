@@ -42,6 +42,8 @@ MOST_SEGMENTS = 1000
 """Most segments in which a path is drawn."""
 DASHES = 30
 """Number of dashes of the path by tracking alone."""
+NAME = 2.2
+"""Distance of a name from the middle of its picture, over the picture's height."""
 ENLARGED = (1, 2, 5, 10, 20, 50)
 """Factors by which the drift may be enlarged."""
 SEEN_DRIFT = 0.2
@@ -53,6 +55,12 @@ def enlarging(view: WalkView) -> int:
     drift_m = float(np.nanmax(view.drift_m))
     most_m = SEEN_DRIFT * float(np.linalg.norm(np.nanmax(view.at_m, axis=0) - np.nanmin(view.at_m, axis=0)))
     return max((times for times in ENLARGED if times * drift_m <= most_m), default=1)
+
+
+def shifted(view: WalkView, times: int) -> FloatArray:
+    """Return (F, 3) positions by tracking alone, their drift enlarged this many times."""
+    shifted_m: FloatArray = view.at_m + times * (view.tracked_m - view.at_m)
+    return shifted_m
 
 
 class WalkDrawing:
@@ -115,7 +123,7 @@ class WalkDrawing:
             "",
             font_screen_scale=0.9,
             anchor="top-center" if index else "bottom-center",
-            position=(0.0, (index - 0.5) * height * self._size_m, depth * self._size_m),
+            position=(0.0, NAME * (2 * index - 1) * height * self._size_m, depth * self._size_m),
         )
 
     def enlarge(self, times: int) -> None:
@@ -126,10 +134,7 @@ class WalkDrawing:
         self._show_line(self._gaps, gaps)
 
     def _shifted(self) -> FloatArray:
-        """Return (F, 3) positions by tracking alone, their drift enlarged."""
-        view = self._view
-        shifted: FloatArray = view.at_m + self._times * (view.tracked_m - view.at_m)
-        return shifted
+        return shifted(self._view, self._times)
 
     def show(self, frame: int) -> None:
         """Show the moment of a frame: the map, the path and the camera with its picture."""
@@ -200,22 +205,23 @@ def frustum_m(view: WalkView) -> float:
 def viewpoint(view: WalkView, fov_rad: float, aspect: float) -> tuple[FloatArray, FloatArray]:
     """Return (3,) the point to look at and (3,) the place to look from, behind the camera and above it.
 
-    The whole map fits into a picture with this vertical field of view and this width over height.
+    The map and both paths fit into a picture with this vertical field of view and this width over height.
     """
     gaze = np.nanmean(view.T_world_camera[:, :3, 2], axis=0)
     level = np.array([gaze[0], gaze[1], 0.0]) / max(float(np.hypot(gaze[0], gaze[1])), 1e-9)
     forward = np.cos(SLOPE_RAD) * level - np.sin(SLOPE_RAD) * np.array([0.0, 0.0, 1.0])
     right = np.cross(forward, (0.0, 0.0, 1.0)) / np.cos(SLOPE_RAD)
     axes = np.stack([right, np.cross(right, forward), forward])
-    at_m = view.at_m[np.isfinite(view.drift_m)]
-    seen_m = np.concatenate([view.points_m[:: 1 + len(view.points_m) // FITTED], at_m]) @ axes.T
-    low_m, high_m = np.percentile(seen_m, [1, 99], axis=0)
-    middle_m = 0.5 * (low_m + high_m)
-    across_m, up_m, away_m = (np.clip(seen_m, low_m, high_m) - middle_m).T
+    seen_m = view.points_m[:: 1 + len(view.points_m) // FITTED] @ axes.T
+    paths_m = np.concatenate([view.at_m, shifted(view, enlarging(view))]) @ axes.T
+    paths_m = paths_m[np.isfinite(paths_m).all(axis=1)]
+    seen_m = np.concatenate([np.clip(seen_m, *np.percentile(seen_m, [1, 99], axis=0)), paths_m])
+    middle_m = 0.5 * (seen_m.min(axis=0) + seen_m.max(axis=0))
+    across_m, up_m, away_m = (seen_m - middle_m).T
     half = np.tan(0.5 * fov_rad) * MARGIN
     back_m = np.maximum(np.abs(across_m) / (half * aspect), np.abs(up_m) / half) - away_m
     center_m = middle_m @ axes
-    return center_m, center_m - float(np.percentile(back_m, 99)) * forward
+    return center_m, center_m - float(back_m.max()) * forward
 
 
 def _segments(at_m: FloatArray) -> FloatArray:

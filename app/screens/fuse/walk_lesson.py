@@ -22,8 +22,8 @@ class WalkLook:
 
     moment: float | None = 1.0
     """Share of the recording's frames that have been taken; None: the first lost one, or the end."""
-    loop: Literal["none", "largest", "last"] = "none"
-    """The loop that moved the camera farthest, the last in the list, or none."""
+    loop: Literal["none", "largest", "contradicting"] = "none"
+    """The loop that moved the camera farthest, one that contradicts the others (if there is one), or none."""
     enlarged: bool = True
     """Whether the drift is enlarged."""
 
@@ -41,12 +41,12 @@ def _moment(text: str) -> float | None:
 
 SETTINGS: dict[str, Setting[WalkLook]] = {
     "moment": sets("moment", _moment),
-    "loop": sets("loop", choice({name: name for name in ("none", "largest", "last")})),
+    "loop": sets("loop", choice({name: name for name in ("none", "largest", "contradicting")})),
     "drift": sets("enlarged", choice({"enlarged": True, "true size": False})),
 }
 """The settings of a stop, by their names in the file."""
 NUMBERS = (
-    *("frames", "keyframes", "seconds", "path", "lost", "times", "drift", "end_drift"),
+    *("frames", "keyframes", "seconds", "path", "lost", "times", "drift", "end_drift", "step"),
     *("loops", "found", "pair", "moved", "turned", "left", "overlap"),
     *("first", "half", "points", "missed", "missed_before"),
 )
@@ -62,7 +62,9 @@ def frame_of(look: WalkLook, view: WalkView) -> int:
 
 def loop_of(look: WalkLook, view: WalkView) -> int:
     """Return the index of the loop that a stop shows; -1 for none."""
-    return {"none": -1, "largest": min(0, len(view.loops) - 1), "last": len(view.loops) - 1}[look.loop]
+    largest = 0 if view.loops else -1
+    contradicting = view.used_loops if view.used_loops < len(view.loops) else -1
+    return {"none": -1, "largest": largest, "contradicting": contradicting}[look.loop]
 
 
 def numbers(scene: str, view: WalkView, surface: Any, times: int) -> Numbers:
@@ -75,6 +77,8 @@ def numbers(scene: str, view: WalkView, surface: Any, times: int) -> Numbers:
         times: factor by which the drift is enlarged.
     """
     share = 100.0 * view.until / max(len(view.points_m), 1)
+    known_m = view.drift_m[np.isfinite(view.drift_m)]
+    step_m = np.abs(np.diff(known_m, prepend=known_m[0])).max()
     values = {
         "frames": f"{view.frames:,}",
         "keyframes": f"{len(view.keyframes):,}",
@@ -84,6 +88,7 @@ def numbers(scene: str, view: WalkView, surface: Any, times: int) -> Numbers:
         "times": f"{times}",
         "drift": number(float(np.nanmax(view.drift_m)), 1, "cm", 100.0),
         "end_drift": number(float(view.drift_m[view.last]), 1, "cm", 100.0),
+        "step": number(float(step_m), 1, "cm", 100.0),
         "loops": f"{view.used_loops:,}",
         "found": f"{len(view.loops):,}",
         "points": f"{view.map_points:,}",

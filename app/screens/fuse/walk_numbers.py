@@ -9,7 +9,7 @@ import numpy as np
 from app.drawing.colors import css
 from app.screens.fuse.walk_view import LoopView, Pictures, WalkView
 from app.web.markup import Markup
-from app.window.tables import UNKNOWN, Row, number, table
+from app.window.tables import UNKNOWN, Row, number, table, term
 
 LINES: tuple[tuple[str, str], ...] = (
     ("solid", "path of the camera up to the moment"),
@@ -19,7 +19,10 @@ LINES: tuple[tuple[str, str], ...] = (
     ("loop", "cameras of the chosen loop; red if it contradicts the others"),
 )
 """Looks and names of what is drawn besides the map."""
-MAP_LINE = Markup("<div><b style='margin: 0 13px 0 6px'>⁘</b>map of the frames up to the moment</div>")
+MAP_LINE = Markup(
+    "<div><b style='margin: 0 13px 0 6px'>⁘</b>map of the frames up to the moment; grey: colour unknown</div>"
+)
+MOMENT = term("Moment", "The frame at the clock's time, and the part of the map measured by then.")
 
 
 def walk_table(view: WalkView) -> Markup:
@@ -33,8 +36,8 @@ def walk_table(view: WalkView) -> Markup:
         ("Lost", "Frames without a pose: they show too little of what was seen before.", f"{lost:,}"),
         (
             "Keyframes",
-            "Frames with which the later ones are registered; a new one begins when less than .8 of a "
-            "frame is in the last one.",
+            "Frames with which the later ones are registered; a new one begins when less than 80 % of "
+            "a frame is in the last one.",
             f"{len(view.keyframes):,}",
         ),
         (
@@ -102,7 +105,8 @@ def loop_html(view: WalkView, loop: LoopView, pictures: Pictures) -> Markup:
         ),
         (
             "Left",
-            "The same between the final poses and this loop: what the other registrations say against it.",
+            "The same between the final poses and this loop: what the other registrations say against it. It "
+            "is large where a registration can slide along bare walls; it has little weight there.",
             f"{_cm(loop.left_m)}, {_deg(loop.left_rad)}",
         ),
         ("Overlap", "Share of one image's points that the other shows.", _percent(loop.overlap_share)),
@@ -127,8 +131,9 @@ def moment_html(view: WalkView, frame: int, pictures: Pictures) -> Markup:
     share = view.until[frame] / max(len(view.points_m), 1)
     return Markup(
         "<div style='display: flex; gap: 0.8em; padding: 0 0.8em 0.6em; font-size: 13px'>"
-        "<div style='flex: none; width: 160px'>{}</div><div>{}.<br>The map has {} of its points.</div></div>"
-    ).format(_image(pictures.of(frame)), frame_line(view, frame), _percent(float(share)))
+        "<div style='flex: none; width: 160px'>{}</div>"
+        "<div>{}<br>{}.<br>The map has {} of its points.</div></div>"
+    ).format(_image(pictures.of(frame)), MOMENT, frame_line(view, frame), _percent(float(share)))
 
 
 def _picture(time_s: float, frame: int, data: bytes | None) -> Markup:
@@ -160,12 +165,7 @@ def legend_html(colors: dict[str, tuple[int, int, int]], times: int) -> Markup:
         for look, name in LINES
     ]
     return Markup("<div style='padding: 0 0.8em 0.8em; font-size: 12px'>{}</div>").format(
-        Markup("").join(
-            [
-                *lines,
-                Markup("<div><b style='margin: 0 13px 0 6px'>⁘</b>map of the frames up to the moment</div>"),
-            ]
-        )
+        Markup("").join([*lines, MAP_LINE])
     )
 
 

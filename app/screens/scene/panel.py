@@ -26,6 +26,11 @@ TEXT = Markdown(
 depth pixels at their places in space; gaps are pixels that the sensor could not measure. Go on with
 **Depth**."""
 )
+WALK_TEXT = Markdown(
+    """**What you see.** One camera walked through the room; each node is a keyframe of its recording, with
+its points and its pose as tracking found it. Gaps are pixels that the sensor could not measure. Go on with
+**Fuse** to see the walk."""
+)
 TITLES = {name: scene.title for name, scene in DEMOS.items()}
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
 
@@ -40,7 +45,7 @@ class ScenePanel(Panel):
     def build(self) -> None:
         """Add the choice of scene, preset and node, the upload, and the node's images and numbers."""
         gui, spec = self.gui, self.session.spec
-        gui.add_markdown(TEXT)
+        self._text = gui.add_markdown(TEXT)
         title = _title(spec)
         options = [*TITLES.values()] if title in TITLES.values() else [title, *TITLES.values()]
         self._demo = gui.add_dropdown(
@@ -83,6 +88,7 @@ class ScenePanel(Panel):
         self._view: SceneView = view
         with self.ui.atomic():
             clear(self.scene, "/scene")
+            self._text.content = WALK_TEXT if view.has_walk else TEXT
             for node in view.nodes:
                 add_cloud(self.scene, f"/scene/{node.name}/cloud", node.sensor, node.T_world_camera)
                 add_camera(self.scene, f"/scene/{node.name}/camera", node, node.T_world_camera)
@@ -124,7 +130,9 @@ class ScenePanel(Panel):
                     ),
                     (
                         "Nodes",
-                        "Camera nodes of this rig; a single RGB-D pair is a rig of one.",
+                        "Keyframes of the recording that are nodes; the map has all frames."
+                        if view.has_walk
+                        else "Camera nodes of this rig; a single RGB-D pair is a rig of one.",
                         str(len(view.nodes)),
                     ),
                 ]

@@ -8,6 +8,7 @@ from dataclasses import replace
 from app.compute.records import AveragedView
 from app.web.markup import Markup
 from app.window.panel import PanelSession
+from app.window.tables import number
 from pipeline.config import MOST_FRAMES, PipelineConfig
 from pipeline.sources import Source
 
@@ -60,17 +61,23 @@ class FramesSlider:
 def frames_html(view: AveragedView, tried: Mapping[int, AveragedView]) -> Markup:
     """Return the numbers of an average, and the pixels without depth for all numbers of frames tried."""
     text = Markup(
-        "<b>{:.1%}</b> of the pixels have no depth with {} frame{}; noise {:.1f} mm (median); {:.1%} moved, "
-        "{:.1%} flicker."
+        "<b>{}</b> of the pixels have no depth with {} frame{}; noise {:.1f} mm (median); {} moved, "
+        "{} flicker."
     ).format(
-        view.unmeasured_share,
+        _percent(view.unmeasured_share),
         view.frames,
         "s" * (view.frames != 1),
         1000.0 * view.median_sd_m,
-        view.moving_share,
-        view.flickering_share,
+        _percent(view.moving_share),
+        _percent(view.flickering_share),
     )
     if len(tried) > 1:
-        shares = ", ".join(f"{tried[frames].unmeasured_share:.1%} with {frames}" for frames in sorted(tried))
+        shares = ", ".join(
+            f"{_percent(tried[frames].unmeasured_share)} with {frames}" for frames in sorted(tried)
+        )
         text += Markup(" Tried: {}.").format(shares)
     return Markup("<div style='padding: 0 0.8em; font-size: 13px'>{}</div>").format(text)
+
+
+def _percent(share: float) -> str:
+    return number(share, 1, "%", 100.0)

@@ -11,14 +11,24 @@ import pytest
 
 from app.drawing.colors import DELIVERED, LOSS
 from app.screens.fuse import walk_job
-from app.screens.fuse.walk_draw import enlarging, pieces
+from app.screens.fuse.walk_draw import enlarging, pieces, shifted, viewpoint
 from app.screens.fuse.walk_job import MOST_PICTURES, PICTURE_PX, pictures_of, view_of
 from app.screens.fuse.walk_lane import ARCS_PX, KEYFRAME, TRACKED, WalkLane, drift_lane
+from app.screens.fuse.walk_lesson import WalkLook, loop_of
 from app.screens.fuse.walk_numbers import frame_line, loop_html, loop_line, loop_name, moment_html, walk_table
 from app.screens.fuse.walk_view import NO_PICTURES
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
-from tests.app.screens.fuse.walks import CAMERA, DRIFT_M, FRAME_S, FRAMES, KEYFRAMES, T_COLOR_DEPTH, walk
+from tests.app.screens.fuse.walks import (
+    CAMERA,
+    DRIFT_M,
+    FRAME_S,
+    FRAMES,
+    KEYFRAMES,
+    T_COLOR_DEPTH,
+    link,
+    walk,
+)
 
 FRAME_NS = round(1e9 * FRAME_S)
 
@@ -64,6 +74,20 @@ def test_a_large_map_is_thinned_evenly_over_the_frames(monkeypatch):
     assert thin.map_points == 20_000
     assert thin.spacing_m == pytest.approx(0.02 * np.sqrt(20.0))
     assert thin.until[20] / 1000 == pytest.approx((made.first_frames <= 20).mean(), abs=0.05)
+
+
+def test_the_first_view_shows_both_paths_and_most_of_the_map_in_any_window(view):
+    for fov_rad, aspect in ((1.3, 1.5), (1.3, 0.6), (0.8, 3.0)):
+        center_m, stand_m = viewpoint(view, fov_rad, aspect)
+        forward = (center_m - stand_m) / np.linalg.norm(center_m - stand_m)
+        right = np.cross(forward, (0.0, 0.0, 1.0)) / np.linalg.norm(np.cross(forward, (0.0, 0.0, 1.0)))
+        axes = np.stack([right, np.cross(right, forward), forward], axis=1)
+        least = {"paths": 1.0, "map": 0.9}
+        paths_m = np.concatenate([view.at_m, shifted(view, enlarging(view))])
+        for name, points_m in (("paths", paths_m[np.isfinite(paths_m[:, 0])]), ("map", view.points_m)):
+            across, up, away = ((points_m - stand_m) @ axes).T
+            half = np.tan(0.5 * fov_rad) * away
+            assert np.mean((away > 0) & (np.abs(up) < half) & (np.abs(across) < aspect * half)) >= least[name]
 
 
 def test_pieces_of_the_map_end_with_frames(view):
@@ -173,6 +197,16 @@ def test_the_moment_has_its_picture_and_the_share_of_the_map(view):
     assert base64.b64encode(pictures.of(20)).decode() in html
     assert f"{100 * view.until[20] / 500:.0f} % of its points" in html
     assert "<img" not in moment_html(view, 20, NO_PICTURES)
+
+
+def test_a_stop_shows_no_loop_that_contradicts_where_all_agree(view):
+    agreeing = view_of(walk(loops=(link(39, 0, loop=True),)), CAMERA, T_COLOR_DEPTH)
+    without = view_of(walk(loops=()), CAMERA, T_COLOR_DEPTH)
+    shown = [
+        [loop_of(WalkLook(loop=which), one) for which in ("none", "largest", "contradicting")]
+        for one in (view, agreeing, without)
+    ]
+    assert shown == [[-1, 0, 1], [-1, 0, -1], [-1, -1, -1]]
 
 
 def test_a_loop_that_contradicts_says_why_it_does_not_count(view):

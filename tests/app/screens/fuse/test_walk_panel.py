@@ -96,7 +96,7 @@ def seen(bench):
 def test_a_recording_opens_with_its_walk_and_without_a_race(fuse):
     gui = fuse.gui
     assert gui.find("Show").value == WALK
-    assert gui.find("Show").options[1:3] == tuple(RACES)[1:3]  # it has one node
+    assert gui.find("Show").options == (WALK, *tuple(RACES)[1:], RESULT)  # it has one node
     assert gui.find("Loop").seen
     assert not gui.find("Compare").seen
     assert fuse.panel._raced is None
@@ -202,13 +202,14 @@ def test_every_stop_of_the_lesson_shows_its_moment(fuse):
         part._take_look(stop.look)
         moment = stop.look.moment
         assert part._frame == (LOST[0] if moment is None else round(moment * (FRAMES - 1)))
-        assert part._chosen == {"none": -1, "largest": 0, "last": 1}[stop.look.loop]
+        assert part._chosen == {"none": -1, "largest": 0, "contradicting": 1}[stop.look.loop]
     values = part._numbers()
     assert set(values) == {*NUMBERS, SCENE}
-    assert [values[name] for name in ("frames", "lost", "drift", "pair")] == [
+    assert [values[name] for name in ("frames", "lost", "drift", "step", "pair")] == [
         "40",
         "3",
         "7.8 cm",
+        "0.8 cm",
         "frames 0 and 39",
     ]
     part.lesson.take("")

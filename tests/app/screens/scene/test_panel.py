@@ -98,6 +98,7 @@ def test_a_recording_in_a_zip_may_stay_one_walk(session, tmp_path):
     assert "TUM: 6 frames become one surface" in session.gui.text(FOLDER)
     assert session.gui.find("Scene").value == "my-walk"
     assert session.results.view("scene").nodes[0].name.startswith("frame_0000")
+    assert "One camera walked through the room" in session.gui.text()
     assert sorted(path.name for path in (upload / "own").iterdir()) == ["my walk.zip"]
     session.gui.set("It becomes", MOMENTS)
     assert session.gui.find("Frames").seen

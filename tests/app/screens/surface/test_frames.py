@@ -51,8 +51,11 @@ def test_holes_close_with_more_frames_and_all_numbers_stay(bench):
     both = bench.results.view("scene").averaged
     assert both.unmeasured_share < 0.1
     text = bench.gui.text()
-    assert f"{both.unmeasured_share:.1%}</b> of the pixels have no depth with 2 frames" in text
-    assert f"Tried: {alone.unmeasured_share:.1%} with 1, {both.unmeasured_share:.1%} with 2, " in text
+    assert f"{100 * both.unmeasured_share:.1f} %</b> of the pixels have no depth with 2 frames" in text
+    assert (
+        f"Tried: {100 * alone.unmeasured_share:.1f} % with 1, {100 * both.unmeasured_share:.1f} % with 2, "
+        in text
+    )
 
 
 def test_other_sources_have_no_slider(bench):
@@ -85,5 +88,5 @@ def test_several_cameras_are_averaged():
 def test_the_numbers_have_their_units():
     view = AveragedView(1, 30, 0.25, 0.01, 0.02, 0.0034)
     text = frames_html(view, {1: view})
-    assert "<b>25.0%</b> of the pixels have no depth with 1 frame; noise 3.4 mm" in text
-    assert "1.0% moved, 2.0% flicker" in text
+    assert "<b>25.0 %</b> of the pixels have no depth with 1 frame; noise 3.4 mm" in text
+    assert "1.0 % moved, 2.0 % flicker" in text
