@@ -17,6 +17,11 @@ from pipeline.types import FloatArray
 if TYPE_CHECKING:
     import viser
 
+LOOKING_AROUND = 0.5
+"""Cameras whose mean viewing direction is shorter than this look around; it is 1 if all look one way."""
+SLOPE_RAD, HALF_VIEW = np.radians(50.0), 0.9 * np.tan(np.radians(37.5))
+"""Angle at which one looks down on their scene; tangent of half the vertical field of view, less a margin."""
+
 
 def add_camera(
     scene: viser.SceneApi, name: str, node: SceneNode, T_world_camera: FloatArray, with_image: bool = True
@@ -65,12 +70,29 @@ def stage_around(clouds_m: Sequence[FloatArray], T_world_camera: Sequence[FloatA
     back_m = cameras_m - middle_m
     distance_m = float(np.linalg.norm(back_m))
     viewpoint_m = cameras_m + 0.4 * back_m + np.array([0.0, 0.0, 0.45 * distance_m])
+    points_m = np.concatenate(seen_m)
+    gaze = np.mean([pose[:3, 2] for pose in T_world_camera], axis=0)
+    if float(np.linalg.norm(gaze)) < LOOKING_AROUND:
+        middle_m, viewpoint_m = _above(points_m, gaze)
     right = np.cross(middle_m - viewpoint_m, (0.0, 0.0, 1.0))
     right /= max(float(np.linalg.norm(right)), 1e-9)
-    points_m = np.concatenate(seen_m)
     low_m, high_m = np.percentile(points_m @ right, [1, 99])
     top_m = np.array([middle_m[0], middle_m[1], float(np.percentile(points_m[:, 2], 98)) + 0.4])
     return Stage(viewpoint_m, middle_m, right, float(high_m - low_m), top_m)
+
+
+def _above(points_m: FloatArray, gaze: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return (3,) the middle of (N, 3) points and (3,) a place above from which they fit a square."""
+    level = np.array([gaze[0], gaze[1], 0.0]) + np.array([1e-9, 0.0, 0.0])
+    level /= float(np.linalg.norm(level))
+    forward = np.cos(SLOPE_RAD) * level - np.array([0.0, 0.0, np.sin(SLOPE_RAD)])
+    up = np.sin(SLOPE_RAD) * level + np.array([0.0, 0.0, np.cos(SLOPE_RAD)])
+    axes = np.stack([np.cross(forward, up), up, forward])
+    low_m, high_m = np.percentile(points_m @ axes.T, [1, 99], axis=0)
+    middle_m = 0.5 * (low_m + high_m) @ axes
+    across_m, up_m, away_m = ((points_m - middle_m) @ axes.T).T
+    distance_m = float(np.percentile(np.maximum(np.abs(across_m), np.abs(up_m)) / HALF_VIEW - away_m, 98))
+    return middle_m, middle_m - distance_m * forward
 
 
 def look(clients: Iterable[viser.ClientHandle], stage: Stage, wide: bool = False) -> None:

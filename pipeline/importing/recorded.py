@@ -17,7 +17,7 @@ from pipeline.importing.depth_views import DepthCamera, DepthView, frame_of, unr
 from pipeline.importing.kinds import kind_of
 from pipeline.importing.reading import check_bag_intrinsics, check_scale, of_many, read_sequence
 from pipeline.importing.recorded_bag import BagRecording, iterate_bag_recording
-from pipeline.importing.sequence import SAME_VIEW_REMEDY, Candidate, Sequence
+from pipeline.importing.sequence import POSES_UNKNOWN, SAME_VIEW_REMEDY, Candidate, Sequence
 from pipeline.importing.stored import read_color_of
 from pipeline.io.images import NoDepthError
 from pipeline.io.same_view import depth_camera_of
@@ -56,7 +56,9 @@ class FolderRecording:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        return (*self.sequence.notes, *unreadable_note(self.unreadable))
+        """Notes; that there are no poses is none: a recording's camera is tracked or stands."""
+        found = (note for note in self.sequence.notes if not _only_without_poses(note))
+        return (*found, *unreadable_note(self.unreadable))
 
     def view(self, index: int) -> DepthView:
         """Read the depth of a frame; it is all NaN without any depth, or if the image cannot be read.
@@ -168,6 +170,11 @@ def _bag_in(place: Path) -> Path | None:
         names = ", ".join(bag.name for bag in bags[:6])
         raise InputError(f"{place} holds {len(bags)} bags; try one of them: {names}")
     return bags[0]
+
+
+def _only_without_poses(note: str) -> bool:
+    """Return whether a note says that the recording has no poses, and nothing of poses that were refused."""
+    return note.startswith("No ") and note.endswith(POSES_UNKNOWN)
 
 
 def _with_depth(sequence: Sequence) -> Iterator[Candidate]:

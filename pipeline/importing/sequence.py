@@ -16,6 +16,8 @@ from pipeline.types import CameraIntrinsics, FloatArray
 
 DEPTH_SUFFIXES = (".png", ".tif", ".tiff", ".npy", ".pfm", ".exr", ".pgm")
 """File name suffixes of depth images."""
+POSES_UNKNOWN = "poses are not known; reconstruct looks for them"
+"""End of the note on a recording without poses."""
 SAME_VIEW_REMEDY = "try a recording whose depth shows the view of its colour images"
 """What to try where depth is not in proportion to colour."""
 
@@ -168,7 +170,7 @@ def posed(
             why = f"{refused[0]}{f' (and {len(refused) - 1} more)' if len(refused) > 1 else ''}"
         elif lost:
             why = f"Every {what} holds numbers that are not finite, as where tracking was lost"
-        return tuple(candidates), (f"{why}: poses are not known; reconstruct looks for them",)
+        return tuple(candidates), (f"{why}: {POSES_UNKNOWN}",)
     without = len(candidates) - len(known)
     notes = []
     if without:

@@ -230,6 +230,6 @@ def _sentence(averaging: Averaging, of: int) -> str:
     """Return what was averaged, and what share of the pixels moved and flickers."""
     verb = "was used" if averaging.frames == 1 else "were averaged"
     return (
-        f"The camera stands: {averaging.frames} of {of} frames {verb}; {averaging.moving_share:.1%} of the "
-        f"pixels moved and are left out, {averaging.flickering_share:.1%} flicker"
+        f"The camera stands: {averaging.frames} of {of} frames {verb}; {100.0 * averaging.moving_share:.1f} % of the "
+        f"pixels moved and are left out, {100.0 * averaging.flickering_share:.1f} % flicker"
     )

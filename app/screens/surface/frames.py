@@ -16,7 +16,8 @@ QUIET_S = 0.2
 """Time without a change after which the slider counts as at rest, seconds."""
 HINT = (
     "Frames of the camera at rest, from the first one, whose depth is averaged pixel by pixel. More frames "
-    "close holes that flicker, and lower the noise."
+    "measure pixels that flicker, and lower the noise. The ball follows the points: where they become denser "
+    "it becomes smaller, so fewer pixels without depth are not always fewer holes."
 )
 
 
