@@ -229,7 +229,8 @@ def _on_color(vote: Vote, view: DepthView, frame: RgbdFrame) -> tuple[DepthMap, 
 def _sentence(averaging: Averaging, of: int) -> str:
     """Return what was averaged, and what share of the pixels moved and flickers."""
     verb = "was used" if averaging.frames == 1 else "were averaged"
+    moving, flickering = 100.0 * averaging.moving_share, 100.0 * averaging.flickering_share
     return (
-        f"The camera stands: {averaging.frames} of {of} frames {verb}; {100.0 * averaging.moving_share:.1f} % of the "
-        f"pixels moved and are left out, {100.0 * averaging.flickering_share:.1f} % flicker"
+        f"The camera stands: {averaging.frames} of {of} frames {verb}; {moving:.1f} % of the pixels moved "
+        f"and are left out, {flickering:.1f} % flicker"
     )

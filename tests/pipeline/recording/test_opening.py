@@ -131,7 +131,7 @@ def test_a_camera_that_stands_is_one_node_without_a_walk():
     assert not frame.depth.valid[30, 40]
     assert "A note." in frame.notes
     assert any(
-        "The camera stands: 16 of 16 frames were averaged; 0.0% of the pixels moved" in note
+        "The camera stands: 16 of 16 frames were averaged; 0.0 % of the pixels moved" in note
         for note in rig.notes
     )
 
