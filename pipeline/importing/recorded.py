@@ -23,6 +23,8 @@ from pipeline.io.images import NoDepthError
 from pipeline.io.same_view import depth_camera_of
 from pipeline.types import AnyPath, FloatArray, RgbdFrame
 
+MOST_DAMAGED = 10
+"""Number of damaged depth images at the start of a recording at which it is refused."""
 FRAMES_PER_S = 30.0
 """Frame rate that is assumed for a recording without times."""
 
@@ -178,10 +180,23 @@ def _only_without_poses(note: str) -> bool:
 
 
 def _with_depth(sequence: Sequence) -> Iterator[Candidate]:
-    """Yield the candidates whose depth image has depth."""
+    """Yield the candidates whose depth image has depth; a few damaged images are passed over.
+
+    Raises:
+        InputError: the first ``MOST_DAMAGED`` images that can have depth are damaged, or all of them.
+    """
+    damaged: list[InputError] = []
     for candidate in sequence.candidates:
         try:
             depth_in(candidate, sequence)
         except NoDepthError:
             continue
+        except InputError as error:
+            damaged.append(error)
+            if len(damaged) == MOST_DAMAGED:
+                break
+            continue
         yield candidate
+        damaged.clear()
+    if damaged:
+        raise damaged[0]

@@ -336,3 +336,23 @@ def test_of_a_long_recording_every_nth_frame_is_used(tmp_path, monkeypatch):
     np.testing.assert_array_equal(recording.frame(1).rgb, every.frame(3).rgb)
     assert "Of the 7 frames one in 3 is used, so that there are at most 3" in recording.notes
     assert not any("one in" in note for note in every.notes)
+
+
+def test_a_damaged_first_depth_image_is_left_out_like_any_other(tmp_path):
+    write_tum(tmp_path / "recording", orbit(3))
+    first = min((tmp_path / "recording" / "depth").iterdir())
+    first.write_bytes(first.read_bytes()[:40])
+    recording = open_recording(tmp_path / "recording")
+    assert not recording.view(0).depth.valid.any()
+    assert recording.view(0).depth.z_m.shape == recording.view(1).depth.z_m.shape
+    assert recording.view(1).depth.valid.any()
+    assert any(first.name in note for note in recording.notes)
+
+
+def test_a_recording_whose_depth_is_all_damaged_is_refused_with_the_first_reason(tmp_path):
+    write_tum(tmp_path / "recording", orbit(3))
+    images = sorted((tmp_path / "recording" / "depth").iterdir())
+    for image in images:
+        image.write_bytes(image.read_bytes()[:40])
+    with pytest.raises(InputError, match=images[0].name):
+        open_recording(tmp_path / "recording")
