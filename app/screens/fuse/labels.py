@@ -24,6 +24,7 @@ DIRECTIONS: dict[str, Direction] = {
 OFF_FROM: dict[Reference, str] = {
     "truth": "from the truth",
     "pixels": "from the measured points of its pixels",
+    "walk": "from the poses of the whole walk",
     "cloud": "to the nearest point",
 }
 """Meaning of the distance that a race shows."""

@@ -17,6 +17,7 @@ STOPS = {"max_iterations": "limit"}
 _OFF: dict[Reference, tuple[str, str]] = {
     "truth": ("error", "RMS distance of the moved points from their true places"),
     "pixels": ("error", "RMS distance of the moved points from the measured points of the same pixels"),
+    "walk": ("error", "RMS distance of the moved points from their places by the poses of the whole walk"),
     "cloud": ("gap", "Median distance of the drawn points to the nearest point of the other cloud"),
 }
 

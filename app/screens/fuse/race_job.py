@@ -139,6 +139,8 @@ def contest_of(rig: Rig, nodes: Sequence[NodeClouds], race: Race) -> Contest:
     staying = race.source if race.mode == "inferred" else race.target
     poses = [frame.T_world_camera for frame in rig.frames]
     T_aligned = geometry.inverse(poses[race.target]) @ poses[race.source] if T_home is None else T_home
+    if reference == "cloud" and rig.walk is not None:
+        T_home, reference = T_aligned, "walk"
     return _contest(race, source, target, T_aligned, T_home, reference, poses[staying])
 
 

@@ -15,9 +15,10 @@ RaceMode = Literal["nodes", "inferred", "corridor", "square", "mirrored"]
 """nodes: one node's sensor cloud onto another's; inferred: a node's inferred cloud onto its sensor cloud;
 otherwise two scans of a made room (``rooms.py``)."""
 
-Reference: TypeAlias = Literal["truth", "pixels", "cloud"]
+Reference: TypeAlias = Literal["truth", "pixels", "walk", "cloud"]
 """Reference of a race's errors: the points' true positions; the pixels at which they were inferred, which
-needs no ground truth; or, if both are unknown, the nearest points of the other cloud."""
+needs no ground truth; the poses that a recording's whole walk gives; or, if all are unknown, the nearest
+points of the other cloud."""
 
 Rival: TypeAlias = tuple[Method, Metric]
 

@@ -14,7 +14,9 @@ from app.screens.fuse.view import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, Race, Sta
 from packetmesh.errors import InputError
 from packetmesh.progress import drain as end
 from pipeline.io.rigs import save_rig
+from pipeline.kernels.geometry import inverse
 from pipeline.sources import Demo, RigFolder
+from tests.app.screens.fuse.walks import walk
 
 SPEC = Spec(Demo("box-on-table"))
 SLIGHT = Race(start=Start.towards(3.0, 6.0, seed=0))
@@ -134,6 +136,14 @@ def test_a_start_is_as_far_off_as_it_says(rig, nodes, seed):
 def test_aligned_is_the_truth(rig, nodes):
     contest = contest_of(rig, nodes, Race())
     assert contest.error_m(contest.start_pose(Start())) == 0.0
+
+
+def test_two_keyframes_are_compared_with_their_poses_by_the_whole_walk(rig, nodes):
+    contest = contest_of(replace(rig, truth=None, walk=walk()), nodes, Race())
+    poses = [frame.T_world_camera for frame in rig.frames]
+    np.testing.assert_array_equal(contest.T_home, inverse(poses[0]) @ poses[1])
+    assert contest.reference == "walk"
+    assert contest.error_m(contest.start_pose(Start())) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_degrading_changes_the_source_only(rig, nodes):
