@@ -61,7 +61,13 @@ def test_a_click_on_a_loop_shows_what_closed_it_and_a_reload_keeps_it(walk):
     box = field(walk)
     walk.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 8)  # the longest loops are on top
     expect(walk.get_by_role("row", name="Counts")).to_be_visible()
-    frame, loop = in_address(walk, "frame"), in_address(walk, "loop")
+    shown = walk.locator(".packetmesh-dock-row .names").inner_text()
+    frame = re.search(r"frame (\d+)", shown)[1]
+    loop = "-".join(re.findall(r"\d+", walk.get_by_label("Loop", exact=True).first.input_value()))
+    for key, value in (("frame", frame), ("loop", loop)):
+        walk.wait_for_function(
+            "([key, value]) => new URLSearchParams(location.search).get(key) === value", arg=[key, value]
+        )
     walk.reload()
     walk.get_by_text(SEEN).wait_for()
     expect(walk.locator(".packetmesh-dock-row .names")).to_contain_text(f"frame {frame}:")
