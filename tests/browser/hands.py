@@ -134,10 +134,11 @@ def arrow(page):
 NEW_SESSION = """query => {
   sessionStorage.clear();
   history.replaceState(null, "", `${location.pathname}?${query}`);
-  const {beginAddress} = packetmesh.calls;
+  const {beginAddress, showAddress} = packetmesh.calls;
+  packetmesh.calls.showAddress = () => {}; // of the old session, still on its way
   window.begun = new Promise(done => {
     packetmesh.calls.beginAddress = (...given) => {
-      packetmesh.calls.beginAddress = beginAddress;
+      Object.assign(packetmesh.calls, {beginAddress, showAddress});
       beginAddress(...given);
       done();
     };
