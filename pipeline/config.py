@@ -48,7 +48,7 @@ FusionMode = Literal["union", "fill"]
 Fill = Literal["auto", "completion", "network"]
 RadiusRule = Literal["thesis", "thesis+", "manual"]
 NodePoints = Literal["sensor", "fused"]
-MOST_FRAMES = 64
+MOST_AVERAGED = 64
 """Most depth images of a camera that stands that are averaged: 79 MB at 640 x 480 pixels."""
 
 
@@ -66,13 +66,13 @@ def _above(key: str, value: float, bound: float) -> None:
 class RecordingConfig:
     """Recording to rig (SPEC 10)."""
 
-    frames: int = MOST_FRAMES
+    frames: int = MOST_AVERAGED
     """Frames of a camera that stands, from the first one, that are averaged, 1 to 64; recordings of a camera
     that walks and other images do not use it."""
 
     def __post_init__(self) -> None:
-        if not 1 <= self.frames <= MOST_FRAMES:
-            raise InputError(f"recording.frames is {self.frames}; try a number from 1 to {MOST_FRAMES}")
+        if not 1 <= self.frames <= MOST_AVERAGED:
+            raise InputError(f"recording.frames is {self.frames}; try a number from 1 to {MOST_AVERAGED}")
 
 
 @dataclass(frozen=True, slots=True)

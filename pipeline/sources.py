@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 from packetmesh.errors import InputError
-from pipeline.config import MOST_FRAMES
+from pipeline.config import MOST_AVERAGED
 from pipeline.types import Rig
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ class RigFolder:
                 f"The nodes of {self.path} are recordings, which take no calibration from elsewhere; try to "
                 f"copy each node's pose.txt from {calibration} into the rig"
             )
-        return drain(iterate_recorded_rig(self.path, MOST_FRAMES, self.depth_scale))
+        return drain(iterate_recorded_rig(self.path, MOST_AVERAGED, self.depth_scale))
 
     def arguments(self) -> list[str]:
         return ["--rig", self.path, *_depth_scale_argument(self.depth_scale)]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Self
 
 from packetmesh.settings import differences
-from pipeline.config import MOST_FRAMES, PRESETS, PipelineConfig
+from pipeline.config import MOST_AVERAGED, PRESETS, PipelineConfig
 from pipeline.sources import Recorded, RigFolder, Source
 
 StageName = Literal[
@@ -64,7 +64,7 @@ class Needs:
 
 def _averaged(spec: Spec) -> int:
     """Return the frames to average; the most for sources without frames, whose rig is the same for all."""
-    return spec.config.recording.frames if isinstance(spec.source, Recorded | RigFolder) else MOST_FRAMES
+    return spec.config.recording.frames if isinstance(spec.source, Recorded | RigFolder) else MOST_AVERAGED
 
 
 NEEDS: dict[StageName, Needs] = {

@@ -19,7 +19,7 @@ import numpy as np
 from packetmesh.progress import Progress, drain, part
 from pipeline.acquisition import Acquired, acquire, without_rayless
 from pipeline.config import (
-    MOST_FRAMES,
+    MOST_AVERAGED,
     AcquisitionConfig,
     DepthConfig,
     FusionMode,
@@ -142,7 +142,7 @@ def _ready(stage: StageName, results: dict[StageName, Done]) -> bool:
 # The stages.
 
 
-def open_rig(source: Source, frames: int = MOST_FRAMES) -> Steps[Rig]:
+def open_rig(source: Source, frames: int = MOST_AVERAGED) -> Steps[Rig]:
     """Load the images and, if it is known, the truth; a recording is averaged, or tracked and mapped.
 
     ``frames`` is the number that is averaged if its camera stands.

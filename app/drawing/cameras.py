@@ -83,16 +83,33 @@ def stage_around(clouds_m: Sequence[FloatArray], T_world_camera: Sequence[FloatA
 
 def _above(points_m: FloatArray, gaze: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return (3,) the middle of (N, 3) points and (3,) a place above from which they fit a square."""
+    axes = axes_downwards(gaze)
+    low_m, high_m = np.percentile(points_m @ axes.T, [1, 99], axis=0)
+    middle_m = 0.5 * (low_m + high_m) @ axes
+    needed_m = distances_m((points_m - middle_m) @ axes.T, HALF_VIEW, HALF_VIEW)
+    return middle_m, middle_m - float(np.percentile(needed_m, 98)) * axes[2]
+
+
+def axes_downwards(gaze: FloatArray) -> FloatArray:
+    """Return (3, 3) right, up and forward of a view along a (3,) gaze that looks down by ``SLOPE_RAD``."""
     level = np.array([gaze[0], gaze[1], 0.0]) + np.array([1e-9, 0.0, 0.0])
     level /= float(np.linalg.norm(level))
     forward = np.cos(SLOPE_RAD) * level - np.array([0.0, 0.0, np.sin(SLOPE_RAD)])
     up = np.sin(SLOPE_RAD) * level + np.array([0.0, 0.0, np.cos(SLOPE_RAD)])
-    axes = np.stack([np.cross(forward, up), up, forward])
-    low_m, high_m = np.percentile(points_m @ axes.T, [1, 99], axis=0)
-    middle_m = 0.5 * (low_m + high_m) @ axes
-    across_m, up_m, away_m = ((points_m - middle_m) @ axes.T).T
-    distance_m = float(np.percentile(np.maximum(np.abs(across_m), np.abs(up_m)) / HALF_VIEW - away_m, 98))
-    return middle_m, middle_m - distance_m * forward
+    return np.stack([np.cross(forward, up), up, forward])
+
+
+def distances_m(points_m: FloatArray, half_width: float, half_height: float) -> FloatArray:
+    """Return how far back from the origin a camera must be for each point to be in its picture.
+
+    Args:
+        points_m: (N, 3) points along the axes of the view: right, up and forward.
+        half_width: tangent of half the horizontal field of view.
+        half_height: the same, vertical.
+    """
+    across_m, up_m, away_m = points_m.T
+    needed_m: FloatArray = np.maximum(np.abs(across_m) / half_width, np.abs(up_m) / half_height) - away_m
+    return needed_m
 
 
 def look(clients: Iterable[viser.ClientHandle], stage: Stage, wide: bool = False) -> None:

@@ -17,9 +17,9 @@ from lab.worlds.living_room import living_room
 from lab.worlds.render import Renderer
 from lab.worlds.sensor import SensorConfig, sense_depth
 from packetmesh.files import atomic_path, writable_folder
-from pipeline.folders.walk import write_tum
 from pipeline.io.demos import DEMO_WALKS, RECORDINGS, TRUE_PATH
 from pipeline.io.intrinsics import write_intrinsics
+from pipeline.io.poses import write_tum
 from pipeline.kernels.geometry import rigid
 from pipeline.types import AnyPath, ByteArray, CameraIntrinsics, FloatArray
 

@@ -19,10 +19,10 @@ from lab.worlds.scene import Rng, Scene
 from lab.worlds.sensor import sense_depth
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, writable_folder
-from pipeline.folders.walk import write_tum
 from pipeline.importing.tum import UNITS_PER_METRE
 from pipeline.io.images import write_color
 from pipeline.io.intrinsics import write_intrinsics
+from pipeline.io.poses import write_tum
 from pipeline.types import AnyPath, CameraIntrinsics, DepthMap, FloatArray, IntArray
 
 TRUE_POSES = "groundtruth_true.txt"

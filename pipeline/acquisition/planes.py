@@ -70,8 +70,7 @@ def local_planes(
         noise: the sensor's calibrated noise; None estimates it from the image.
         least_sd_m: (H, W) least standard deviation of each depth, NaN where there is none.
     """
-    known = depth.valid & (depth.z_m > 0)
-    inverse = (known / np.where(known, depth.z_m, 1.0)).astype(np.float32)
+    inverse = inverse_depth(depth)
     steepest = float(np.tan(np.radians(STEEPEST_DEG))) / intrinsics.fx_px
     across, below = surface_steps(inverse, steepest)
     right = mean_around(*across, (PLANE_PX - 1, PLANE_PX))
@@ -80,11 +79,18 @@ def local_planes(
     if noise is None:
         sd = np.hypot(typical_step(inverse, (across, below)), LATERAL_PX * slope)
     else:
-        z_m = 1.0 / np.where(known, inverse, 1.0)
+        z_m = 1.0 / np.where(inverse > 0.0, inverse, 1.0)
         sd = noise.sd_m(z_m, 1.0 / np.hypot(1.0, slope * z_m * intrinsics.fx_px)) * inverse**2
     if least_sd_m is not None:
         sd = np.fmax(sd, least_sd_m * inverse**2)
     return LocalPlanes(inverse, right, down, sd.astype(np.float32))
+
+
+def inverse_depth(depth: DepthMap) -> FloatArray:
+    """Return (H, W) float32 1/z, 1/m; 0 where the depth is unknown."""
+    known = depth.valid & (depth.z_m > 0.0)
+    inverse: FloatArray = (known / np.where(known, depth.z_m, 1.0)).astype(np.float32)
+    return inverse
 
 
 Steps = tuple[FloatArray, BoolArray]

@@ -20,16 +20,15 @@ from pipeline.importing.arkit import Y_DOWN
 from pipeline.importing.colmap_model import CENTRE_PX
 from pipeline.importing.rig_folder import new_folder
 from pipeline.io.images import write_color, write_depth_mm
-from pipeline.kernels.geometry import apply, inverse, project
+from pipeline.kernels.geometry import inverse, is_pinhole
 from pipeline.kernels.straight_view import straight_depth, straight_image, straight_view
+from pipeline.recording.photographs import measured_in
 from pipeline.recording.recording import Recording
 from pipeline.types import CameraIntrinsics, FloatArray, IntArray, PointCloud, RgbdFrame, Walk
 
 FOLDER = "keyframes"
 MOST_POINTS = 20_000
 """Largest number of the map's points that the COLMAP model has, spread evenly."""
-SEEN = 0.02
-"""Largest difference of a point's depth from a keyframe's, as a share, if the keyframe sees the point."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +107,7 @@ def _iterate_images(
 def straight(frame: RgbdFrame) -> RgbdFrame:
     """Return a frame without distortion, in a pinhole camera of the same size that sees all of its image."""
     camera = frame.intrinsics
-    if not camera.fisheye and not np.any(camera.distortion):
+    if is_pinhole(camera):
         return frame
     view = straight_view(camera)
     rgb, depth = straight_image(frame.rgb, camera, view), straight_depth(frame.depth, camera, view)
@@ -120,15 +119,8 @@ def _write(out: Path, frame: RgbdFrame, cloud: PointCloud) -> _Written:
     color, depth = f"{frame.name}.jpg", f"{frame.name}.png"
     write_color(out / "images" / color, frame.rgb)
     write_depth_mm(out / "depth" / depth, frame.depth)
-    own_m = apply(inverse(frame.T_world_camera), cloud.points_m)
-    rows = np.flatnonzero(own_m[:, 2] > 0.0)
-    pixels = project(frame.intrinsics, own_m[rows])
-    size_px = frame.intrinsics.width_px, frame.intrinsics.height_px
-    inside = ((pixels > -0.5) & (pixels < np.array(size_px) - 0.5)).all(axis=1)
-    rows, pixels = rows[inside], pixels[inside]
-    u, v = np.rint(pixels).astype(int).T
-    seen = np.abs(frame.depth.z_m[v, u] - own_m[rows, 2]) <= SEEN * own_m[rows, 2]
-    return _Written(color, depth, frame.intrinsics, frame.T_world_camera, rows[seen], pixels[seen])
+    rows, pixels, _ = measured_in(frame, cloud.points_m)
+    return _Written(color, depth, frame.intrinsics, frame.T_world_camera, rows, pixels)
 
 
 def _transforms(written: list[_Written]) -> dict[str, object]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from packetmesh.files import atomic_path, write_json
+from packetmesh.files import write_json
+from pipeline.io.poses import write_tum
 from pipeline.types import FloatArray, Walk
 
 FILES = ("trajectory.txt", "trajectory.json")
@@ -24,15 +23,7 @@ def write_trajectory(folder: Path, walk: Walk) -> list[Path]:
         InputError: the folder cannot be written.
     """
     files = [folder / name for name in FILES]
-    lines = [
-        "# time (s), position (m) and quaternion of the colour camera in the world: tx ty tz qx qy qz qw"
-    ]
-    for time_s, T in zip(walk.times_s, walk.T_world_camera, strict=True):
-        if T is not None:
-            values = *T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_quat()
-            lines.append(f"{time_s:.6f} " + " ".join(f"{value:.9f}" for value in values))
-    with atomic_path(files[0]) as temporary:
-        Path(temporary).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_tum(files[0], walk.times_s, walk.T_world_camera)
     links = [
         {
             "source": link.source,
@@ -48,17 +39,6 @@ def write_trajectory(folder: Path, walk: Walk) -> list[Path]:
     ]
     write_json(files[1], {"keyframes": walk.keyframes, "links": links})
     return files
-
-
-def write_tum(file: Path, times_s: FloatArray, T_world_camera: Sequence[FloatArray | None]) -> None:
-    """Write (4, 4) poses and their (N,) times in TUM's form; those that are None have no line."""
-    lines = ["# time (s), then the camera in the world: tx ty tz (m) qx qy qz qw"]
-    for time_s, T in zip(times_s, T_world_camera, strict=True):
-        if T is not None:
-            values = *T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_quat()
-            lines.append(f"{time_s:.6f} " + " ".join(f"{value:.9f}" for value in values))
-    with atomic_path(file) as temporary:
-        Path(temporary).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def walk_metrics(walk: Walk, elapsed_s: float) -> dict[str, Any]:

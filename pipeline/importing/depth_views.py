@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TypeVar
 
 import cv2
 import numpy as np
 
+from packetmesh.errors import InputError
 from pipeline.io.depth_to_color import register_depth
-from pipeline.kernels.geometry import LEVEL_POSE, pixel_rays, project
+from pipeline.io.images import NoDepthError
+from pipeline.kernels.geometry import LEVEL_POSE, is_pinhole
+from pipeline.kernels.straight_view import maps_between
 from pipeline.types import ByteArray, CameraIntrinsics, DepthMap, DepthNoise, FloatArray, RgbdFrame
 
 KINECT = DepthNoise(s0_m=0.0012, s1_m=0.0015, p=2.0, q=1.0)
 """Noise that is assumed for every sensor: within a tenth of ``acquisition.depth_sigma_m`` from 1.5 to 4 m."""
+MOST_DAMAGED = 10
+"""Number of damaged depth images at the start of a recording at which it is refused."""
+Read = TypeVar("Read")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +55,13 @@ def view_of(z_m: FloatArray, depth_camera: DepthCamera) -> DepthView:
         z_m: (H, W) depth, metres; NaN where it is unknown.
         depth_camera: its camera.
     """
-    straight, pixels = _straight(depth_camera.camera)
-    z_m = z_m if pixels is None else _moved(z_m, pixels)
-    return DepthView(DepthMap(z_m), straight, depth_camera.T_color_depth, KINECT)
+    camera = depth_camera.camera
+    if not is_pinhole(camera):
+        values = camera.matrix.tobytes(), camera.distortion.tobytes()
+        maps = _kept_maps(*values, camera.width_px, camera.height_px, camera.fisheye)
+        z_m = cv2.remap(z_m, *maps, cv2.INTER_NEAREST, borderValue=np.nan)
+        camera = replace(camera, distortion=np.zeros(5), fisheye=False)
+    return DepthView(DepthMap(z_m), camera, depth_camera.T_color_depth, KINECT)
 
 
 def frame_of(
@@ -77,6 +88,30 @@ def frame_of(
     return RgbdFrame(f"frame_{index:05d}", rgb, depth, camera, T, pose_known=T_world_camera is not None)
 
 
+def first_with_depth(reads: Iterable[Callable[[], Read]]) -> Read | None:
+    """Return the first depth image that has depth; None if none has. A few damaged ones are passed over.
+
+    Args:
+        reads: read the images of a recording, in order.
+
+    Raises:
+        InputError: the first ``MOST_DAMAGED`` images that can have depth are damaged, or all of them.
+    """
+    damaged: list[InputError] = []
+    for read in reads:
+        try:
+            return read()
+        except NoDepthError:
+            continue
+        except InputError as error:
+            damaged.append(error)
+            if len(damaged) == MOST_DAMAGED:
+                break
+    if damaged:
+        raise damaged[0]
+    return None
+
+
 def unreadable_note(unreadable: Mapping[int, str]) -> tuple[str, ...]:
     """Return a sentence on depth images that could not be read, by their errors; none if all could."""
     if not unreadable:
@@ -85,33 +120,11 @@ def unreadable_note(unreadable: Mapping[int, str]) -> tuple[str, ...]:
     return (f"{len(unreadable)} depth images were left out, the first because: {first}",)
 
 
-def _straight(camera: CameraIntrinsics) -> tuple[CameraIntrinsics, FloatArray | None]:
-    """Return a camera without its distortion, and (H, W, 2) its pixels in the distorted image."""
-    if not camera.fisheye and not np.any(camera.distortion):
-        return camera, None
-    straight = replace(camera, distortion=np.zeros(5), fisheye=False)
-    values = camera.matrix.tobytes(), camera.distortion.tobytes()
-    return straight, _distorted(*values, camera.width_px, camera.height_px, camera.fisheye)
-
-
 @lru_cache(maxsize=2)
-def _distorted(matrix: bytes, distortion: bytes, width_px: int, height_px: int, fisheye: bool) -> FloatArray:
-    """Return (H, W, 2) float32 pixels in the distorted image of the pixels of the straight one."""
+def _kept_maps(
+    matrix: bytes, distortion: bytes, width_px: int, height_px: int, fisheye: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Return ``maps_between`` a camera and itself without its distortion."""
     own = np.frombuffer(matrix).reshape(3, 3)
     camera = CameraIntrinsics(own, np.frombuffer(distortion), width_px, height_px, fisheye)
-    straight = CameraIntrinsics(own, np.zeros(5), width_px, height_px)
-    pixels = project(camera, pixel_rays(straight).reshape(-1, 3))
-    return np.nan_to_num(pixels, nan=-10.0).astype(np.float32).reshape(height_px, width_px, 2)
-
-
-def _moved(z_m: FloatArray, pixels: FloatArray) -> FloatArray:
-    """Return (H, W) depth at (H, W, 2) pixels of an image, each from the nearest pixel; NaN outside."""
-    moved: FloatArray = cv2.remap(
-        z_m,
-        pixels[..., 0],
-        pixels[..., 1],
-        cv2.INTER_NEAREST,
-        borderMode=cv2.BORDER_CONSTANT,
-        borderValue=np.nan,
-    )
-    return moved
+    return maps_between(camera, CameraIntrinsics(own, np.zeros(5), width_px, height_px))

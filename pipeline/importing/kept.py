@@ -8,7 +8,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress, part
@@ -17,8 +16,9 @@ from pipeline.importing.rig_folder import check_new, new_folder
 from pipeline.importing.tum import UNITS_PER_METRE
 from pipeline.io.images import write_color
 from pipeline.io.intrinsics import write_intrinsics
+from pipeline.io.poses import write_tum
 from pipeline.io.same_view import alike
-from pipeline.types import AnyPath, CameraIntrinsics, RgbdFrame
+from pipeline.types import AnyPath, CameraIntrinsics, FloatArray, RgbdFrame
 
 PROGRESS_EVERY, REPORTS = 5, 100
 """Least number of frames between progress reports, and most reports."""
@@ -93,7 +93,9 @@ class _Writer:
     camera: CameraIntrinsics | None = None
     too_far: int = 0
     """Number of depths that were left out."""
-    lines: dict[str, list[str]] = field(default_factory=lambda: {"rgb": [], "depth": [], "groundtruth": []})
+    lines: dict[str, list[str]] = field(default_factory=lambda: {"rgb": [], "depth": []})
+    path: list[tuple[float, FloatArray]] = field(default_factory=list)
+    """Times and poses of the frames that have one."""
 
     def write(self, frame: RgbdFrame, time_s: float) -> None:
         """Write the images of a frame.
@@ -118,16 +120,14 @@ class _Writer:
         png = cv2.imencode(".png", np.rint(np.where(far, 0.0, units)).astype(np.uint16))[1]
         (self.folder / "depth" / name).write_bytes(png.tobytes())
         if frame.pose_known:
-            T = frame.T_world_camera
-            values = [*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_quat()]
-            numbers = " ".join(f"{value:.9f}" for value in values)
-            self.lines["groundtruth"].append(f"{time_s:.6f} {numbers}")
+            self.path.append((time_s, frame.T_world_camera))
 
     def finish(self, camera: CameraIntrinsics) -> None:
         """Write the lists and the camera."""
         write_intrinsics(self.folder / "intrinsics.json", camera)
         for name, lines in self.lines.items():
-            columns = "tx ty tz qx qy qz qw" if name == "groundtruth" else "filename"
-            if lines:
-                text = "\n".join([f"# timestamp {columns}", *lines]) + "\n"
-                (self.folder / f"{name}.txt").write_text(text, encoding="utf-8")
+            text = "\n".join(["# timestamp filename", *lines]) + "\n"
+            (self.folder / f"{name}.txt").write_text(text, encoding="utf-8")
+        if self.path:
+            times_s, poses = zip(*self.path, strict=True)
+            write_tum(self.folder / "groundtruth.txt", np.array(times_s), poses)

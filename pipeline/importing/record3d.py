@@ -39,7 +39,7 @@ from pipeline.importing.stored import StoredImage
 from pipeline.importing.stray import CONFIDENCE_NOTE
 from pipeline.io.images import color_in
 from pipeline.io.intrinsics import check_camera
-from pipeline.kernels.geometry import scaled_to
+from pipeline.kernels.geometry import rigid, scaled_to
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
 
 SUFFIX = ".r3d"
@@ -227,9 +227,7 @@ def _resized(metadata: _Metadata, width_px: int, height_px: int) -> _Metadata:
 
 def _from_arkit(row: FloatArray) -> FloatArray:
     """Return the (4, 4) T_world_camera of a quaternion, its scalar last, and a position in ARKit's axes."""
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = Rotation.from_quat(row[:4]).as_matrix(), row[4:]
-    return T @ Y_DOWN
+    return rigid(Rotation.from_quat(row[:4]).as_matrix(), row[4:]) @ Y_DOWN
 
 
 def _photograph(package: _Package, name: str) -> ByteArray:

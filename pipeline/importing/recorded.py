@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -13,18 +13,23 @@ from packetmesh.errors import InputError
 from packetmesh.progress import Progress, drain
 from pipeline.importing.bag_reader import is_bag
 from pipeline.importing.depth_units import depth_in
-from pipeline.importing.depth_views import DepthCamera, DepthView, frame_of, unreadable_note, view_of
+from pipeline.importing.depth_views import (
+    DepthCamera,
+    DepthView,
+    first_with_depth,
+    frame_of,
+    unreadable_note,
+    view_of,
+)
 from pipeline.importing.kinds import kind_of
 from pipeline.importing.reading import check_bag_intrinsics, check_scale, of_many, read_sequence
 from pipeline.importing.recorded_bag import BagRecording, iterate_bag_recording
 from pipeline.importing.sequence import POSES_UNKNOWN, SAME_VIEW_REMEDY, Candidate, Sequence
 from pipeline.importing.stored import read_color_of
-from pipeline.io.images import NoDepthError
+from pipeline.io.images import NoDepthError, ReadDepth
 from pipeline.io.same_view import depth_camera_of
 from pipeline.types import AnyPath, FloatArray, RgbdFrame
 
-MOST_DAMAGED = 10
-"""Number of damaged depth images at the start of a recording at which it is refused."""
 FRAMES_PER_S = 30.0
 """Frame rate that is assumed for a recording without times."""
 
@@ -119,7 +124,9 @@ class FolderRecording:
     @cached_property
     def _depth_shape(self) -> tuple[int, ...]:
         """Height and width of the first depth image that has depth."""
-        return depth_in(next(_with_depth(self.sequence)), self.sequence).depth.z_m.shape
+        first = _first_depth(self.sequence)
+        assert first is not None  # else it would not have been opened
+        return first.depth.z_m.shape
 
 
 def open_recording(
@@ -149,7 +156,7 @@ def iterate_opening(
         check_bag_intrinsics(bag, intrinsics)
         return (yield from iterate_bag_recording(bag, depth_scale))
     kind, folder, sequence = read_sequence(place, depth_scale, intrinsics)
-    if next(_with_depth(sequence), None) is None:
+    if _first_depth(sequence) is None:
         raise NoDepthError(f"No frame of {folder} has depth; check the depth images and the depth scale")
     chosen, notes = of_many(len(sequence.candidates))
     candidates = sequence.candidates[chosen]
@@ -179,24 +186,6 @@ def _only_without_poses(note: str) -> bool:
     return note.startswith("No ") and note.endswith(POSES_UNKNOWN)
 
 
-def _with_depth(sequence: Sequence) -> Iterator[Candidate]:
-    """Yield the candidates whose depth image has depth; a few damaged images are passed over.
-
-    Raises:
-        InputError: the first ``MOST_DAMAGED`` images that can have depth are damaged, or all of them.
-    """
-    damaged: list[InputError] = []
-    for candidate in sequence.candidates:
-        try:
-            depth_in(candidate, sequence)
-        except NoDepthError:
-            continue
-        except InputError as error:
-            damaged.append(error)
-            if len(damaged) == MOST_DAMAGED:
-                break
-            continue
-        yield candidate
-        damaged.clear()
-    if damaged:
-        raise damaged[0]
+def _first_depth(sequence: Sequence) -> ReadDepth | None:
+    """Return the first depth image that has depth, as ``first_with_depth``."""
+    return first_with_depth(partial(depth_in, candidate, sequence) for candidate in sequence.candidates)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,19 @@ from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.importing.bag_depth import BagScale, place_of_depth
 from pipeline.importing.bag_messages import color_of
-from pipeline.importing.bag_reader import opened_bag
+from pipeline.importing.bag_reader import opened_bag, readable
 from pipeline.importing.bag_stream import BagStream
 from pipeline.importing.bag_times import all_moments, times_of
 from pipeline.importing.bag_topics import Topic, iterate_scan, message_of, pairs_of
 from pipeline.importing.bag_transforms import Transforms
-from pipeline.importing.depth_views import DepthCamera, DepthView, frame_of, unreadable_note, view_of
+from pipeline.importing.depth_views import (
+    DepthCamera,
+    DepthView,
+    first_with_depth,
+    frame_of,
+    unreadable_note,
+    view_of,
+)
 from pipeline.importing.reading import of_many
 from pipeline.io.images import NoDepthError, ReadDepth
 from pipeline.types import CameraIntrinsics, FloatArray, IntArray, RgbdFrame
@@ -106,14 +114,14 @@ def iterate_bag_recording(path: Path, depth_scale: float | None) -> Generator[Pr
         times_s, time_notes = times_of([color, depth])
         moments = all_moments(path, times_s)
         scale = BagScale.of(reader, depth.name, depth_scale)
-        for at in moments[:, 1]:
-            try:
-                read = scale.read(message_of(reader, depth.name, depth.recorded_ns, int(at)))
-                break
-            except NoDepthError:
-                continue
-        else:
-            raise NoDepthError(f"No frame of {path} has depth; check the depth images of {depth.name}")
+
+        def depth_at(index: int) -> ReadDepth:
+            with readable(path):
+                return scale.read(message_of(reader, depth.name, depth.recorded_ns, index))
+
+        read = first_with_depth(partial(depth_at, int(at)) for at in moments[:, 1])
+    if read is None:
+        raise NoDepthError(f"No frame of {path} has depth; check the depth images of {depth.name}")
     shape = read.depth.z_m.shape
     place, place_notes = place_of_depth(color, depth, shape, scanned.transforms)
     if place is not None:

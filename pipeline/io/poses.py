@@ -1,11 +1,14 @@
-"""Reading and writing of poses as text files of 4 x 4 numbers."""
+"""Reading and writing of poses as text files of 4 x 4 numbers, and writing of paths in TUM's form."""
 
 from __future__ import annotations
 
 import logging
 import re
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, read_text
@@ -149,3 +152,14 @@ def write_pose(path: AnyPath, T: FloatArray) -> None:
     """
     with atomic_path(path) as sibling:
         np.savetxt(sibling, T, fmt="%.17g")
+
+
+def write_tum(file: AnyPath, times_s: FloatArray, T_world_camera: Sequence[FloatArray | None]) -> None:
+    """Write (4, 4) poses and their (N,) times in TUM's form; those that are None have no line."""
+    lines = ["# time (s), then the camera in the world: tx ty tz (m) qx qy qz qw"]
+    for time_s, T in zip(times_s, T_world_camera, strict=True):
+        if T is not None:
+            values = *T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_quat()
+            lines.append(f"{time_s:.6f} " + " ".join(f"{value:.9f}" for value in values))
+    with atomic_path(file) as temporary:
+        Path(temporary).write_text("\n".join(lines) + "\n", encoding="utf-8")

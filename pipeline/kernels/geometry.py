@@ -108,7 +108,7 @@ def pixel_rays(intrinsics: CameraIntrinsics) -> FloatArray:
 
 def has_ray(intrinsics: CameraIntrinsics) -> BoolArray:
     """Return (H, W) True for the pixels that have a direction in ``pixel_rays``."""
-    if _is_pinhole(intrinsics):
+    if is_pinhole(intrinsics):
         return np.ones((intrinsics.height_px, intrinsics.width_px), dtype=bool)
     return np.isfinite(pixel_rays(intrinsics)[..., 2])
 
@@ -137,7 +137,7 @@ def undistorted_rays(intrinsics: CameraIntrinsics, pixels: ArrayLike) -> FloatAr
     pixels = np.asarray(pixels, dtype=np.float64)
     if not len(pixels):
         return np.empty((0, 3))
-    if _is_pinhole(intrinsics):
+    if is_pinhole(intrinsics):
         x = (pixels[:, 0] - intrinsics.cx_px) / intrinsics.fx_px
         y = (pixels[:, 1] - intrinsics.cy_px) / intrinsics.fy_px
         return np.stack([x, y, np.ones_like(x)], axis=1)
@@ -154,7 +154,7 @@ def project(intrinsics: CameraIntrinsics, points_m: FloatArray) -> FloatArray:
         return np.empty((0, 2))
     depth_m = points_m[:, 2]
     nearness = np.divide(1.0, depth_m, out=np.ones_like(depth_m), where=depth_m != 0.0)
-    if _is_pinhole(intrinsics):  # OpenCV would also compute fifty derivatives per point
+    if is_pinhole(intrinsics):  # OpenCV would also compute fifty derivatives per point
         u_px = points_m[:, 0] * nearness * intrinsics.fx_px + intrinsics.cx_px
         v_px = points_m[:, 1] * nearness * intrinsics.fy_px + intrinsics.cy_px
         return np.stack([u_px, v_px], axis=1)
@@ -174,5 +174,6 @@ def project(intrinsics: CameraIntrinsics, points_m: FloatArray) -> FloatArray:
     return pixels
 
 
-def _is_pinhole(intrinsics: CameraIntrinsics) -> bool:
+def is_pinhole(intrinsics: CameraIntrinsics) -> bool:
+    """Return whether a camera has no distortion."""
     return not intrinsics.fisheye and not np.any(intrinsics.distortion)

@@ -35,22 +35,22 @@ def straight_view(camera: CameraIntrinsics) -> CameraIntrinsics:
 
 def straight_image(rgb: ByteArray, camera: CameraIntrinsics, view: CameraIntrinsics) -> ByteArray:
     """Return (H, W, 3) an image of ``camera`` as ``view`` sees it; black outside the image."""
-    return cv2.remap(rgb, *_maps(camera, view), cv2.INTER_LINEAR, borderValue=(0, 0, 0))
+    return cv2.remap(rgb, *maps_between(camera, view), cv2.INTER_LINEAR, borderValue=(0, 0, 0))
 
 
 def straight_depth(depth: DepthMap, camera: CameraIntrinsics, view: CameraIntrinsics) -> DepthMap:
     """Return depth of ``camera`` on the pixels of ``view``, each from the nearest pixel; NaN outside."""
-    z = cv2.remap(depth.z_m, *_maps(camera, view), cv2.INTER_NEAREST, borderValue=math.nan)
+    z = cv2.remap(depth.z_m, *maps_between(camera, view), cv2.INTER_NEAREST, borderValue=math.nan)
     return DepthMap(z, depth.kind)
 
 
 def bent_depth(depth: DepthMap, camera: CameraIntrinsics, view: CameraIntrinsics) -> DepthMap:
     """Return depth of ``view`` on the pixels of ``camera``; NaN where ``view`` does not see."""
-    z = cv2.remap(depth.z_m, *_maps(view, camera), cv2.INTER_LINEAR, borderValue=math.nan)
+    z = cv2.remap(depth.z_m, *maps_between(view, camera), cv2.INTER_LINEAR, borderValue=math.nan)
     return DepthMap(z, depth.kind)
 
 
-def _maps(source: CameraIntrinsics, target: CameraIntrinsics) -> tuple[FloatArray, FloatArray]:
+def maps_between(source: CameraIntrinsics, target: CameraIntrinsics) -> tuple[FloatArray, FloatArray]:
     """Return (H, W) float32 columns and rows in ``source`` of the pixels of ``target``."""
     pixels = project(source, pixel_rays(target).reshape(-1, 3))
     pixels = np.nan_to_num(pixels, nan=_OUTSIDE_PX).reshape(target.height_px, target.width_px, 2)

@@ -47,8 +47,6 @@ OF_TRACKING = 1.5
 """Weight of a link of tracking where links contradict each other, in loops: two loops outvote it."""
 GRAPH_POINTS = 200
 """About the number of a keyframe's points at which the pose graph measures errors."""
-
-
 Pair = tuple[int, int]
 """Source and target of a link."""
 
@@ -218,7 +216,7 @@ def _chain(track: Track) -> dict[int, FloatArray]:
 def _candidates(
     poses: Mapping[int, FloatArray],
     clouds: Mapping[int, OrganisedCloud],
-    tried: Mapping[tuple[int, int], FloatArray],
+    tried: Mapping[Pair, FloatArray],
 ) -> Generator[Progress, None, list[_Candidate]]:
     """Return pairs of keyframes that should show the same place, for each the ``MOST_TRIED`` best.
 

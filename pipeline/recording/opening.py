@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress, part
-from pipeline.config import MOST_FRAMES
+from pipeline.acquisition.planes import inverse_depth
+from pipeline.config import MOST_AVERAGED
 from pipeline.importing.recorded import DepthView
 from pipeline.io.depth_to_color import register_depth
-from pipeline.kernels.geometry import inverse, pixel_rays, project
+from pipeline.kernels.geometry import apply, inverse, is_pinhole, pixel_rays, project
 from pipeline.recording.recording import Recording, spread
-from pipeline.recording.still import Vote, inverse_depth, voted
+from pipeline.recording.still import Vote, voted
 from pipeline.recording.tracking import REPORTED, read_ahead
 from pipeline.recording.walk import LEAST_FRAMES, iterate_walk
 from pipeline.types import Averaging, ByteArray, DepthMap, FloatArray, RgbdFrame, Rig
@@ -46,7 +47,7 @@ NAME = "camera"
 """Name of the node."""
 
 
-def iterate_recording(recording: Recording, frames: int = MOST_FRAMES) -> Generator[Progress, None, Rig]:
+def iterate_recording(recording: Recording, frames: int = MOST_AVERAGED) -> Generator[Progress, None, Rig]:
     """Turn a recording into a rig, of one node if the camera stands; else its path is tracked.
 
     Args:
@@ -147,7 +148,7 @@ def iterate_still(recording: Recording, frames: int) -> Generator[Progress, None
     Raises:
         InputError: no frame has depth, no photograph can be read, or nothing keeps its depth.
     """
-    available = min(len(recording.times_s), MOST_FRAMES)
+    available = min(len(recording.times_s), MOST_AVERAGED)
     numbers, stack = yield from _iterate_stack(recording, min(frames, available))
     yield Progress(f"averaging {len(numbers)} frames", 0.9)
     view = recording.view(numbers[0])
@@ -210,15 +211,14 @@ def _median_color(photographs: list[ByteArray]) -> ByteArray:
 def _on_color(vote: Vote, view: DepthView, frame: RgbdFrame) -> tuple[DepthMap, FloatArray]:
     """Return depth and its (H, W) standard deviation on the pixel grid of a photograph."""
     camera = frame.intrinsics
-    same = view.depth.z_m.shape == frame.rgb.shape[:2] and not camera.fisheye
-    same = same and np.array_equal(view.camera.matrix, camera.matrix) and not np.any(camera.distortion)
+    same = view.depth.z_m.shape == frame.rgb.shape[:2] and is_pinhole(camera)
+    same = same and np.array_equal(view.camera.matrix, camera.matrix)
     if same and np.array_equal(view.T_color_depth, np.eye(4)):
         return vote.depth, vote.sd_m
     depth = register_depth(vote.depth, view.camera, camera, view.T_color_depth)
     rows, columns = np.nonzero(depth.valid)
     points_m = pixel_rays(camera)[rows, columns] * depth.z_m[rows, columns, None]
-    T_depth_color = inverse(view.T_color_depth)
-    own_m = points_m @ T_depth_color[:3, :3].T + T_depth_color[:3, 3]
+    own_m = apply(inverse(view.T_color_depth), points_m)
     u, v = np.rint(np.nan_to_num(project(view.camera, own_m), nan=-1.0)).astype(int).T
     inside = (u >= 0) & (u < view.camera.width_px) & (v >= 0) & (v < view.camera.height_px)
     sd_m = np.full(depth.z_m.shape, np.nan, np.float32)

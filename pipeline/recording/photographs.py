@@ -11,12 +11,14 @@ from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.kernels.geometry import apply, inverse, project
 from pipeline.recording.recording import Recording, spread
-from pipeline.types import ByteArray, FloatArray, PointCloud, RgbdFrame
+from pipeline.types import ByteArray, FloatArray, IntArray, PointCloud, RgbdFrame
 
 MOST_COLORING = 96
 """Most keyframes that colour the map, evenly chosen."""
 SAME_DEPTH = 0.02
-"""Largest difference of a point's depth from the measured one, as a share, at a frame that colours it."""
+"""Largest difference of a point's depth from the measured one, as a share, at a frame that measured it."""
+NEAREST_M = 0.05
+"""Points nearer to the camera's plane are not looked for in its image."""
 UNKNOWN = 128
 """Grey value of points that no frame colours."""
 
@@ -71,6 +73,24 @@ def iterate_photographs(
     return Photographs(tuple(kept), blend.colors, tuple(notes))
 
 
+def measured_in(frame: RgbdFrame, points_m: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return which of (N, 3) world points a frame measured.
+
+    Returns:
+        Their (M,) rows, (M, 2) columns and rows in the image, and (M, 3) places in the camera's frame.
+    """
+    own_m = apply(inverse(frame.T_world_camera), points_m)
+    ahead = np.flatnonzero(own_m[:, 2] > NEAREST_M)
+    pixels = project(frame.intrinsics, own_m[ahead])
+    nearest = np.nan_to_num(np.rint(pixels), nan=-1.0).astype(int)
+    size_px = frame.intrinsics.width_px, frame.intrinsics.height_px
+    inside = np.all((nearest >= 0) & (nearest < size_px), axis=1)
+    rows, (u, v) = ahead[inside], nearest[inside].T
+    z_m = own_m[rows, 2]
+    seen = np.abs(frame.depth.z_m[v, u] - z_m) <= SAME_DEPTH * z_m
+    return rows[seen], pixels[inside][seen], own_m[rows[seen]]
+
+
 class Blend:
     """Mean colour of each point over the frames that measured it.
 
@@ -84,19 +104,11 @@ class Blend:
 
     def add(self, frame: RgbdFrame) -> None:
         """Add what a frame shows of the points."""
-        own_m = apply(inverse(frame.T_world_camera), self._points.points_m)
-        ahead = np.flatnonzero(own_m[:, 2] > 0.05)
-        pixels = project(frame.intrinsics, own_m[ahead])
-        pixels = np.nan_to_num(np.rint(pixels), nan=-1.0).astype(int)
-        size = frame.intrinsics.width_px, frame.intrinsics.height_px
-        inside = np.all((pixels >= 0) & (pixels < size), axis=1)
-        rows, (u, v) = ahead[inside], pixels[inside].T
-        z_m = own_m[rows, 2]
-        seen = np.abs(frame.depth.z_m[v, u] - z_m) <= SAME_DEPTH * z_m
-        rows, u, v = rows[seen], u[seen], v[seen]
-        distance_m = np.linalg.norm(own_m[rows], axis=1)
+        rows, pixels, own_m = measured_in(frame, self._points.points_m)
+        u, v = np.rint(pixels).astype(int).T
+        distance_m = np.linalg.norm(own_m, axis=1)
         normals = np.asarray(self._points.normals)[rows] @ frame.T_world_camera[:3, :3]
-        facing = -np.einsum("ni,ni->n", normals, own_m[rows]) / distance_m
+        facing = -np.einsum("ni,ni->n", normals, own_m) / distance_m
         weight = np.maximum(facing, 0.05) / distance_m**2
         self._total[rows] += weight[:, None] * frame.rgb[v, u]
         self._weights[rows] += weight

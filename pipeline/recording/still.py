@@ -49,13 +49,6 @@ class Vote:
     """(H, W) True for pixels that less than ``FLICKERS_BELOW`` of the frames measured."""
 
 
-def inverse_depth(depth: DepthMap) -> FloatArray:
-    """Return (H, W) float32 1/z, 1/m; 0 where the depth is unknown."""
-    known = depth.valid & (depth.z_m > 0.0)
-    inverse: FloatArray = (known / np.where(known, depth.z_m, 1.0)).astype(np.float32)
-    return inverse
-
-
 def voted(inverse: FloatArray, noise: DepthNoise) -> Vote:
     """Average depth images pixel by pixel: the mean of what lies within the noise of the median.
 

@@ -10,7 +10,7 @@ import numpy as np
 import viser
 
 from app.compute.records import Sample
-from app.drawing.cameras import turn
+from app.drawing.cameras import axes_downwards, distances_m, turn
 from app.drawing.clouds import add_cloud
 from app.drawing.colors import DELIVERED, LOSS, SOURCE
 from app.drawing.poses import move, place
@@ -34,8 +34,6 @@ POINT = 0.75
 FRUSTUM = 0.35
 """Size of a frustum over the distance from the path to what it sees, at most ``MOST_FRUSTUM_M``."""
 MOST_FRUSTUM_M = 0.3
-SLOPE_RAD = np.radians(50.0)
-"""Angle at which one looks down on the walk."""
 FITTED, MARGIN = 3000, 0.9
 """Number of map points that must fit into the picture, and the share of the picture that they may fill."""
 MOST_SEGMENTS = 1000
@@ -163,7 +161,7 @@ class WalkDrawing:
 
     def choose(self, loop: LoopView | None) -> None:
         """Show the cameras of a loop's two keyframes with their pictures; None hides them."""
-        frames = () if loop is None else sorted((loop.source, loop.target))
+        frames = () if loop is None else loop.frames
         for camera in self._pair:
             camera.visible = bool(frames)
         for camera, name, frame in zip(self._pair, self._names, frames, strict=False):
@@ -208,20 +206,16 @@ def viewpoint(view: WalkView, fov_rad: float, aspect: float) -> tuple[FloatArray
     The map and both paths fit into a picture with this vertical field of view and this width over height.
     """
     gaze = np.nanmean(view.T_world_camera[:, :3, 2], axis=0)
-    level = np.array([gaze[0], gaze[1], 0.0]) / max(float(np.hypot(gaze[0], gaze[1])), 1e-9)
-    forward = np.cos(SLOPE_RAD) * level - np.sin(SLOPE_RAD) * np.array([0.0, 0.0, 1.0])
-    right = np.cross(forward, (0.0, 0.0, 1.0)) / np.cos(SLOPE_RAD)
-    axes = np.stack([right, np.cross(right, forward), forward])
+    axes = axes_downwards(gaze)
     seen_m = view.points_m[:: 1 + len(view.points_m) // FITTED] @ axes.T
     paths_m = np.concatenate([view.at_m, shifted(view, enlarging(view))]) @ axes.T
     paths_m = paths_m[np.isfinite(paths_m).all(axis=1)]
     seen_m = np.concatenate([np.clip(seen_m, *np.percentile(seen_m, [1, 99], axis=0)), paths_m])
     middle_m = 0.5 * (seen_m.min(axis=0) + seen_m.max(axis=0))
-    across_m, up_m, away_m = (seen_m - middle_m).T
     half = np.tan(0.5 * fov_rad) * MARGIN
-    back_m = np.maximum(np.abs(across_m) / (half * aspect), np.abs(up_m) / half) - away_m
+    back_m = distances_m(seen_m - middle_m, half * aspect, half)
     center_m = middle_m @ axes
-    return center_m, center_m - float(back_m.max()) * forward
+    return center_m, center_m - float(back_m.max()) * axes[2]
 
 
 def _segments(at_m: FloatArray) -> FloatArray:

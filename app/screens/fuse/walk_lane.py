@@ -90,7 +90,7 @@ class WalkLane:
 
     def _arc(self, loop: LoopView) -> tuple[FloatArray, FloatArray]:
         """Return (K,) times and (K,) heights from the lane's upper edge along a loop's arc."""
-        first, last = (float(self._times_ns[frame]) for frame in sorted((loop.source, loop.target)))
+        first, last = (float(self._times_ns[frame]) for frame in loop.frames)
         span = (last - first) / max(float(self._times_ns[-1] - self._times_ns[0]), 1.0)
         high_px = (ARCS_PX - 4) * (LEAST_ARC + (1.0 - LEAST_ARC) * np.sqrt(span))
         angles = np.linspace(np.pi, 0.0, ARC_PARTS + 1)
@@ -136,8 +136,7 @@ class WalkLane:
 
     def place(self, item: int) -> tuple[int, int, int, int]:
         """Return the times of a loop's two keyframes, and the edges of the band."""
-        loop = self._view.loops[item]
-        first, last = sorted((loop.source, loop.target))
+        first, last = self._view.loops[item].frames
         return int(self._times_ns[first]), int(self._times_ns[last]), ARCS_PX, self.height_px
 
 

@@ -46,9 +46,9 @@ SETTINGS: dict[str, Setting[WalkLook]] = {
 }
 """The settings of a stop, by their names in the file."""
 NUMBERS = (
-    *("frames", "keyframes", "seconds", "path", "lost", "times", "drift", "end_drift", "step"),
+    *("frames", "keyframes", "seconds", "lost", "times", "drift", "step"),
     *("loops", "found", "pair", "moved", "turned", "left", "overlap"),
-    *("first", "half", "points", "missed", "missed_before"),
+    *("first", "half", "missed", "missed_before"),
 )
 """Fields of the texts."""
 
@@ -83,15 +83,12 @@ def numbers(scene: str, view: WalkView, surface: Any, times: int) -> Numbers:
         "frames": f"{view.frames:,}",
         "keyframes": f"{len(view.keyframes):,}",
         "seconds": number(float(view.times_s[-1]), 1, "s"),
-        "path": number(view.path_m, 1, "m"),
-        "lost": f"{sum(last - first + 1 for first, last in view.lost):,}",
+        "lost": f"{view.lost_frames:,}",
         "times": f"{times}",
         "drift": number(float(np.nanmax(view.drift_m)), 1, "cm", 100.0),
-        "end_drift": number(float(view.drift_m[view.last]), 1, "cm", 100.0),
         "step": number(float(step_m), 1, "cm", 100.0),
         "loops": f"{view.used_loops:,}",
         "found": f"{len(view.loops):,}",
-        "points": f"{view.map_points:,}",
         "first": number(float(share[0]), 0, "%"),
         "half": number(float(share[view.frames // 2]), 0, "%"),
     }

@@ -27,13 +27,19 @@ MOMENT = term("Moment", "The frame at the clock's time, and the part of the map 
 
 def walk_table(view: WalkView) -> Markup:
     """Return a table with the numbers of the whole walk."""
-    lost = sum(last - first + 1 for first, last in view.lost)
-    tracked = view.frames - lost
     rate = (view.frames - 1) / max(float(view.times_s[-1]), 1e-9)
     rows: list[Row] = [
         ("Frames", "Depth and colour images of the recording.", f"{view.frames:,} ({rate:.0f} per second)"),
-        ("Tracked", "Frames whose pose is known; only they are in the map.", f"{tracked:,}"),
-        ("Lost", "Frames without a pose: they show too little of what was seen before.", f"{lost:,}"),
+        (
+            "Tracked",
+            "Frames whose pose is known; only they are in the map.",
+            f"{view.frames - view.lost_frames:,}",
+        ),
+        (
+            "Lost",
+            "Frames without a pose: they show too little of what was seen before.",
+            f"{view.lost_frames:,}",
+        ),
         (
             "Keyframes",
             "Frames with which the later ones are registered; a new one begins when less than 80 % of "
@@ -50,12 +56,12 @@ def walk_table(view: WalkView) -> Markup:
         (
             "Largest drift",
             "Largest distance between the position by tracking alone and the one after the loops.",
-            number(float(np.nanmax(view.drift_m)), 1, "cm", 100.0),
+            _cm(float(np.nanmax(view.drift_m))),
         ),
         (
             "Corrected at the end",
             "The same distance at the last tracked frame.",
-            number(float(view.drift_m[view.last]), 1, "cm", 100.0),
+            _cm(view.drift_m[view.last]),
         ),
         (
             "Points in the map",
@@ -77,8 +83,7 @@ def frame_line(view: WalkView, frame: int) -> str:
 
 def loop_name(loop: LoopView) -> str:
     """Return the name of a loop by its keyframes: ``frames 0 and 180``."""
-    first, last = sorted((loop.source, loop.target))
-    return f"frames {first} and {last}"
+    return "frames {} and {}".format(*loop.frames)
 
 
 def loop_line(loop: LoopView) -> str:
@@ -91,8 +96,7 @@ def loop_line(loop: LoopView) -> str:
 
 def loop_html(view: WalkView, loop: LoopView, pictures: Pictures) -> Markup:
     """Return the pictures of a loop's two keyframes, and its numbers."""
-    frames = sorted((loop.source, loop.target))
-    shown = Markup("").join(_picture(view.times_s[frame], frame, pictures.of(frame)) for frame in frames)
+    shown = Markup("").join(_picture(view.times_s[frame], frame, pictures.of(frame)) for frame in loop.frames)
     if loop.used:
         counts, why = "yes", "The final poses agree with it as far as the others allow."
     else:

@@ -137,10 +137,6 @@ class WalkPart:
             self._drawing.look(clients)
         return True
 
-    def look_anew(self) -> None:
-        """Turn the view again at the next ``look``."""
-        self._framed = ()
-
     def _take(self, key: Hashable, view: WalkView | None) -> None:
         if key != self._asked:
             return
@@ -272,7 +268,7 @@ class WalkPart:
 
     def _pairs(self) -> list[str]:
         assert self._view is not None
-        return ["{}-{}".format(*sorted((loop.source, loop.target))) for loop in self._view.loops]
+        return ["{}-{}".format(*loop.frames) for loop in self._view.loops]
 
     def _take_loop(self, text: str) -> None:
         if text and re.fullmatch(r"\d{1,7}-\d{1,7}", text) is None:

@@ -16,7 +16,7 @@ class LoopView:
     """A registration of two keyframes that closes a loop."""
 
     source: int
-    """Frame number of the later keyframe."""
+    """Frame number of a keyframe; it is not always the later one."""
     target: int
     moved_m: float
     """Distance between the source's position in the target by this registration and by tracking alone."""
@@ -29,6 +29,11 @@ class LoopView:
     """Share of the points that both measured and at about the same depth."""
     used: bool
     """False if it contradicts the other registrations."""
+
+    @property
+    def frames(self) -> tuple[int, int]:
+        """Frame numbers of the earlier and the later keyframe."""
+        return min(self.source, self.target), max(self.source, self.target)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +89,11 @@ class WalkView:
     def frames(self) -> int:
         """Number of frames."""
         return len(self.times_s)
+
+    @property
+    def lost_frames(self) -> int:
+        """Number of frames without a pose."""
+        return sum(last - first + 1 for first, last in self.lost)
 
     @cached_property
     def drift_m(self) -> FloatArray:

@@ -9,7 +9,7 @@ from app.compute.records import AveragedView
 from app.web.markup import Markup
 from app.window.panel import PanelSession
 from app.window.tables import number
-from pipeline.config import MOST_FRAMES, PipelineConfig
+from pipeline.config import MOST_AVERAGED, PipelineConfig
 from pipeline.sources import Source
 
 QUIET_S = 0.2
@@ -29,7 +29,7 @@ class FramesSlider:
         ui = session.ui
         self._session = session
         self._slider = ui.gui.add_slider(
-            "Frames", 1, MOST_FRAMES, 1, session.spec.config.recording.frames, hint=HINT, visible=False
+            "Frames", 1, MOST_AVERAGED, 1, session.spec.config.recording.frames, hint=HINT, visible=False
         )
         self._text = ui.gui.add_html(Markup(""), visible=False)
         self._source: Source | None = None

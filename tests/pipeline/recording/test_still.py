@@ -5,7 +5,8 @@ import time
 import numpy as np
 import pytest
 
-from pipeline.recording.still import WITHIN_SD, inverse_depth, step_at, voted
+from pipeline.acquisition.planes import inverse_depth
+from pipeline.recording.still import WITHIN_SD, step_at, voted
 from pipeline.types import DepthMap, DepthNoise
 
 LAW = DepthNoise(s0_m=0.0012, s1_m=0.0015, p=2.0, q=1.0)

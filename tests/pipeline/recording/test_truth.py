@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.folders.walk import write_tum
+from pipeline.io.poses import write_tum
 from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.recording.truth import with_true_path
 from pipeline.types import PointCloud, Rig, Walk
