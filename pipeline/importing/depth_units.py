@@ -83,7 +83,8 @@ def depth_of(name: str, values: NDArray[Any], units_per_metre: float, stated: bo
         InputError: there is no depth within 65 m.
     """
     known = known_in(values)
-    z_m = (values / units_per_metre).astype(np.float32)
+    with np.errstate(all="ignore"):
+        z_m = (values / units_per_metre).astype(np.float32)
     z_m[~known | (z_m > FARTHEST_M)] = np.nan
     if not np.isfinite(z_m).any():
         raise InputError(

@@ -9,7 +9,6 @@ from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.importing import iterate_import
 from pipeline.importing.recorded import open_recording
-from pipeline.importing.sens import read_sens
 from pipeline.io.extrinsics import read_extrinsics
 from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.rigs import load_rig
@@ -119,12 +118,13 @@ def test_a_damaged_image_gets_a_sentence_and_the_other_frames_are_read(tmp_path)
     start = HEADER_BYTES + 96 + color_bytes  # the first frame's depth
     data[start : start + 40] = bytes(40)
     file.write_bytes(data)
+    recording = open_recording(file)
     with pytest.raises(InputError, match=r"depth image 0 in .*scene0000_00.sens is truncated or damaged"):
-        open_recording(file)
-    sequence = read_sens(file, None)
-    np.testing.assert_array_equal(
-        sequence.candidates[1].depth.read(), np.nan_to_num(1000 * written.frames[1].depth.z_m).round()
-    )
+        recording.frame(0)
+    assert np.isnan(recording.view(0).depth.z_m).all()
+    assert "depth image 0" in recording.unreadable[0]
+    for k in (1, 2):
+        np.testing.assert_array_equal(recording.view(k).depth.z_m, written.frames[k].depth.z_m)
 
 
 def test_intrinsics_that_are_given_are_taken(tmp_path):
