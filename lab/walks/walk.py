@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lab.places.pairs import FOV_DEG
 from lab.walks.path import RATE_HZ, walk_poses
+from lab.walks.shutter import photographs
 from lab.worlds.film import Film
 from lab.worlds.raycast import world_mesh
 from lab.worlds.render import Renderer
@@ -54,7 +55,7 @@ def kinect(width_px: int) -> CameraIntrinsics:
 def render_walk(scene: Scene, frames: int, camera: CameraIntrinsics, out: AnyPath, seed: int = 0) -> None:
     """Write a walk through a room frame by frame; the same arguments give the same bits.
 
-    All frames have one film (noise, blur and vignette), automatic exposure and no motion blur. The lists and
+    All frames have one film (noise, blur and vignette), automatic exposure and motion blur. The lists and
     the truth are written first, so that the frames there are can be read before the last one is rendered.
 
     Args:
@@ -80,8 +81,7 @@ def render_walk(scene: Scene, frames: int, camera: CameraIntrinsics, out: AnyPat
         )
     renderer, rng = Renderer(scene, threads=1), np.random.default_rng([seed, 31])
     film = one_film(rng)
-    for k, T in enumerate(poses):
-        view = renderer.exposure(camera, T, "fast", rng).developed(film, rng)
+    for k, view in enumerate(photographs(renderer, camera, poses, 1, film, rng)):
         write_color(folder / image_file("rgb", k), view.rgb)
         _write_depth(folder / image_file("depth", k), sense_depth(view, camera, rng))
 
