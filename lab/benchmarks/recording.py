@@ -10,20 +10,21 @@ import numpy as np
 from lab.benchmarks.benchmark import Benchmark
 from lab.trials import iterate_trials
 from lab.walks.held_out import CACHE, WalkTask, held_out_walks
-from lab.walks.judging import JUDGED_TO_M, LOST_SHARE, Row, reference_of
+from lab.walks.judging import LOST_SHARE, reference_of
 from lab.walks.ours import OURS, OWN, measure_own
 from lab.walks.peers import WALK_PEERS, available_walk_peers, measure_peer
+from lab.walks.surfaces import F_SCORES, Row
 from packetmesh.progress import drain
 
 WALKS, FRAMES, WIDTH_PX = 10, 600, 320
 """Rooms, frames of each walk, 30 a second, and width of the images."""
 FAST = 5
 """Step between the frames of a fast walk."""
-ERRORS = ("ate_m", "ate_share", "rpe_m", "without_pose", "map_median_m")
+ERRORS = ("ate_m", "ate_share", "rpe_m", "without_pose", "map_median_m", "without_surface")
 """Values whose largest is the worst."""
 MOSTLY_KNOWN = ("ate_m", "ate_share", "rpe_m")
 """Errors that say little if most frames have no pose."""
-GAINS = ("frames_s", "within_2cm", "within_5cm")
+GAINS = ("frames_s", *F_SCORES)
 """Values whose smallest is the worst."""
 TIMED = (
     "Median (worst). Time is from images in memory to poses and map; reading and the surface are not in it."
@@ -136,8 +137,8 @@ def _line(group: Row) -> str:
     if group["map_median_m"] is not None:
         parts += [
             f"map {_both(group, 'map_median_m', 1000, 'mm')} off",
-            f"of the depth to {JUDGED_TO_M:.0f} m {_both(group, 'within_2cm', 100, '%')} within 2 cm",
-            f"{_both(group, 'within_5cm', 100, '%')} within 5 cm",
+            f"F-score at 2 cm {_both(group, 'f_2cm', 100, '%')}, at 5 cm {_both(group, 'f_5cm', 100, '%')}",
+            f"{_both(group, 'without_surface', 100, '%')} of rays without a surface",
         ]
     return f"{group['program']}: {', '.join(parts)}"
 

@@ -3,50 +3,30 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from lab.walks.held_out import FramesInMemory, WalkTask, frames_in_memory
+from lab.walks.surfaces import F_SCORES, Mesh, Row, map_distance_m, surface_errors
 from lab.walks.walk import TRUTH, WalkTruth, read_truth
 from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.memory import peak_memory_bytes
 from pipeline.folders.walk import path_m
 from pipeline.importing.recorded import open_recording
 from pipeline.kernels.geometry import apply, inverse, rigid
-from pipeline.kernels.rays import Camera, hit_depths, tensor, triangle_scene
 from pipeline.recording.errors import ate_m
-from pipeline.types import CameraIntrinsics, FloatArray, IntArray
+from pipeline.types import CameraIntrinsics, FloatArray
 
 LOST_M, LOST_SHARE = 0.2, 0.5
 """A walk is lost if the ATE is larger, or if more of its frames have no pose."""
 RPE_S = 1.0
-JUDGED_EVERY = 20
-"""Step between the frames of a walk whose rays judge the surface."""
-JUDGED_TO_M = 4.0
-"""Largest true depth of these rays."""
-NEAR_M = (0.02, 0.05)
-"""Largest differences of depth at which a ray counts as met by the surface."""
-MOST_POINTS = 200_000
-"""Most points of a map whose distance to the true surface is measured, evenly drawn."""
 WARM_FRAMES = 5
 """Frames that a program processes before the clock starts, to load its code."""
-Row = dict[str, Any]
-
-
-@dataclass(frozen=True, slots=True)
-class Mesh:
-    """Triangles in a program's world frame."""
-
-    vertices_m: FloatArray
-    """(V, 3)."""
-    triangles: IntArray
-    """(F, 3)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,39 +155,21 @@ def map_errors(
     truth: WalkTruth | None,
     every: int,
 ) -> Row:
-    """Return the median distance of the map's points to the true surface, and shares of true depth met.
+    """Return the median distance of the map's points to the true surface, and the mesh's ``surface_errors``.
 
-    The map is moved by the mean difference of true and estimated poses. Rays are those of the true poses of
-    every ``JUDGED_EVERY``-th frame of the walk. All values are None without a map, a true
-    surface or poses.
+    The map is moved by the mean difference of true and estimated poses. All values are None without a map, a
+    true surface or poses.
     """
-    shares: dict[str, float | None] = {f"within_{near_m * 100:.0f}cm": None for near_m in NEAR_M}
     T = None if truth is None else to_truth(T_world_camera, list(truth.T_world_camera[::every]))
     if truth is None or T is None or points_m is None or mesh is None or not len(points_m):
-        return {"map_points": None, "map_median_m": None, "triangles": None, **shares}
-    some_m = points_m[:: max(1, -(-len(points_m) // MOST_POINTS))]
-    room = triangle_scene(truth.vertices_m, truth.triangles)
-    distances_m = room.compute_distance(tensor(apply(T, some_m), np.float32)).numpy()
-    apart_m = np.concatenate(list(_ray_errors_m(apply(T, mesh.vertices_m), mesh.triangles, camera, truth)))
-    for name, near_m in zip(shares, NEAR_M, strict=True):
-        shares[name] = float(np.mean(apart_m <= near_m))
+        names = ("map_points", "map_median_m", "triangles", *F_SCORES, "without_surface")
+        return dict.fromkeys(names)
     return {
         "map_points": len(points_m),
-        "map_median_m": float(np.median(distances_m)),
+        "map_median_m": map_distance_m(apply(T, points_m), truth),
         "triangles": len(mesh.triangles),
-        **shares,
+        **surface_errors(Mesh(apply(T, mesh.vertices_m), mesh.triangles), camera, truth),
     }
-
-
-def _ray_errors_m(
-    vertices_m: FloatArray, triangles: IntArray, camera: CameraIntrinsics, truth: WalkTruth
-) -> Iterator[FloatArray]:
-    """Yield the (N,) differences of true and found depth of each judged frame; inf where nothing is hit."""
-    cameras = [Camera(camera, T) for T in truth.T_world_camera[::JUDGED_EVERY]]
-    own = hit_depths(vertices_m, triangles, cameras)
-    for right, found in zip(hit_depths(truth.vertices_m, truth.triangles, cameras), own, strict=True):
-        z_m = right.z_m[right.z_m < JUDGED_TO_M]
-        yield np.nan_to_num(np.abs(found.z_m[right.z_m < JUDGED_TO_M] - z_m), nan=np.inf)
 
 
 def to_truth(

@@ -8,7 +8,8 @@ import numpy as np
 
 from lab.benchmarks.benchmark import run_alone
 from lab.walks.held_out import FramesInMemory, WalkTask
-from lab.walks.judging import Mesh, Program, Row, WalkAnswer, measured
+from lab.walks.judging import Program, WalkAnswer, measured
+from lab.walks.surfaces import Mesh, Row
 from packetmesh.progress import drain
 from pipeline.config import PRESETS
 from pipeline.recording.loops import iterate_loops, poses_by_tracking

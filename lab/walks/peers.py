@@ -17,7 +17,8 @@ import numpy as np
 
 from lab.benchmarks.benchmark import run_alone
 from lab.walks.held_out import FramesInMemory, WalkTask
-from lab.walks.judging import Mesh, Program, Row, WalkAnswer, measured
+from lab.walks.judging import Program, WalkAnswer, measured
+from lab.walks.surfaces import Mesh, Row
 from pipeline.kernels.geometry import inverse, orthonormal, pixel_rays
 from pipeline.kernels.open3d_runtime import o3d
 from pipeline.kernels.rays import tensor

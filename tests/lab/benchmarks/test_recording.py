@@ -8,12 +8,13 @@ import pytest
 
 from lab.benchmarks.recording import compared, summary
 from lab.walks.held_out import FIRST_ROOM, WalkTask, frames_in_memory, held_out_walks
-from lab.walks.judging import Mesh, map_errors, rpe_m, to_truth, trajectory_errors
+from lab.walks.judging import map_errors, rpe_m, to_truth, trajectory_errors
 from lab.walks.ours import OURS, OURS_TRACKING, OWN, solve_own
 from lab.walks.peers import available_walk_peers, solve_peer
-from lab.walks.walk import TRUE_POSES, TRUTH, kinect, read_truth
+from lab.walks.surfaces import BESIDE_M, Mesh, surface_errors
+from lab.walks.walk import TRUE_POSES, TRUTH, WalkTruth, kinect, read_truth
 from packetmesh.errors import InputError
-from pipeline.kernels.geometry import apply, inverse, rigid, rotation_exp
+from pipeline.kernels.geometry import apply, inverse, look_at, rigid, rotation_exp
 from pipeline.recording.loops import poses_by_tracking
 from pipeline.recording.tracking import Track, Tracked
 from pipeline.types import Link
@@ -50,7 +51,7 @@ def test_every_program_follows_a_short_walk(walk, program):
     assert np.isnan(row["rpe_m"])  # shorter than a second
     if program in (OURS, "open3d-slam"):
         assert row["map_median_m"] < 0.03
-        assert 0.3 < row["within_2cm"] <= row["within_5cm"] <= 1.0
+        assert 0.3 < row["f_2cm"] <= row["f_5cm"] <= 1.0
 
 
 def test_the_true_room_and_poses_have_no_errors_in_another_world(walk):
@@ -60,14 +61,31 @@ def test_the_true_room_and_poses_have_no_errors_in_another_world(walk):
     mesh = Mesh(apply(ELSEWHERE, truth.vertices_m), truth.triangles)
     row = map_errors(poses, mesh.vertices_m, mesh, kinect(WIDTH_PX), truth, 1)
     assert row["map_median_m"] < 1e-5
-    assert (row["within_2cm"], row["within_5cm"]) == (1.0, 1.0)
+    assert (row["f_2cm"], row["f_5cm"], row["without_surface"]) == (1.0, 1.0, 0.0)
     away = Mesh(mesh.vertices_m + 100.0, mesh.triangles)
-    assert map_errors(poses, mesh.vertices_m, away, kinect(WIDTH_PX), truth, 1)["within_5cm"] == 0.0
+    row = map_errors(poses, mesh.vertices_m, away, kinect(WIDTH_PX), truth, 1)
+    assert (row["f_5cm"], row["without_surface"]) == (0.0, 1.0)
     errors = trajectory_errors(poses, np.arange(FRAMES) / 30.0, list(truth.T_world_camera), 1)
     assert errors["ate_m"] < 1e-9
     assert not errors["lost"]
     few = [*poses[:4], *[None] * (FRAMES - 4)]
     assert trajectory_errors(few, np.arange(FRAMES) / 30.0, list(truth.T_world_camera), 1)["lost"]
+
+
+def test_a_wall_3_cm_off_and_one_that_is_missing_are_seen_in_scores_and_rays():
+    def wall(x_m, half):
+        corners = [(0.0, -2.0, -2.0), (0.0, half, -2.0), (0.0, half, 2.0), (0.0, -2.0, 2.0)]
+        return np.array(corners) + np.array([x_m, 0.0, 0.0]), np.array([[0, 1, 2], [0, 2, 3]])
+
+    camera, eye = kinect(WIDTH_PX), look_at(np.array([-1.5, 0.0, 0.0]), np.zeros(3))
+    truth = WalkTruth(*wall(0.0, 2.0), np.array([eye]))
+    row = surface_errors(Mesh(*wall(0.03, 2.0)), camera, truth)
+    assert (row["f_2cm"], row["f_5cm"], row["without_surface"]) == (0.0, 1.0, 0.0)
+    half = surface_errors(Mesh(*wall(0.0, 0.0)), camera, truth)  # precise, and half of what is looked at
+    assert half["f_2cm"] == pytest.approx(2.0 * 0.5 / 1.5, abs=0.02)
+    share = 0.5 - camera.fx_px * BESIDE_M / 1.5 / WIDTH_PX  # the left half is missing, seen from the right
+    assert half["without_surface"] == pytest.approx(share, abs=0.01)
+    assert surface_errors(Mesh(np.empty((0, 3)), np.empty((0, 3), int)), camera, truth)["f_5cm"] == 0.0
 
 
 def test_a_recording_of_others_is_judged_by_its_poses_which_no_program_gets(walk, tmp_path):
@@ -112,15 +130,16 @@ def test_a_summary_has_medians_and_worst_values_and_a_walk_without_poses_is_the_
             "frames": 10,
             "without_pose": without_pose,
             "map_median_m": 0.002,
-            "within_5cm": 0.9,
+            "f_5cm": 0.9,
+            "without_surface": 0.1,
         }
         own = {
             "program": OURS,
             "every": 1,
             "lost": lost,
             "ate_m": ate_m,
-            "within_2cm": within,
-            "within_5cm": 0.9,
+            "f_2cm": within,
+            "f_5cm": 0.9,
         }
         share = None if ate_m is None else ate_m / 10.0
         return values | own | {"ate_share": share, "frames_s": 20.0, "peak_memory_bytes": 5}
@@ -128,7 +147,7 @@ def test_a_summary_has_medians_and_worst_values_and_a_walk_without_poses_is_the_
     (group,) = summary([row(0.01, 0.8), row(0.03, 0.7), row(0.02, 0.9)])
     assert (group["walks"], group["lost"]) == (3, 0)
     assert (group["ate_m"], group["worst_ate_m"]) == (0.02, 0.03)
-    assert (group["within_2cm"], group["worst_within_2cm"]) == (0.8, 0.7)
+    assert (group["f_2cm"], group["worst_f_2cm"]) == (0.8, 0.7)
     (group,) = summary([row(0.01, 0.8), row(0.03, 0.7), row(None, None, lost=True)])
     assert (group["ate_m"], group["worst_ate_m"], group["lost"]) == (0.03, None, 1)
     (group,) = summary([row(0.01, 0.8), row(0.02, 0.7), row(0.001, 0.1, lost=True, without_pose=6)])

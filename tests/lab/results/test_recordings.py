@@ -19,10 +19,12 @@ RUN = {
     "worst_frames_s": 18.6,
     "map_median_m": None,
     "worst_map_median_m": None,
-    "within_2cm": 0.847,
-    "worst_within_2cm": 0.791,
-    "within_5cm": None,
-    "worst_within_5cm": None,
+    "f_2cm": 0.847,
+    "worst_f_2cm": 0.791,
+    "f_5cm": None,
+    "worst_f_5cm": None,
+    "without_surface": 0.081,
+    "worst_without_surface": 0.2,
 }
 
 
@@ -32,5 +34,6 @@ def test_a_row_has_median_and_worst_in_its_units_and_dashes_where_nothing_is_kno
     row = page.splitlines()[-1]
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     assert cells[:7] == ["ours", "1 of 3", "1.23 (–)", "0.50 % (–)", "2.00 (3.00)", "0 (7)", "21 (19)"]
-    assert cells[7:10] == ["500", cells[8], "85 % (79 %)"]
+    assert cells[7:10] == ["500", cells[8], "84.7 % (79.1 %)"]
+    assert cells[11] == "8.1 % (20.0 %)"
     assert cells[8] == cells[10]  # not measured
