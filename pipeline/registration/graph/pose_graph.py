@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import splu
 
 from pipeline.kernels.geometry import rigid, rotation_exp
@@ -18,6 +18,8 @@ from pipeline.types import FloatArray, IntArray
 MAX_STEPS = 50
 STILL = 1e-9
 """The optimisation stops when no node turns or moves more than this, rad and m."""
+FIRST_DAMPING, ROUNDING = 1e-6, 1e-9
+"""Damping after the first step that raises the sum; rise of the sum, of it and at all, that is rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +119,10 @@ def _around(edges: Sequence[PoseEdge], loops: Loops, place: int, row: int) -> Fl
 
 
 def optimised(start: FloatArray, edges: Sequence[PoseEdge]) -> tuple[FloatArray, FloatArray]:
-    """Minimise the sum of the edges' squared Mahalanobis distances over the poses (Gauss-Newton).
+    """Minimise the sum of the edges' squared Mahalanobis distances over the poses (Levenberg-Marquardt).
+
+    Without damping while the sum falls: along a bare wall, where edges hardly hold a motion, full steps may
+    run away.
 
     The first node of each connected group keeps its pose. The distance of an edge X between poses A of its
     source and B of its target is that of X^-1 B^-1 A from the identity (Choi, Zhou, Koltun 2015, eq. 3).
@@ -137,15 +142,32 @@ def optimised(start: FloatArray, edges: Sequence[PoseEdge]) -> tuple[FloatArray,
     information = np.array([edge.information for edge in edges])
     groups = Groups(len(T), zip(sources.tolist(), targets.tolist(), strict=True))
     free = np.array([node for node in range(len(T)) if groups.of(node) != node], int)
+    total, damping = _total(T, T_source_target, information, sources, targets), 0.0
     for _ in range(MAX_STEPS):
-        step = _step(T, T_source_target, information, sources, targets, free)
+        step = _step(T, T_source_target, information, sources, targets, free, damping)
+        moved = T.copy()
         for node, motion in zip(free, step, strict=True):
-            T[node] = T[node] @ rigid(rotation_exp(motion[:3]), motion[3:])
-        if np.abs(step).max() <= STILL:
+            moved[node] = T[node] @ rigid(rotation_exp(motion[:3]), motion[3:])
+        after = _total(moved, T_source_target, information, sources, targets)
+        still = np.abs(step).max() <= STILL
+        if not still and not after <= (1.0 + ROUNDING) * total + ROUNDING:
+            damping = max(FIRST_DAMPING, 10.0 * damping)
+            continue
+        T, total = moved, after
+        damping = 0.1 * damping if damping > FIRST_DAMPING else 0.0
+        if still:
             break
     error = small_motion(T_source_target @ np.linalg.inv(T[targets]) @ T[sources])
     covariance = np.array([edge.loop_covariance for edge in edges])
     return T, np.einsum("ei,ei->e", error, np.linalg.solve(covariance, error[..., None])[..., 0])
+
+
+def _total(
+    T: FloatArray, T_source_target: FloatArray, information: FloatArray, sources: IntArray, targets: IntArray
+) -> float:
+    """Return the sum of the edges' squared Mahalanobis distances."""
+    error = small_motion(T_source_target @ np.linalg.inv(T[targets]) @ T[sources])
+    return float(np.einsum("ei,eij,ej->", error, information, error))
 
 
 def _step(
@@ -155,8 +177,12 @@ def _step(
     sources: IntArray,
     targets: IntArray,
     free: IntArray,
+    damping: float,
 ) -> FloatArray:
-    """Return the (F, 6) motions of the free nodes, each in its own frame, of one Gauss-Newton step."""
+    """Return the (F, 6) motions of the free nodes, each in its own frame, of one step.
+
+    The diagonal of the normal matrix is multiplied by 1 + ``damping``.
+    """
     T_target_source = np.linalg.inv(T[targets]) @ T[sources]
     error = small_motion(T_source_target @ T_target_source)
     by_target = -adjoint(np.linalg.inv(T_target_source))  # the source's own motion enters as it is
@@ -180,5 +206,6 @@ def _step(
     column = np.broadcast_to(6 * column[:, None, None] + axis, block.shape)
     size = 6 * len(free)
     normal = coo_matrix((block.ravel(), (row.ravel(), column.ravel())), shape=(size, size)).tocsc()
+    normal += diags(damping * normal.diagonal(), format="csc")
     solved: FloatArray = splu(normal).solve(-gradient.ravel())
     return solved.reshape(-1, 6)

@@ -148,3 +148,24 @@ def test_the_poses_are_open3ds(ring):
     for pose, node in zip(ours, graph.nodes, strict=True):
         np.testing.assert_allclose(pose, node.pose, atol=2e-4)
     assert np.abs(ours - start).max() > 2e-3
+
+
+@pytest.mark.parametrize("seed", [4, 8])
+def test_poses_along_a_bare_wall_do_not_run_away(seed):
+    """Three motions are open there; full steps of Gauss and Newton end 10^37 m away."""
+    rng, edges = np.random.default_rng(seed), []
+    poses = [rigid(rotation_exp(rng.normal(0.0, 0.1, 3)), np.array([0.1 * k, 0.0, 0.0])) for k in range(12)]
+    information = np.diag([1e5, 1e5, 0.1, 0.1, 0.1, 1e6])
+    for source in range(len(poses)):
+        for target in range(max(0, source - 3), source):
+            turned = rotation_exp(np.array([0.0, 0.0, rng.normal()]))
+            slipped = rigid(turned, np.array([*rng.normal(0.0, 0.4, 2), 0.0]))
+            motion = np.linalg.inv(poses[target]) @ poses[source] @ slipped
+            edges.append(PoseEdge(source, target, motion, information, 1.0))
+    start = [np.eye(4)]
+    for edge in edges:
+        if edge.target == edge.source - 1:
+            start.append(start[-1] @ edge.T_target_source)
+    solved, distance = optimised(np.array(start), edges)
+    assert distance.sum() < 50.0
+    assert np.linalg.norm(solved[:, :3, 3], axis=1).max() < 2.0
