@@ -8,6 +8,8 @@ from typing import TypeVar
 
 Step = TypeVar("Step")
 Result = TypeVar("Result")
+REPORTS = 100
+"""Progress reports of a long loop, about."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +23,11 @@ class Progress:
     """Name of the stage, readable for users (``"depth inference"``)."""
     fraction: float
     """Share of the whole computation that is done, 0 to 1."""
+
+
+def spaced(count: int, least: int) -> int:
+    """Return after how many of ``count`` steps to report progress: ``least`` or more, at most 101 times."""
+    return max(least, count // REPORTS)
 
 
 def drain(

@@ -23,6 +23,7 @@ from pipeline.delivery.sink import heard
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
+from pipeline.stages import Cache, RunCache, compute
 from pipeline.types import RgbdFrame, Rig
 
 
@@ -72,12 +73,15 @@ def deliver(
     )
 
 
-def iterate_delivery(spec: DeliverySpec, processes: int = 1) -> Generator[Moment, None, Delivery]:
+def iterate_delivery(
+    spec: DeliverySpec, processes: int = 1, cache: Cache | None = None
+) -> Generator[Moment, None, Delivery]:
     """Run ``deliver`` for any source; yields each moment.
 
     Args:
         spec: the source, the network, the coding, and the number of moments.
         processes: number of moments that are rebuilt in parallel; it does not change the results.
+        cache: results of stages that are known, such as the rig of a recording; None for none.
 
     Yields:
         The moments in order of time; closing the generator cancels those not yet rebuilt.
@@ -85,11 +89,13 @@ def iterate_delivery(spec: DeliverySpec, processes: int = 1) -> Generator[Moment
     Raises:
         InputError: the rig, the network or the coding cannot be used; the message says why.
     """
-    sending, moments = send(spec), []
+    cache = cache or RunCache()
+    rig = drain(compute(spec.spec, "rig", cache)).value
+    sending, moments = send(spec, rig), []
     for moment in _moments(sending, processes):
         moments.append(moment)
         yield moment
-    lossless = drain(iterate_reconstruction(spec.spec))
+    lossless = drain(iterate_reconstruction(spec.spec, cache))
     return Delivery(sending, tuple(moments), _last(sending, lossless), lossless)
 
 

@@ -1,16 +1,17 @@
-"""Sources of rigs: each has a title, loads its rig, and knows its command-line arguments.
+"""Sources of rigs: each has a title and knows its command-line arguments.
 
-Reading images needs large libraries, so they are imported only when a source is loaded.
+``stages.open_rig`` loads the rig of any; rigs of images have ``load``. Equal sources give equal rigs, so that
+results are cached by source. Reading images needs large libraries, so they are imported only when a source is
+loaded.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from packetmesh.errors import InputError
-from pipeline.config import MOST_AVERAGED
 from pipeline.types import Rig
 
 if TYPE_CHECKING:
@@ -19,27 +20,6 @@ if TYPE_CHECKING:
     from packetmesh.progress import Progress
     from pipeline.importing.recorded import BagRecording, FolderRecording
     from pipeline.io.calibrations import NodeFiles
-
-
-class Source(Protocol):
-    """A source that gives a rig; equal sources give equal rigs, so results are cached by source."""
-
-    @property
-    def title(self) -> str:
-        """Name to display."""
-        ...
-
-    def load(self) -> Rig:
-        """Return the images, with the truth if it is known.
-
-        Raises:
-            InputError: a file is missing or cannot be used.
-        """
-        ...
-
-    def arguments(self) -> list[str]:
-        """Return the options of ``packetmesh reconstruct`` that name the source."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,19 +61,16 @@ class RigFolder:
         return self.load_with(None)
 
     def load_with(self, calibration: str | None) -> Rig:
-        """Load the rig, with calibration files from a folder instead of its own."""
-        from packetmesh.progress import drain
+        """Load the rig of images, with calibration files from a folder instead of its own."""
         from pipeline.io.rigs import load_rig
-        from pipeline.recording.rig import holds_recordings, iterate_recorded_rig
+        from pipeline.recording.rig import holds_recordings
 
-        if not holds_recordings(self.path):
-            return load_rig(self.path, calibration, self.depth_scale)
-        if calibration is not None:
+        if calibration is not None and holds_recordings(self.path):
             raise InputError(
                 f"The nodes of {self.path} are recordings, which take no calibration from elsewhere; try to "
                 f"copy each node's pose.txt from {calibration} into the rig"
             )
-        return drain(iterate_recorded_rig(self.path, MOST_AVERAGED, self.depth_scale))
+        return load_rig(self.path, calibration, self.depth_scale)
 
     def arguments(self) -> list[str]:
         return ["--rig", self.path, *_depth_scale_argument(self.depth_scale)]
@@ -204,13 +181,6 @@ class Recorded:
 
         return drain(self.iterate_open())
 
-    def load(self) -> Rig:
-        """Return the average of a camera that stands, or the keyframes and the map of one that walks."""
-        from packetmesh.progress import drain
-        from pipeline.recording.opening import iterate_recording
-
-        return drain(iterate_recording(self.open()))
-
     def arguments(self) -> list[str]:
         if self.demo is not None:
             return ["--scene", self.demo]
@@ -250,3 +220,5 @@ def demo_of(name: str) -> Demo | Recorded:
 
 FileSource: TypeAlias = Demo | RigFolder | ImagePair | Calibrated | Recorded
 """Sources that can be given on the command line."""
+Source: TypeAlias = FileSource | LoadedRig
+"""All sources."""

@@ -58,13 +58,16 @@ def deliver(
     from pipeline.folders.delivery import delivery_metrics, summary, write_delivery_folder
     from pipeline.folders.run import clear_run_folder
     from pipeline.spec import Spec
+    from pipeline.stages import RunCache, compute
 
     source, imported = drain(iterate_imported(named, out), say_progress)
     if link_trace is not None:
         network = _with_link(network, link_trace, of_network)
     _say_notes(network, before, preset, of_network)
     delivery_spec = DeliverySpec(Spec(source, chain, config), network, coding, moments, down)
-    steps = iterate_delivery(delivery_spec, processes=min(2, os.cpu_count() or 1))
+    cache = RunCache()
+    drain(compute(delivery_spec.spec, "rig", cache), say_progress)
+    steps = iterate_delivery(delivery_spec, min(2, os.cpu_count() or 1), cache)
     first = next(steps)  # an error here leaves no folder
     writable_folder(out)
     _say_moment(first)
@@ -130,4 +133,4 @@ def _say_moment(moment: Moment) -> None:
         say(f"{line}; no surface yet")
         return
     score = "" if moment.truth is None else f", F-score {moment.truth['f_score_5cm']:.3f}"
-    say(f"{line}; {moment.surface.quality.no_hit_ray_share:.1%} of the rays without surface{score}")
+    say(f"{line}; {moment.surface.quality.no_hit_ray_share:.1%} of the rays are without a surface{score}")

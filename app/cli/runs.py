@@ -23,7 +23,7 @@ from packetmesh.files import atomic_path, finite, writable_folder, write_json
 from packetmesh.progress import Progress, drain, part
 from packetmesh.settings import settings
 from pipeline.config import Baseline, PipelineConfig
-from pipeline.folders.keyframes import delete_keyframes, iterate_keyframes
+from pipeline.folders.keyframes import iterate_keyframes
 from pipeline.folders.run import METRICS, clear_run_folder, metrics_of, write_baseline, write_run_folder
 from pipeline.importing import ImportReport, is_recording, iterate_import
 from pipeline.io.rigs import is_rig
@@ -100,8 +100,6 @@ def iterate_run(
     if isinstance(rig, Recorded) and result.rig.walk is not None:
         recording = yield from part(rig.iterate_open(), "files", 0.9, 0.95, detail=True)
         yield from part(iterate_keyframes(recording, result.rig.walk, out), "keyframes", 0.95, 1.0)
-    else:
-        delete_keyframes(out)
     write_reconstruction_report(result, metrics, out / REPORT)
     if baseline is not None and beside is not None:
         write_baseline(baseline, beside, result, out)
@@ -169,7 +167,7 @@ def iterate_rigs(
     try:
         for index, outcome in run_batch(reconstruct_one, tasks, scheduler, killed=_killed_outcome):
             outcomes[index] = outcome
-            summary = outcome.sentence or f"{outcome.no_hit_after:.1%} of the rays miss the surface"
+            summary = outcome.sentence or f"{outcome.no_hit_after:.1%} of the rays are without a surface"
             yield Progress(f"{outcome.name} {outcome.state}: {summary}", len(outcomes) / len(tasks))
     finally:
         done = tuple(outcomes[index] for index in sorted(outcomes))
@@ -309,7 +307,7 @@ def _figures(outcomes: tuple[RigOutcome, ...], out: Path) -> Iterator[Markup]:
 HEADINGS = (
     "rig",
     "nodes",
-    "no-hit rays before",
+    "rays without a surface before",
     "after",
     "within 2 % before",
     "after",

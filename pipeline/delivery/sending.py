@@ -64,17 +64,17 @@ class Sending:
         return packet_bytes_of(self.trace.config)
 
 
-def send(spec: DeliverySpec, rig: Rig | None = None) -> Sending:
+def send(spec: DeliverySpec, rig: Rig) -> Sending:
     """Encode every node's images and run the network that carries them.
 
     Args:
         spec: what is sent, and how.
-        rig: the rig of the spec if it is loaded, such as that of a recording, which takes long to track.
+        rig: the spec's rig, as stage ``rig`` gives it.
 
     Raises:
         InputError: as for ``iterate_delivery``.
     """
-    coding, rig = coding_named(spec.coding), rig or spec.spec.source.load()
+    coding = coding_named(spec.coding)
     packet_bytes = packet_bytes_of(spec.network)
     encoded = [coding.encode(images_of(frame), packet_bytes) for frame in rig.frames]
     senders = senders_of(rig, spec.down)

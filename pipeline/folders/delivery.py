@@ -12,7 +12,6 @@ from pipeline.deliver import Delivery
 from pipeline.delivery.moments import Moment, NodeArrival
 from pipeline.folders.run import (
     METRICS,
-    clear_run_folder,
     config_of,
     metrics_of,
     surface_metrics,
@@ -40,8 +39,9 @@ def raw_bytes(delivery: Delivery) -> int:
 def write_delivery_folder(delivery: Delivery, metrics: dict[str, Any], preset: str, folder: Path) -> None:
     """Write everything but the report into ``folder``, each file whole or not at all.
 
-    Writes what ``packetmesh reconstruct`` writes, for all that arrived; if that was too little for a
-    surface, only config.json, metrics.json and moments.csv.
+    ``clear_run_folder`` comes first if the folder may have an earlier run. Writes what ``packetmesh
+    reconstruct`` writes, for all that arrived; if that was too little for a surface, only config.json,
+    metrics.json and moments.csv.
 
     Raises:
         InputError: the folder cannot be written.
@@ -52,7 +52,6 @@ def write_delivery_folder(delivery: Delivery, metrics: dict[str, Any], preset: s
         | {"coding": spec.coding, "moments": spec.moments, "network": preset}
         | {"network_settings": settings(delivery.sending.trace.config)}
     )
-    clear_run_folder(folder)
     _write_table(delivery.moments, folder / "moments.csv")
     if delivery.last is not None:
         record = metrics_of(delivery.last) | {"delivery": metrics}
@@ -70,7 +69,7 @@ def summary(delivery: Delivery) -> str:
     share = f"{last.delivered_bytes / sent:.1%} of {sent:,} bytes arrived in {last.t_s:.3g} s"
     if last.surface is None:
         return f"{share}, too little for a surface"
-    holes = f"{last.surface.quality.no_hit_ray_share:.1%} of the rays without surface"
+    holes = f"{last.surface.quality.no_hit_ray_share:.1%} of the rays are without a surface"
     return f"{share}: {holes}, {delivery.lossless.after.quality.no_hit_ray_share:.1%} without losses"
 
 

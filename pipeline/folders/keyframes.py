@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError
-from packetmesh.files import atomic_path, write_json
+from packetmesh.files import atomic_path, file_trouble, write_json
 from packetmesh.progress import Progress
 from pipeline.importing.arkit import Y_DOWN
 from pipeline.importing.colmap_model import CENTRE_PX
@@ -48,9 +48,16 @@ class _Written:
 
 
 def delete_keyframes(folder: Path) -> None:
-    """Delete the keyframes of an earlier run, complete or interrupted, from its folder."""
-    for path in (folder / FOLDER, *folder.glob(f".{FOLDER}-*")):
-        shutil.rmtree(path, ignore_errors=True)
+    """Delete the keyframes of an earlier run, complete or interrupted, from its folder.
+
+    Raises:
+        InputError: they cannot be deleted.
+    """
+    try:
+        for path in (*folder.glob(FOLDER), *folder.glob(f".{FOLDER}-*")):
+            shutil.rmtree(path)
+    except OSError as error:
+        raise InputError(file_trouble(error)) from None
 
 
 def iterate_keyframes(recording: Recording, walk: Walk, folder: Path) -> Generator[Progress, None, Path]:

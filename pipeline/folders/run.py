@@ -12,10 +12,12 @@ from packetmesh.errors import InputError
 from packetmesh.files import delete_unfinished, file_trouble, write_json
 from packetmesh.memory import peak_memory_bytes
 from packetmesh.settings import settings
+from pipeline.folders.keyframes import delete_keyframes
 from pipeline.folders.walk import FILES as WALK_FILES
 from pipeline.folders.walk import walk_metrics, write_trajectory
 from pipeline.io.clouds import write_cloud
 from pipeline.io.meshes import write_mesh
+from pipeline.measuring.surface import MEASURING, measured_surface, write_measured
 from pipeline.merging import MergedClouds
 from pipeline.placement.agreement import Agreement
 from pipeline.placement.outcome import NodeRegistration, NodeVerdict
@@ -30,14 +32,15 @@ MESH_FILES = ("surface_before.ply", "surface_after.ply", "surface.glb")
 
 
 def clear_run_folder(folder: Path) -> None:
-    """Delete the files of an earlier run, complete or interrupted, the metrics first.
+    """Delete what an earlier run wrote, complete or interrupted, the metrics first.
 
     Raises:
         InputError: the folder cannot be written.
     """
     try:
-        for name in (METRICS, "config.json", "poses.json", *WALK_FILES, *CLOUD_FILES, *MESH_FILES):
+        for name in (METRICS, "config.json", "poses.json", *WALK_FILES, *CLOUD_FILES, *MESH_FILES, MEASURING):
             (folder / name).unlink(missing_ok=True)
+        delete_keyframes(folder)
         delete_unfinished(folder)
     except OSError as error:
         raise InputError(file_trouble(error)) from None
@@ -49,10 +52,11 @@ def write_run_folder(
     folder: Path,
     config: dict[str, Any] | None = None,
 ) -> list[Path]:
-    """Write everything but the report into ``folder``, each file whole or not at all.
+    """Write everything but the report and keyframes into ``folder``, each file whole or not at all.
 
-    The metrics are written last: if they exist, all files exist and belong to one run. A surface without
-    triangles, if the ball rests nowhere, gets no mesh file.
+    ``clear_run_folder`` comes first if the folder may have an earlier run. The metrics are written last: if
+    they exist, all files exist and belong to one run. A surface without triangles, if the ball rests
+    nowhere, gets no mesh file.
 
     Args:
         reconstruction: the reconstruction to write.
@@ -66,7 +70,6 @@ def write_run_folder(
     Raises:
         InputError: the folder cannot be written.
     """
-    clear_run_folder(folder)
     files = [folder / "config.json", folder / "poses.json"]
     write_json(files[0], config or config_of(reconstruction.spec))
     write_json(files[1], metrics["poses"])
@@ -81,6 +84,9 @@ def write_run_folder(
         if len(mesh.triangles):
             files.append(folder / name)
             write_mesh(files[-1], mesh, texture if name.endswith(".glb") else None)
+    if len(reconstruction.after.triangles):
+        files.append(folder / MEASURING)
+        write_measured(files[-1], measured_surface(reconstruction))
     write_json(folder / METRICS, metrics)
     return [*files, folder / METRICS]
 

@@ -15,15 +15,16 @@ from packetmesh.errors import InputError
 from packetmesh.files import read_json
 from pipeline.importing.cameras import camera_of
 from pipeline.importing.found_poses import found_poses
-from pipeline.importing.pairing import require, thinned, visible
+from pipeline.importing.pairing import require, visible
 from pipeline.importing.sequence import DEPTH_SUFFIXES, Candidate, Sequence, posed
-from pipeline.importing.stray import CONFIDENCE_NOTE
 from pipeline.io.images import read_color
 from pipeline.io.intrinsics import check_camera
 from pipeline.types import CameraIntrinsics, FloatArray
 
 Y_DOWN = np.diag([1.0, -1.0, -1.0, 1.0])
 """From camera axes with z forward and y down to ARKit's, with z backward and y up."""
+POLYCAM_HIGHEST = 255
+"""Value of high confidence in Polycam's images; low is 0, medium 127 by its documents and 54 in its files."""
 
 
 def is_polycam(folder: Path) -> bool:
@@ -41,12 +42,12 @@ def read_polycam(folder: Path, intrinsics: Path | None) -> Sequence:
     assert frames is not None
     corrected = all(_filled(frames / f"corrected_{name}") for name in ("cameras", "images"))
     prefix = "corrected_" if corrected else ""
-    files, rare = thinned(visible((frames / f"{prefix}cameras").glob("*.json")))
+    files = visible((frames / f"{prefix}cameras").glob("*.json"))
     found = [(file, *images) for file in files if (images := _polycam_images(frames, prefix, file.stem))]
     require(found, frames, f"an image in {prefix}images/ and depth/ with a name of {prefix}cameras/")
     read = {file: _polycam_camera(file) for file, _, _ in found}
     poses = found_poses({file: T for file, (_, T) in read.items()})
-    candidates, notes = posed(
+    candidates, without, notes = posed(
         [
             Candidate(
                 color,
@@ -60,12 +61,16 @@ def read_polycam(folder: Path, intrinsics: Path | None) -> Sequence:
         f"pose in {prefix}cameras/",
         poses,
     )
-    if any(candidate.confidence for candidate in candidates):
-        notes += (CONFIDENCE_NOTE,)
     camera, _ = read[found[0][0]]
     if intrinsics:
         camera, _ = camera_of(folder, candidates[0].color, intrinsics, None, "")
-    return Sequence(candidates, camera, notes=(*rare, *notes))
+    return Sequence(
+        candidates,
+        camera,
+        highest_confidence=POLYCAM_HIGHEST,
+        without_poses=without,
+        notes=notes,
+    )
 
 
 def _polycam_images(frames: Path, prefix: str, stem: str) -> tuple[Path, Path] | None:
@@ -101,14 +106,13 @@ def read_scanner_app(folder: Path, intrinsics: Path | None) -> Sequence:
     Raises:
         InputError: no frame has both, or a file of a frame has another form.
     """
-    every = [
+    found = [
         (color, depth)
         for color in visible(folder.glob("frame_*.jpg"))
         if (depth := folder / f"depth_{color.stem.partition('_')[2]}.png").is_file()
         and color.with_suffix(".json").is_file()
     ]
-    require(every, folder, "frame_00000.jpg, frame_00000.json and depth_00000.png of one number")
-    found, rare = thinned(every)
+    require(found, folder, "frame_00000.jpg, frame_00000.json and depth_00000.png of one number")
     height_px, width_px = read_color(found[0][0]).shape[:2]
     read = {
         color: _scanner_app_camera(color.with_suffix(".json"), (width_px, height_px)) for color, _ in found
@@ -116,7 +120,7 @@ def read_scanner_app(folder: Path, intrinsics: Path | None) -> Sequence:
     poses = found_poses({color: T for color, (_, T, _) in read.items()})
     times = [time_s for _, _, time_s in read.values() if time_s is not None]
     timed = len(times) == len(found) and bool((np.diff(times) > 0.0).all())
-    candidates, notes = posed(
+    candidates, without, notes = posed(
         [
             Candidate(
                 color,
@@ -131,12 +135,10 @@ def read_scanner_app(folder: Path, intrinsics: Path | None) -> Sequence:
         "cameraPoseARFrame",
         poses,
     )
-    if any(candidate.confidence for candidate in candidates):
-        notes += (CONFIDENCE_NOTE,)
     camera = read[found[0][0]][0]
     if intrinsics:
         camera, _ = camera_of(folder, candidates[0].color, intrinsics, None, "")
-    return Sequence(candidates, camera, notes=(*rare, *notes))
+    return Sequence(candidates, camera, without_poses=without, notes=notes)
 
 
 def _scanner_app_camera(

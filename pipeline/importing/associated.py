@@ -52,7 +52,7 @@ def read_associated(folder: Path, intrinsics: Path | None) -> Sequence:
     times_s = np.array([_time_of_color(rows[k], depth) for k in there])
     trajectory, trajectory_notes = _trajectory(folder)
     poses = poses_at(trajectory, times_s) if trajectory else {}
-    candidates, pose_notes = posed(
+    candidates, without, pose_notes = posed(
         [
             Candidate(pairs[k][1 - depth], pairs[k][depth], poses.get(n), float(times_s[n]))
             for n, k in enumerate(there)
@@ -65,7 +65,8 @@ def read_associated(folder: Path, intrinsics: Path | None) -> Sequence:
     notes += (f"{file.name} is taken to mean 5000 units in a metre; --depth-scale names others",)
     if len(there) < len(pairs):
         notes += (f"Files of {len(pairs) - len(there)} of {len(pairs)} lines of {file.name} do not exist",)
-    sequence = Sequence(candidates, camera, UNITS_PER_METRE, notes=(*notes, *trajectory_notes, *pose_notes))
+    notes += (*trajectory_notes, *pose_notes)
+    sequence = Sequence(candidates, camera, UNITS_PER_METRE, without_poses=without, notes=notes)
     if trajectory is None or trajectory.suffix != ".freiburg" or not y_points_up(sequence):
         return sequence
     return mirrored_poses(sequence, f"The y axis points up in {trajectory.name}: its poses were mirrored")

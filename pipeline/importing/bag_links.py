@@ -22,7 +22,7 @@ _COLUMNS = 9
 
 
 @dataclass(frozen=True)
-class Link:
+class TransformLink:
     """Transforms from one frame to another, over time."""
 
     parent: str
@@ -77,11 +77,11 @@ class Links:
     """Links of a bag, in the order in which they were found."""
 
     def __init__(self) -> None:
-        self.of_frames: dict[tuple[str, str], Link] = {}
+        self.of_frames: dict[tuple[str, str], TransformLink] = {}
         """Links by parent and child."""
         self.parents: dict[str, str] = {}
         """The last parent of each frame."""
-        self.odometry: dict[str, Link] = {}
+        self.odometry: dict[str, TransformLink] = {}
         """Links from odometry by topic."""
 
     def add(self, message: Any, msgtype: str, topic: str, at_ns: int) -> None:
@@ -89,7 +89,7 @@ class Links:
         if msgtype == ODOMETRY:
             parent, child = message.header.frame_id.lstrip("/"), message.child_frame_id.lstrip("/")
             if child:
-                link = self.odometry.setdefault(topic, Link(parent, child, False))
+                link = self.odometry.setdefault(topic, TransformLink(parent, child, False))
                 pose = message.pose.pose
                 link.samples.extend(_sample(message.header.stamp, at_ns, pose.position, pose.orientation))
             return
@@ -98,11 +98,11 @@ class Links:
             parent, child = own.header.frame_id.lstrip("/"), own.child_frame_id.lstrip("/")
             values = _sample(own.header.stamp, at_ns, own.transform.translation, own.transform.rotation)
             if values and parent != child:
-                link = self.of_frames.setdefault((parent, child), Link(parent, child, is_static))
+                link = self.of_frames.setdefault((parent, child), TransformLink(parent, child, is_static))
                 link.samples.extend(values)
                 self.parents[child] = parent
 
-    def chain(self, frame: str) -> Iterator[Link]:
+    def chain(self, frame: str) -> Iterator[TransformLink]:
         """Yield the links from a frame up to its topmost ancestor."""
         above = [frame]
         while above[-1] in self.parents and self.parents[above[-1]] not in above:

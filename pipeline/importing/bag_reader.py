@@ -10,11 +10,20 @@ from typing import Any, Protocol
 
 from packetmesh.errors import InputError
 from pipeline.importing.bag_messages import stamp_s
+from pipeline.importing.stored import is_file
 
 SUFFIXES = (".bag", ".db3", ".mcap")
 _MAGIC, _PROFILE_AT = b"\x89MCAP0\r\n", 17
 """Begin of an MCAP file, and the offset of its profile: after the header's opcode and length."""
 _ROS2 = struct.pack("<I", 4) + b"ros2"
+
+
+class _Lower(type(Path())):  # type: ignore[misc]
+    """A path with its suffix in lower case, which rosbags expects."""
+
+    @property
+    def suffix(self) -> str:
+        return str(super().suffix).lower()
 
 
 class BagReader(Protocol):
@@ -56,7 +65,7 @@ class RosReader:
 
 def is_bag(path: Path) -> bool:
     """Return whether a path is a bag's file or the folder of a ROS 2 bag."""
-    return (path.is_file() and path.suffix in SUFFIXES) or (path / "metadata.yaml").is_file()
+    return is_file(path, SUFFIXES) or (path / "metadata.yaml").is_file()
 
 
 @contextmanager
@@ -75,11 +84,11 @@ def enter_bag(path: Path, stack: ExitStack) -> BagReader:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    if path.suffix == ".mcap" and path.is_file() and _is_of_another_profile(path):
+    if is_file(path, (".mcap",)) and _is_of_another_profile(path):
         from pipeline.importing.mcap_reader import McapReader
 
         return stack.enter_context(McapReader(path))
-    reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+    reader = AnyReader([_Lower(path)], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
     return RosReader(stack.enter_context(reader))
 
 
@@ -92,7 +101,7 @@ def readable(path: Path) -> Iterator[None]:
         raise
     except Exception as error:  # a parser fails on damaged data in more ways than can be listed
         why = str(error).splitlines()[0] if str(error) else type(error).__name__
-        tool = "mcap recover" if path.suffix == ".mcap" else "rosbag reindex or ros2 bag reindex"
+        tool = "mcap recover" if path.suffix.lower() == ".mcap" else "rosbag reindex or ros2 bag reindex"
         raise InputError(f"The bag {path} cannot be read ({why}); try to copy it again, or {tool}") from None
 
 

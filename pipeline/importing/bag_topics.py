@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from packetmesh.errors import InputError
-from packetmesh.progress import Progress
+from packetmesh.progress import Progress, spaced
 from pipeline.importing.bag_cameras import FoundCamera, camera_of_topic, common_parts, sdk_stream
 from pipeline.importing.bag_links import ODOMETRY, TRANSFORMS, Links
 from pipeline.importing.bag_messages import is_brightness, is_depth, size_of
@@ -21,8 +21,6 @@ from pipeline.io.same_view import alike
 from pipeline.kernels.geometry import scaled_to
 from pipeline.types import MAX_NODES, CameraIntrinsics, FloatArray, IntArray
 
-PROGRESS_EVERY, REPORTS = 20, 100
-"""Least number of messages between progress reports, and most reports."""
 _RESIZED_WITHIN_PX = 1.0
 """Drivers do not agree on where the first pixel's centre goes."""
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
@@ -75,7 +73,7 @@ def iterate_scan(reader: BagReader) -> Generator[Progress, None, Scanned]:
     images: dict[str, _Seen] = {}
     links = Links()
     total = max(1, sum(own.msgcount for own in wanted))
-    every = max(PROGRESS_EVERY, total // REPORTS)
+    every = spaced(total, 20)
     for number, (own, at_ns, raw) in enumerate(reader.messages(wanted) if wanted else ()):
         if number % every == 0:
             yield Progress(f"message {number} of {total}", min(1.0, number / total))

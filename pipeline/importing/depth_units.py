@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +23,11 @@ from pipeline.io.depth_scale import (
     usual_scale,
 )
 from pipeline.io.images import NoDepthError, ReadDepth
-from pipeline.types import BoolArray, DepthMap
+from pipeline.types import DepthMap, FloatArray
 
+MEDIUM_WEIGHT = 0.25
+"""Factor of the map's weight of depth that is neither of the lowest nor of the highest confidence: twice the
+standard deviation. It is assumed, not measured; telephones state no deviation."""
 _ROTATED_SHARE = 0.95
 
 
@@ -33,29 +37,38 @@ def depth_in(candidate: Candidate, sequence: Sequence) -> ReadDepth:
     Raises:
         InputError: it cannot be read, or has no depth within 65 m; NoDepthError if no depth can be used.
     """
+    return weighted_depth_in(candidate, sequence)[0]
+
+
+def weighted_depth_in(candidate: Candidate, sequence: Sequence) -> tuple[ReadDepth, FloatArray | None]:
+    """Read a depth image as ``depth_in``, and the factor of its pixels' weights, as in ``DepthView.weight``.
+
+    Raises:
+        InputError: as ``depth_in``.
+    """
     read = _depth_in(candidate.depth, sequence)
     if candidate.confidence is None:
-        return read
-    low = _low_confidence(candidate.confidence, read.depth.z_m.shape)
-    z_m = np.where(low, np.float32(np.nan), read.depth.z_m)
+        return read, None
+    levels = _confidence(candidate.confidence, read.depth.z_m.shape)
+    z_m = np.where(levels == 0, np.float32(np.nan), read.depth.z_m)
     if not np.isfinite(z_m).any():
         raise NoDepthError(
             f"All depth in {candidate.depth} has low confidence by {candidate.confidence}; try to "
             "remove the confidence images, so that all depth is kept"
         )
-    return replace(read, depth=DepthMap(z_m))
+    weight = np.where(levels < sequence.highest_confidence, MEDIUM_WEIGHT, 1.0).astype(np.float32)
+    return replace(read, depth=DepthMap(z_m)), weight
 
 
-def _low_confidence(image: AnyImage, shape: tuple[int, ...]) -> BoolArray:
-    """Return (H, W) True where a confidence image is 0."""
+def _confidence(image: AnyImage, shape: tuple[int, ...]) -> NDArray[np.integer]:
+    """Read the (H, W) levels of a confidence image."""
     levels = read_levels_of(image)
     if levels.shape != shape:
         raise InputError(
             f"The confidence image {image} has {levels.shape[1]} x {levels.shape[0]} pixels and its depth "
             f"image {shape[1]} x {shape[0]}; try to remove the confidence images, so that all depth is kept"
         )
-    low: BoolArray = levels == 0
-    return low
+    return levels
 
 
 def _depth_in(image: AnyImage, sequence: Sequence) -> ReadDepth:
@@ -64,7 +77,7 @@ def _depth_in(image: AnyImage, sequence: Sequence) -> ReadDepth:
     values = read_depth_of(image)
     if sequence.rotated_bits and has_rotated_bits(values):
         read = depth_of(str(image), unrotated(values), MILLIMETRES, stated=True)
-        return ReadDepth(read.depth, MILLIMETRES, ("The bits of the depth were turned back by three",))
+        return replace(read, find_notes=lambda: ("The bits of the depth were turned back by three",))
     whole = values.dtype.kind in "iu"
     scale = sequence.units_per_metre if whole or sequence.scale_stated else usual_scale(values)
     return depth_of(str(image), values, scale, sequence.scale_stated)
@@ -91,7 +104,7 @@ def depth_of(name: str, values: NDArray[Any], units_per_metre: float, stated: bo
             f"The depth image {name} is farther than {FARTHEST_M:.0f} m everywhere at depth scale "
             f"{units_per_metre:g}; try --depth-scale {likely_depth_scale(float(np.median(values[known]))):g}"
         )
-    return ReadDepth(DepthMap(z_m), units_per_metre, doubts(values, units_per_metre, stated))
+    return ReadDepth(DepthMap(z_m), units_per_metre, partial(doubts, values, units_per_metre, stated))
 
 
 def has_rotated_bits(units: NDArray[Any]) -> bool:

@@ -36,6 +36,9 @@ class DepthView:
     """(4, 4) pose of this camera in the colour camera's frame, metres."""
     noise: DepthNoise
     """Law of the depth's standard deviation."""
+    weight: FloatArray | None = None
+    """(H, W) float32 factor of each pixel's weight in the map, 0 to 1, by the sensor's confidence; None if it
+    states none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,20 +51,22 @@ class DepthCamera:
     """(4, 4) pose of this camera in the colour camera's frame, metres."""
 
 
-def view_of(z_m: FloatArray, depth_camera: DepthCamera) -> DepthView:
+def view_of(z_m: FloatArray, depth_camera: DepthCamera, weight: FloatArray | None = None) -> DepthView:
     """Return a depth image without its distortion.
 
     Args:
         z_m: (H, W) depth, metres; NaN where it is unknown.
         depth_camera: its camera.
+        weight: (H, W) factor of its pixels' weights; None if there is none.
     """
     camera = depth_camera.camera
     if not is_pinhole(camera):
         values = camera.matrix.tobytes(), camera.distortion.tobytes()
         maps = _kept_maps(*values, camera.width_px, camera.height_px, camera.fisheye)
         z_m = cv2.remap(z_m, *maps, cv2.INTER_NEAREST, borderValue=np.nan)
+        weight = None if weight is None else cv2.remap(weight, *maps, cv2.INTER_NEAREST)
         camera = replace(camera, distortion=np.zeros(5), fisheye=False)
-    return DepthView(DepthMap(z_m), camera, depth_camera.T_color_depth, KINECT)
+    return DepthView(DepthMap(z_m), camera, depth_camera.T_color_depth, KINECT, weight)
 
 
 def frame_of(

@@ -15,7 +15,7 @@ from pipeline.importing.bag_reader import is_bag
 from pipeline.importing.choosing import choose
 from pipeline.importing.depth_units import depth_in
 from pipeline.importing.kinds import kind_of
-from pipeline.importing.reading import check_bag_intrinsics, check_scale, read_sequence
+from pipeline.importing.reading import MOST_CANDIDATES, check_bag_intrinsics, check_scale, read_sequence
 from pipeline.importing.rig_folder import NodeImages, check_new, new_folder, write_node
 from pipeline.importing.sequence import SAME_VIEW_REMEDY, Candidate, Sequence
 from pipeline.importing.stored import read_color_of
@@ -90,7 +90,7 @@ def iterate_import(
         check_bag_intrinsics(Path(path), intrinsics)
         return (yield from _from_bag(Path(path), out, frames, depth_scale))
     yield Progress("files", 0.0)
-    kind, folder, sequence = read_sequence(Path(path), depth_scale, intrinsics)
+    kind, folder, sequence = read_sequence(Path(path), depth_scale, intrinsics, MOST_CANDIDATES)
     sequence = sequence.only_posed()
     yield Progress("choice of frames", 0.2)
     sequence, chosen, middle = _chosen(sequence, frames)
@@ -105,6 +105,8 @@ def iterate_import(
             write_node(folder_of_rig / f"node_{done:02d}", node)
             written.append(ImportedFrame.of(node, done, candidate.time_s))
     notes = [*sequence.notes, *middle.notes, *_same_view_notes(sequence, node)]
+    if sequence.without_poses:
+        notes.append(sequence.without_poses)
     if T_up_world is not None:
         notes.append("The world was turned so that z is up")
     if len(chosen) < min(frames, len(sequence.candidates)):

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from packetmesh.errors import InputError
-from packetmesh.progress import Progress, part
+from packetmesh.progress import Progress, part, spaced
 from pipeline.importing.recorded import iterate_opening
 from pipeline.importing.rig_folder import check_new, new_folder
 from pipeline.importing.tum import UNITS_PER_METRE
@@ -20,8 +20,6 @@ from pipeline.io.poses import write_tum
 from pipeline.io.same_view import alike
 from pipeline.types import AnyPath, CameraIntrinsics, FloatArray, RgbdFrame
 
-PROGRESS_EVERY, REPORTS = 5, 100
-"""Least number of frames between progress reports, and most reports."""
 FARTHEST_M = 65534 / UNITS_PER_METRE
 """Largest depth of the form."""
 
@@ -66,7 +64,7 @@ def iterate_keep(
     with new_folder(Path(out)) as folder:
         writer = _Writer(folder)
         for number in range(count):
-            if number % max(PROGRESS_EVERY, count // REPORTS) == 0:
+            if number % spaced(count, 5) == 0:
                 yield Progress(f"frame {number} of {count}", 0.1 + 0.9 * number / count)
             try:
                 frame = recording.frame(number)

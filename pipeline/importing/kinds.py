@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from packetmesh.errors import InputError
@@ -21,6 +22,7 @@ from pipeline.importing import (
 )
 from pipeline.importing.bag_reader import SUFFIXES
 from pipeline.importing.sequence import Sequence
+from pipeline.importing.stored import is_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,15 +72,15 @@ KINDS = (
         record3d.is_record3d,
         record3d.read_record3d,
     ),
-    Kind("Record3D .r3d", "a file .r3d", record3d.is_r3d, record3d.read_r3d),
+    Kind("Record3D .r3d", "a file .r3d", partial(is_file, suffixes=(".r3d",)), record3d.read_r3d),
     Kind(
         "3D Scanner App",
         "frame_00000.json, frame_00000.jpg and depth_00000.png",
         arkit.is_scanner_app,
         arkit.read_scanner_app,
     ),
-    Kind("ScanNet .sens", "a file .sens", sens.is_sens, sens.read_sens),
-    Kind("Azure Kinect or Femto", "a file .mkv", kinect.is_kinect, kinect.read_kinect),
+    Kind("ScanNet .sens", "a file .sens", partial(is_file, suffixes=(".sens",)), sens.read_sens),
+    Kind("Azure Kinect or Femto", "a file .mkv", partial(is_file, suffixes=(".mkv",)), kinect.read_kinect),
     Kind(
         "ICL-NUIM or ORB-SLAM",
         "associations.txt with rgb/ and depth/",
@@ -118,7 +120,7 @@ def recognise(path: Path) -> tuple[Kind, Path]:
     if found:
         names = ", ".join(place.name for _, place in found[:6])
         raise InputError(f"{path} holds {len(found)} recordings; try one of them: {names}")
-    bags = [file for suffix in SUFFIXES for file in sorted(path.glob(f"*{suffix}"))]
+    bags = [file for file in sorted(path.iterdir()) if is_file(file, SUFFIXES)]
     if bags:
         raise InputError(f"{path} holds the bag {bags[0].name}; try {bags[0]}")
     raise InputError(f"{path} is of no known kind; the kinds are {_known()}")

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from packetmesh.errors import InputError
 from packetmesh.files import json_object, text_in
 from pipeline.importing.cameras import camera_of
-from pipeline.importing.pairing import require, thinned
+from pipeline.importing.pairing import require
 from pipeline.importing.sequence import Candidate, Sequence, posed
 from pipeline.importing.stored import StoredImage
 from pipeline.importing.tum import associate
@@ -29,7 +29,6 @@ from pipeline.io.poses import nearest_rigid
 from pipeline.kernels.geometry import inverse, rigid
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
 
-SUFFIX = ".mkv"
 CALIBRATION = "calibration.json"
 _DEPTH_TAG = "b16g"
 """16 bits, the larger byte first."""
@@ -47,11 +46,6 @@ _CUT_S = 1.0
 """A file that ends so long before its stated end is cut."""
 
 
-def is_kinect(file: Path) -> bool:
-    """Return whether a path is a file with the suffix .mkv."""
-    return file.suffix.lower() == SUFFIX and file.is_file()
-
-
 def read_kinect(file: Path, intrinsics: Path | None) -> Sequence:
     """Read pairs of colour and depth images less than 20 ms apart; depth in millimetres, of its own camera.
 
@@ -61,10 +55,10 @@ def read_kinect(file: Path, intrinsics: Path | None) -> Sequence:
     contents = contents_of(file)
     color, depth = _tracks(file, contents)
     cameras, T_color_depth = _calibration(file, contents, color, depth)
-    near, rare = thinned(associate(color.times_s, depth.times_s))
+    near = associate(color.times_s, depth.times_s)
     require(near, file, "a colour and a depth image less than 20 ms apart")
     reader = TrackReader(file, (color, depth), decoded=False)
-    candidates, notes = posed(
+    candidates, without, notes = posed(
         [
             Candidate(
                 StoredImage(file, f"colour image {i}", partial(_color, reader, color, i, file)),
@@ -89,7 +83,8 @@ def read_kinect(file: Path, intrinsics: Path | None) -> Sequence:
         camera,
         depth_camera=cameras[1],
         T_color_depth=T_color_depth,
-        notes=(*rare, *notes),
+        without_poses=without,
+        notes=notes,
     )
 
 

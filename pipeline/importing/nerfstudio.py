@@ -15,7 +15,6 @@ from packetmesh.errors import InputError
 from packetmesh.files import MAX_TEXT_BYTES, json_object, read_text
 from pipeline.importing.cameras import camera_of
 from pipeline.importing.found_poses import found_poses
-from pipeline.importing.pairing import thinned
 from pipeline.importing.sequence import Candidate, Sequence, existing, named_inside, posed
 from pipeline.io.intrinsics import camera_of_values
 from pipeline.types import CameraIntrinsics, FloatArray
@@ -42,8 +41,7 @@ def read_nerfstudio(folder: Path, intrinsics: Path | None) -> Sequence:
     Raises:
         InputError: no frame's images exist, or no camera is known.
     """
-    values, every = _frames(folder)
-    frames, rare = thinned(every)
+    values, frames = _frames(folder)
     poses = found_poses({k: T for k, own in enumerate(frames) if (T := _pose(own)) is not None})
     named, missing = existing(
         [
@@ -58,14 +56,14 @@ def read_nerfstudio(folder: Path, intrinsics: Path | None) -> Sequence:
         str(folder / _FILE),
         "try to unpack the images beside it",
     )
-    candidates, notes = posed(named, f"transform_matrix in {_FILE}", poses)
+    candidates, without, notes = posed(named, f"transform_matrix in {_FILE}", poses)
     if poses.T_world_camera:
         notes += (f"The poses of {_FILE} are taken to be in metres",)
     camera = candidates[0].camera
     if camera is None:
         camera, assumed = camera_of(folder, candidates[0].color, intrinsics, None, "")
         notes += assumed
-    return Sequence(candidates, camera, notes=(*rare, *missing, *notes))
+    return Sequence(candidates, camera, without_poses=without, notes=(*missing, *notes))
 
 
 def _frames(folder: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:

@@ -17,7 +17,6 @@ from pipeline.importing.pairing import (
     paired,
     pose_indices,
     require,
-    thinned,
     visible,
 )
 from pipeline.importing.sequence import Candidate, Sequence, posed
@@ -38,7 +37,7 @@ def is_seven_scenes(folder: Path) -> bool:
 def read_seven_scenes(folder: Path, intrinsics: Path | None) -> Sequence:
     """Read frames of 7-Scenes (Shotton et al., CVPR 2013), 3DMatch or BundleFusion; depth in millimetres."""
     found = []
-    colors, rare = thinned(sorted(folder.glob("frame-*.color.*")))
+    colors = sorted(folder.glob("frame-*.color.*"))
     for color in colors:
         stem = color.name.split(".")[0]
         depth = next(iter(depth_images(folder, f"{stem}.depth.*")), None)
@@ -46,10 +45,10 @@ def read_seven_scenes(folder: Path, intrinsics: Path | None) -> Sequence:
             found.append((color, depth, folder / f"{stem}.pose.txt"))
     stem = colors[0].name.split(".")[0]
     require(found, folder, f"{stem}.depth.png beside {colors[0].name}")
-    candidates, notes = _with_poses(found, found[0][2].name)
+    candidates, without, notes = _with_poses(found, found[0][2].name)
     default = _SEVEN_SCENES, "those of 7-Scenes, whose depth is not quite registered to the colour"
     camera, assumed = camera_of(folder, candidates[0].color, intrinsics, *default)
-    return Sequence(candidates, camera, notes=(*rare, *assumed, *notes))
+    return Sequence(candidates, camera, without_poses=without, notes=(*assumed, *notes))
 
 
 def is_scannet(folder: Path) -> bool:
@@ -59,11 +58,10 @@ def is_scannet(folder: Path) -> bool:
 
 def read_scannet(folder: Path, intrinsics: Path | None) -> Sequence:
     """Read a ScanNet scene as exported by its SensReader (Dai et al., CVPR 2017); depth in millimetres."""
-    every, unpaired = paired(folder / "color", folder / "depth")
-    pairs, rare = thinned(every)
+    pairs, unpaired = paired(folder / "color", folder / "depth")
     found = [(pair.color, pair.depth, folder / "pose" / f"{pair.color.stem}.txt") for pair in pairs]
-    candidates, lost = _with_poses(found, f"pose/{found[0][2].name}")
-    notes = (*unpaired, *rare, *lost)
+    candidates, without, lost = _with_poses(found, f"pose/{found[0][2].name}")
+    notes = (*unpaired, *lost)
     first, beside = candidates[0], folder / "intrinsic"
     height_px, width_px = read_color_of(first.color).shape[:2]
     if intrinsics is None:
@@ -72,7 +70,7 @@ def read_scannet(folder: Path, intrinsics: Path | None) -> Sequence:
         camera, _ = camera_of(folder, first.color, intrinsics, None, "")
     depth_height_px, depth_width_px = read_depth_of(first.depth).shape
     if (depth_height_px, depth_width_px) == (height_px, width_px):
-        return Sequence(candidates, camera, notes=notes)
+        return Sequence(candidates, camera, without_poses=without, notes=notes)
     depth_camera = read_intrinsics(beside / "intrinsic_depth.txt", (depth_width_px, depth_height_px))
     extrinsics = [beside / f"extrinsic_{of}.txt" for of in FRAMES]
     (T_body_color, color_off), (T_body_depth, depth_off) = map(_transform_or_identity, extrinsics)
@@ -81,7 +79,14 @@ def read_scannet(folder: Path, intrinsics: Path | None) -> Sequence:
     if missing:
         notes += (f"No {missing}: taken as the identity, so that depth may be shifted against the colour",)
     T_color_depth = inverse(T_body_color) @ T_body_depth
-    return Sequence(candidates, camera, depth_camera=depth_camera, T_color_depth=T_color_depth, notes=notes)
+    return Sequence(
+        candidates,
+        camera,
+        depth_camera=depth_camera,
+        T_color_depth=T_color_depth,
+        without_poses=without,
+        notes=notes,
+    )
 
 
 FRAMES = ("color", "depth")
@@ -96,14 +101,18 @@ def read_open3d(folder: Path, intrinsics: Path | None) -> Sequence:
     """Read Redwood (Choi et al., CVPR 2015) or Open3D recordings; depth in mm, poses in a .log file."""
     colors = color_folder(folder)
     assert colors is not None
-    every, unpaired = paired(colors, folder / "depth")
+    pairs, unpaired = paired(colors, folder / "depth")
     poses, missing, trajectory = _trajectory(folder)
-    pairs, rare = thinned(list(zip(pose_indices(every, poses.count), every, strict=True)))
-    found = [Candidate(pair.color, pair.depth, poses.T_world_camera.get(index)) for index, pair in pairs]
-    candidates, notes = posed(found, missing, poses)
+    indices = pose_indices(pairs, poses.count)
+    found = [
+        Candidate(pair.color, pair.depth, poses.T_world_camera.get(index))
+        for index, pair in zip(indices, pairs, strict=True)
+    ]
+    candidates, without, notes = posed(found, missing, poses)
     default = PRIMESENSE, "a PrimeSense camera's from the factory"
     camera, assumed = camera_of(folder, candidates[0].color, intrinsics, *default)
-    return Sequence(candidates, camera, notes=(*unpaired, *rare, *assumed, *trajectory, *notes))
+    notes = (*unpaired, *assumed, *trajectory, *notes)
+    return Sequence(candidates, camera, without_poses=without, notes=notes)
 
 
 def _trajectory(folder: Path) -> tuple[FoundPoses, str, tuple[str, ...]]:
@@ -155,7 +164,7 @@ def read_sunrgbd(folder: Path, intrinsics: Path | None) -> Sequence:
 
 def _with_poses(
     frames: list[tuple[Path, Path, Path]], what: str
-) -> tuple[tuple[Candidate, ...], tuple[str, ...]]:
+) -> tuple[tuple[Candidate, ...], str, tuple[str, ...]]:
     """Return the candidates of colour, depth and pose files as ``posed`` does."""
     poses = poses_in_files(pose for _, _, pose in frames)
     found = [Candidate(color, depth, poses.T_world_camera.get(pose)) for color, depth, pose in frames]

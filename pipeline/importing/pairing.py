@@ -15,8 +15,6 @@ from packetmesh.errors import InputError
 from pipeline.importing.sequence import DEPTH_SUFFIXES
 from pipeline.importing.tum import associate
 
-MOST_CANDIDATES = 12_000
-"""Largest number of frames that are considered; longer recordings are subsampled."""
 COLOR_FOLDERS = ("color", "rgb", "image", "images")
 COLOR_SUFFIXES = (".jpg", ".jpeg", ".png", ".ppm")
 _Numbered: TypeAlias = dict[tuple[Fraction, ...], Path]
@@ -117,13 +115,6 @@ def _at_nearest_time(colors: _Numbered, depths: _Numbered) -> _Numbered:
     near = associate(*(np.array([float(key[0]) for key in own]) for own in keys))
     renamed = {keys[1][j]: keys[0][i] for i, j in near}
     return {renamed.get(key, key): path for key, path in depths.items()}
-
-
-def thinned(items: list) -> tuple[list, tuple[str, ...]]:
-    """Subsample a long list evenly; returns it with a note about the subsampling."""
-    every = -(-len(items) // MOST_CANDIDATES) or 1
-    note = f"Of {len(items)} frames one in {every} was looked at"
-    return items[::every], (note,) if every > 1 else ()
 
 
 def require(items: list, folder: Path, missing: str) -> None:

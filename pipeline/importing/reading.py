@@ -8,18 +8,24 @@ from pathlib import Path
 import numpy as np
 
 from packetmesh.errors import InputError
+from pipeline.importing.depth_units import MEDIUM_WEIGHT
 from pipeline.importing.kinds import Kind, recognise
 from pipeline.importing.sequence import Sequence, distinct
 from pipeline.types import AnyPath
 
-MOST_FRAMES = 5000
-"""Most frames of a recording; of a longer one every n-th is used, which bounds time and memory."""
+CONFIDENCE_NOTE = (
+    "Depth to which the telephone gives its lowest confidence (0) is left out; that of medium confidence "
+    f"counts {MEDIUM_WEIGHT:g} in the map of a camera that walks, and 1 elsewhere"
+)
+MOST_FRAMES, MOST_CANDIDATES = 5000, 12_000
+"""Most frames of a recording, and most from which a few are chosen; of more every n-th is used, which bounds
+time and memory."""
 
 
-def of_many(frames: int) -> tuple[slice, tuple[str, ...]]:
+def of_many(frames: int, most: int) -> tuple[slice, tuple[str, ...]]:
     """Return which of a recording's frames are used, and a note if not all."""
-    step = max(1, -(-frames // MOST_FRAMES))
-    note = f"Of the {frames} frames one in {step} is used, so that there are at most {MOST_FRAMES}"
+    step = max(1, -(-frames // most))
+    note = f"Of the {frames} frames one in {step} is used, so that there are at most {most}"
     return slice(None, None, step), (note,) if step > 1 else ()
 
 
@@ -38,7 +44,7 @@ def check_bag_intrinsics(bag: Path, intrinsics: AnyPath | None) -> None:
 
 
 def read_sequence(
-    path: Path, depth_scale: float | None, intrinsics: AnyPath | None
+    path: Path, depth_scale: float | None, intrinsics: AnyPath | None, most: int
 ) -> tuple[Kind, Path, Sequence]:
     """Return kind, folder and frames of a recording, each moment once; no image is read.
 
@@ -46,6 +52,7 @@ def read_sequence(
         path: the recording's folder, or a folder with only this recording.
         depth_scale: depth units per metre; None takes that of the kind of recording.
         intrinsics: intrinsics file of the colour camera; None takes the recording's, or those of its kind.
+        most: largest number of frames; of more every n-th is used.
 
     Raises:
         InputError: the path is no usable recording.
@@ -55,4 +62,8 @@ def read_sequence(
     if depth_scale is not None:
         sequence = sequence.with_scale(depth_scale)
     candidates, repeated = distinct(sequence.candidates)
-    return kind, folder, replace(sequence, candidates=candidates, notes=(*sequence.notes, *repeated))
+    chosen, rare = of_many(len(candidates), most)
+    candidates = candidates[chosen]
+    confident = (CONFIDENCE_NOTE,) if any(one.confidence is not None for one in candidates) else ()
+    notes = (*sequence.notes, *repeated, *rare, *confident)
+    return kind, folder, replace(sequence, candidates=candidates, notes=notes)

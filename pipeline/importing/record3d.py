@@ -33,16 +33,14 @@ from pipeline.importing.arkit import Y_DOWN
 from pipeline.importing.cameras import camera_of
 from pipeline.importing.found_poses import found_poses
 from pipeline.importing.lzfse_data import BLOCK, stated_size, unpack_lzfse
-from pipeline.importing.pairing import color_folder, paired, pose_indices, require, thinned
+from pipeline.importing.pairing import color_folder, paired, pose_indices, require
 from pipeline.importing.sequence import Candidate, Sequence, posed
 from pipeline.importing.stored import StoredImage
-from pipeline.importing.stray import CONFIDENCE_NOTE
 from pipeline.io.images import color_in
 from pipeline.io.intrinsics import check_camera
 from pipeline.kernels.geometry import rigid, scaled_to
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
 
-SUFFIX = ".r3d"
 _METADATA = ("metadata.json", "metadata")
 _MAX_METADATA_BYTES = 100 * MAX_TEXT_BYTES
 _FRAME = re.compile(r"rgbd/(\d{1,9})\.(jpg|depth|conf)")
@@ -89,11 +87,6 @@ def is_record3d(folder: Path) -> bool:
         return False
 
 
-def is_r3d(file: Path) -> bool:
-    """Return whether a path is a file with the suffix .r3d."""
-    return file.suffix.lower() == SUFFIX and file.is_file()
-
-
 def read_record3d(folder: Path, intrinsics: Path | None) -> Sequence:
     """Read an export as images (rgb/ and depth/ in metres) or an unpacked .r3d, with cameras and poses.
 
@@ -104,12 +97,11 @@ def read_record3d(folder: Path, intrinsics: Path | None) -> Sequence:
     assert file is not None
     if colors is None or not _has_images(folder):
         return _read_package(_folder_package(folder), file.name, intrinsics)
-    every, unpaired = paired(colors, folder / "depth")
+    pairs, unpaired = paired(colors, folder / "depth")
     metadata = _metadata(read_text(file, "metadata", _MAX_METADATA_BYTES), str(file))
-    frames = pose_indices(every, max(len(metadata.each), max(metadata.T_world_camera, default=-1) + 1))
-    pairs, rare = thinned(list(zip(frames, every, strict=True)))
-    images = {k: Candidate(pair.color, pair.depth) for k, pair in pairs}
-    return _sequence(folder, images, metadata, file.name, intrinsics, (*unpaired, *rare))
+    frames = pose_indices(pairs, max(len(metadata.each), max(metadata.T_world_camera, default=-1) + 1))
+    images = {k: Candidate(pair.color, pair.depth) for k, pair in zip(frames, pairs, strict=True)}
+    return _sequence(folder, images, metadata, file.name, intrinsics, unpaired)
 
 
 def read_r3d(file: Path, intrinsics: Path | None) -> Sequence:
@@ -131,16 +123,13 @@ def _read_package(package: _Package, metadata_name: str, intrinsics: Path | None
         if match := _FRAME.fullmatch(name):
             found.setdefault(int(match[1]), {})[match[2]] = name
     complete = sorted(k for k, names in found.items() if names.keys() >= {"jpg", "depth"})
-    numbers, rare = thinned(complete)
-    require(numbers, package.place, "rgbd/0.jpg and rgbd/0.depth")
+    require(complete, package.place, "rgbd/0.jpg and rgbd/0.depth")
     missing = len(found) - len(complete)
     lacks = f"{missing} of {len(found)} frames of {package.place} lack an image and were left out"
-    first_rgb = _photograph(package, found[numbers[0]]["jpg"])
+    first_rgb = _photograph(package, found[complete[0]]["jpg"])
     metadata = _resized(metadata, first_rgb.shape[1], first_rgb.shape[0])
-    images = {k: _candidate(package, found[k], metadata) for k in numbers}
-    notes = (*((lacks,) if missing else ()), *rare)
-    if any(candidate.confidence for candidate in images.values()):
-        notes += (CONFIDENCE_NOTE,)
+    images = {k: _candidate(package, found[k], metadata) for k in complete}
+    notes = (lacks,) if missing else ()
     return _sequence(package.place, images, metadata, metadata_name, intrinsics, notes)
 
 
@@ -170,7 +159,7 @@ def _sequence(
     poses = found_poses({k: T for k, T in metadata.T_world_camera.items() if k in images})
     cameras = {} if intrinsics else dict(enumerate(metadata.each))
     times = dict(enumerate(metadata.times_s))
-    candidates, pose_notes = posed(
+    candidates, without, pose_notes = posed(
         [
             replace(
                 candidate,
@@ -186,7 +175,7 @@ def _sequence(
     camera = metadata.camera
     if intrinsics:
         camera, _ = camera_of(place, candidates[0].color, intrinsics, None, "")
-    return Sequence(candidates, camera, notes=(*notes, *pose_notes))
+    return Sequence(candidates, camera, without_poses=without, notes=(*notes, *pose_notes))
 
 
 def _metadata(text: str, name: str) -> _Metadata:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
 
@@ -12,7 +12,7 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress, drain
 from pipeline.importing.bag_reader import is_bag
-from pipeline.importing.depth_units import depth_in
+from pipeline.importing.depth_units import depth_in, weighted_depth_in
 from pipeline.importing.depth_views import (
     DepthCamera,
     DepthView,
@@ -22,9 +22,9 @@ from pipeline.importing.depth_views import (
     view_of,
 )
 from pipeline.importing.kinds import kind_of
-from pipeline.importing.reading import check_bag_intrinsics, check_scale, of_many, read_sequence
+from pipeline.importing.reading import MOST_FRAMES, check_bag_intrinsics, check_scale, read_sequence
 from pipeline.importing.recorded_bag import BagRecording, iterate_bag_recording
-from pipeline.importing.sequence import POSES_UNKNOWN, SAME_VIEW_REMEDY, Candidate, Sequence
+from pipeline.importing.sequence import SAME_VIEW_REMEDY, Candidate, Sequence
 from pipeline.importing.stored import read_color_of
 from pipeline.io.images import NoDepthError, ReadDepth
 from pipeline.io.same_view import depth_camera_of
@@ -64,24 +64,24 @@ class FolderRecording:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes; that there are no poses is none: a recording's camera is tracked or stands."""
-        found = (note for note in self.sequence.notes if not _only_without_poses(note))
-        return (*found, *unreadable_note(self.unreadable))
+        return (*self.sequence.notes, *unreadable_note(self.unreadable))
 
     def view(self, index: int) -> DepthView:
         """Read the depth of a frame; it is all NaN without any depth, or if the image cannot be read.
 
         ``notes`` says how many cannot be read.
         """
-        candidate = self.sequence.candidates[index]
+        candidate, weight = self.sequence.candidates[index], None
         try:
-            z_m = depth_in(candidate, self.sequence).depth.z_m
+            read, weight = weighted_depth_in(candidate, self.sequence)
+            z_m = read.depth.z_m
             depth_camera = self._depth_camera_of(candidate, z_m.shape)
         except InputError as error:
             if not isinstance(error, NoDepthError):
                 self.unreadable[index] = str(error)
             z_m = np.full(self._depth_shape, np.nan, np.float32)
             depth_camera = self._depth_camera_of(candidate, self._depth_shape)
-        return view_of(z_m, depth_camera)
+        return view_of(z_m, depth_camera, weight)
 
     def frame(self, index: int) -> RgbdFrame:
         """Read colour and depth of a frame; depth of another camera is registered to colour.
@@ -155,12 +155,9 @@ def iterate_opening(
     if bag is not None:
         check_bag_intrinsics(bag, intrinsics)
         return (yield from iterate_bag_recording(bag, depth_scale))
-    kind, folder, sequence = read_sequence(place, depth_scale, intrinsics)
+    kind, folder, sequence = read_sequence(place, depth_scale, intrinsics, MOST_FRAMES)
     if _first_depth(sequence) is None:
         raise NoDepthError(f"No frame of {folder} has depth; check the depth images and the depth scale")
-    chosen, notes = of_many(len(sequence.candidates))
-    candidates = sequence.candidates[chosen]
-    sequence = replace(sequence, candidates=candidates, notes=(*sequence.notes, *notes))
     return FolderRecording(kind.name, folder, sequence)
 
 
@@ -179,11 +176,6 @@ def _bag_in(place: Path) -> Path | None:
         names = ", ".join(bag.name for bag in bags[:6])
         raise InputError(f"{place} holds {len(bags)} bags; try one of them: {names}")
     return bags[0]
-
-
-def _only_without_poses(note: str) -> bool:
-    """Return whether a note says that the recording has no poses, and nothing of poses that were refused."""
-    return note.startswith("No ") and note.endswith(POSES_UNKNOWN)
 
 
 def _first_depth(sequence: Sequence) -> ReadDepth | None:

@@ -26,7 +26,7 @@ from pipeline.importing.depth_views import (
     unreadable_note,
     view_of,
 )
-from pipeline.importing.reading import of_many
+from pipeline.importing.reading import MOST_FRAMES, of_many
 from pipeline.io.images import NoDepthError, ReadDepth
 from pipeline.types import CameraIntrinsics, FloatArray, IntArray, RgbdFrame
 
@@ -126,7 +126,7 @@ def iterate_bag_recording(path: Path, depth_scale: float | None) -> Generator[Pr
     place, place_notes = place_of_depth(color, depth, shape, scanned.transforms)
     if place is not None:
         _check_size(depth.name, shape, (place.camera.height_px, place.camera.width_px))
-    chosen, thinned = of_many(len(moments))
+    chosen, thinned = of_many(len(moments), MOST_FRAMES)
     moments = moments[chosen]
     frames_s = times_s[0][moments[:, 0]]
     poses, pose_notes = _poses(scanned.transforms, color, frames_s, bool(time_notes))
@@ -153,10 +153,10 @@ def _poses(
     """Return the (4, 4) pose of a camera at each time, or None if none is known, and notes."""
     found = transforms.over_time(color.frame, times_s, in_bag)
     if found is None:
-        return None, (f"No transforms or odometry move the camera of {color.name}: poses are not known",)
+        return None, ()
     lost = int((~found.known).sum())
     if lost == len(times_s):
-        return None, (f"No frame has a pose by {found.source} at its time: poses are not known",)
+        return None, (f"No frame has a pose by {found.source} at its time",)
     poses = tuple(T if known else None for T, known in zip(found.T_world_frame, found.known, strict=True))
     note = f"{lost} of {len(times_s)} frames have no pose by {found.source} at their time"
     return poses, (f"The poses are those by {found.source}", *((note,) if lost else ()))

@@ -20,7 +20,6 @@ from packetmesh.errors import InputError
 from packetmesh.files import MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS
 from pipeline.importing.cameras import camera_of
 from pipeline.importing.found_poses import found_poses
-from pipeline.importing.pairing import thinned
 from pipeline.importing.sequence import Candidate, Sequence, posed
 from pipeline.importing.stored import StoredImage
 from pipeline.io.images import color_in
@@ -30,7 +29,6 @@ from pipeline.io.same_view import alike
 from pipeline.kernels.geometry import inverse
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
 
-SUFFIX = ".sens"
 _VERSION = 4
 _LONGEST_NAME = 10_000
 _FRAME = struct.Struct("<16f4Q")
@@ -66,11 +64,6 @@ class _Frame:
     depth_at: tuple[int, int]
 
 
-def is_sens(file: Path) -> bool:
-    """Return whether a path is a file with the suffix .sens."""
-    return file.suffix.lower() == SUFFIX and file.is_file()
-
-
 def read_sens(file: Path, intrinsics: Path | None) -> Sequence:
     """Read the frames of a .sens file; their images are read when they are requested.
 
@@ -86,10 +79,9 @@ def read_sens(file: Path, intrinsics: Path | None) -> Sequence:
     if not every:
         raise InputError(f"{file} is cut before the end of its first frame; try to copy it again")
     cut = f"{file} is cut: it has {len(every)} of its {header.frames} frames; try to copy it again"
-    frames, rare = thinned(list(enumerate(every)))
     timed = all(before.time_us < after.time_us for before, after in pairwise(every))
-    poses = found_poses({k: frame.pose for k, frame in frames})
-    candidates, notes = posed(
+    poses = found_poses({k: frame.pose for k, frame in enumerate(every)})
+    candidates, without, notes = posed(
         [
             Candidate(
                 StoredImage(file, f"colour image {k}", partial(_color, file, k, frame, header)),
@@ -97,7 +89,7 @@ def read_sens(file: Path, intrinsics: Path | None) -> Sequence:
                 poses.T_world_camera.get(k),
                 1e-6 * frame.time_us if timed else None,
             )
-            for k, frame in frames
+            for k, frame in enumerate(every)
         ],
         "pose of its frames",
         poses,
@@ -112,7 +104,8 @@ def read_sens(file: Path, intrinsics: Path | None) -> Sequence:
         header.units_per_metre,
         depth_camera=depth if own_depth else None,
         T_color_depth=header.T_color_depth if own_depth else None,
-        notes=(*((cut,) if len(every) < header.frames else ()), *rare, *notes),
+        without_poses=without,
+        notes=(*((cut,) if len(every) < header.frames else ()), *notes),
     )
 
 

@@ -16,8 +16,6 @@ from pipeline.types import CameraIntrinsics, FloatArray
 
 DEPTH_SUFFIXES = (".png", ".tif", ".tiff", ".npy", ".pfm", ".exr", ".pgm")
 """File name suffixes of depth images."""
-POSES_UNKNOWN = "poses are not known; reconstruct looks for them"
-"""End of the note on a recording without poses."""
 SAME_VIEW_REMEDY = "try a recording whose depth shows the view of its colour images"
 """What to try where depth is not in proportion to colour."""
 
@@ -34,7 +32,8 @@ class Candidate:
     camera: CameraIntrinsics | None = None
     """Colour camera of this moment, if it differs from moment to moment."""
     confidence: AnyImage | None = None
-    """Image of the depth image's size that is 0 where the sensor has low confidence in its depth."""
+    """Image of the depth image's size: 0 where the sensor has low confidence in its depth, larger values for
+    more, up to ``Sequence.highest_confidence``."""
 
     def enlarged(self, factor: float) -> Candidate:
         """Return the candidate with its position multiplied by ``factor``."""
@@ -61,6 +60,10 @@ class Sequence:
     """(4, 4) pose of the depth camera in the colour camera's frame, metres."""
     poses_in_depth_units: bool = False
     """Whether the poses have the depth images' unknown unit, as in COLMAP."""
+    highest_confidence: int = 2
+    """Value of confidence images where the sensor has high confidence; 2 is ARKit's."""
+    without_poses: str = ""
+    """Sentence on a recording without any pose, of whose poses none was refused; empty for others."""
     notes: tuple[str, ...] = ()
     """Assumptions, one sentence each."""
 
@@ -154,8 +157,8 @@ def distinct(candidates: tuple[Candidate, ...]) -> tuple[tuple[Candidate, ...], 
 
 def posed(
     candidates: list[Candidate], what: str, poses: FoundPoses | None = None
-) -> tuple[tuple[Candidate, ...], tuple[str, ...]]:
-    """Return the candidates, and notes on their poses.
+) -> tuple[tuple[Candidate, ...], str, tuple[str, ...]]:
+    """Return the candidates, ``Sequence.without_poses``, and notes on their poses.
 
     Args:
         candidates: the frames of a recording.
@@ -165,12 +168,14 @@ def posed(
     refused, lost = (poses.refused, poses.lost) if poses else ((), 0)
     known = [candidate for candidate in candidates if candidate.T_world_camera is not None]
     if not known:
-        why = f"No {what}"
+        unknown = "poses are not known; reconstruct looks for them"
         if refused:
             why = f"{refused[0]}{f' (and {len(refused) - 1} more)' if len(refused) > 1 else ''}"
         elif lost:
             why = f"Every {what} holds numbers that are not finite, as where tracking was lost"
-        return tuple(candidates), (f"{why}: {POSES_UNKNOWN}",)
+        else:
+            return tuple(candidates), f"No {what}: {unknown}", ()
+        return tuple(candidates), "", (f"{why}: {unknown}",)
     without = len(candidates) - len(known)
     notes = []
     if without:
@@ -178,4 +183,4 @@ def posed(
         notes.append(f"{without} of {len(candidates)} frames have no pose{why}")
     if poses:
         notes += rounding_note("The rotation of a pose", poses.departure)
-    return tuple(candidates), tuple(notes)
+    return tuple(candidates), "", tuple(notes)

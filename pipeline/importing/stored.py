@@ -33,6 +33,11 @@ class StoredImage:
 AnyImage: TypeAlias = Path | StoredImage
 
 
+def is_file(path: Path, suffixes: tuple[str, ...]) -> bool:
+    """Return whether a path is a file with one of some lower-case suffixes, in any case."""
+    return path.suffix.lower() in suffixes and path.is_file()
+
+
 def exists(image: AnyImage) -> bool:
     """Return whether an image is there: a file, or an image that its file has."""
     return isinstance(image, StoredImage) or image.is_file()

@@ -15,14 +15,13 @@ from scipy.spatial.transform import Rotation
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_IMAGE_PIXELS, MAX_TEXT_BYTES, read_text
 from pipeline.importing.cameras import camera_of
-from pipeline.importing.pairing import color_folder, depth_images, paired, require, thinned
+from pipeline.importing.pairing import color_folder, depth_images, paired, require
 from pipeline.importing.sequence import Candidate, Sequence, posed
 from pipeline.importing.stored import AnyImage, StoredImage, read_color_of
 from pipeline.importing.video import TrackReader, contents_of
 from pipeline.kernels.geometry import rigid
 from pipeline.types import CameraIntrinsics, FloatArray
 
-CONFIDENCE_NOTE = "Depth to which the telephone gives its lowest confidence (0) is left out"
 _POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 _CAMERA = ("fx", "fy", "cx", "cy")
 _MATRIX, _ODOMETRY, _VIDEO = "camera_matrix.csv", "odometry.csv", "rgb.mp4"
@@ -57,29 +56,26 @@ def read_stray(folder: Path, intrinsics: Path | None) -> Sequence:
                 confidence=confidence if confidence.is_file() else None,
             )
         )
-    candidates, pose_notes = posed(found, f"pose in {_ODOMETRY} with the number of a frame")
+    candidates, without, pose_notes = posed(found, f"pose in {_ODOMETRY} with the number of a frame")
     notes += pose_notes
-    if any(candidate.confidence for candidate in candidates):
-        notes += (CONFIDENCE_NOTE,)
     if not own_cameras:
         camera, assumed = camera_of(folder, candidates[0].color, intrinsics or folder / _MATRIX, None, "")
-        return Sequence(candidates, camera, notes=(*notes, *assumed))
+        return Sequence(candidates, camera, without_poses=without, notes=(*notes, *assumed))
     cameras = [candidate.camera for candidate in candidates if candidate.camera]
     if len(cameras) < len(candidates):
         raise InputError(
             f"{folder} has no {_MATRIX}, and its {_ODOMETRY} no fx, fy, cx and cy of every frame; try "
             "--intrinsics FILE"
         )
-    return Sequence(candidates, cameras[0], notes=notes)
+    return Sequence(candidates, cameras[0], without_poses=without, notes=notes)
 
 
 def _pairs(folder: Path) -> tuple[list[tuple[AnyImage, Path]], tuple[str, ...]]:
     """Return colour and depth of each frame, and notes."""
     colors = color_folder(folder)
     if colors is not None:
-        every, unpaired = paired(colors, folder / "depth")
-        pairs, rare = thinned(every)
-        return [(pair.color, pair.depth) for pair in pairs], (*unpaired, *rare)
+        pairs, unpaired = paired(colors, folder / "depth")
+        return [(pair.color, pair.depth) for pair in pairs], unpaired
     video = folder / _VIDEO
     if not video.is_file():
         raise InputError(
@@ -105,8 +101,7 @@ def _pairs(folder: Path) -> tuple[list[tuple[AnyImage, Path]], tuple[str, ...]]:
         if k < len(track.stamps)
     ]
     note = f"{_VIDEO} has {len(track.stamps)} frames and depth/ {len(depths)} images: {len(films)} are used"
-    kept, rare = thinned(films)
-    return kept, (*((note,) if len(depths) != len(track.stamps) else ()), *rare)
+    return films, (note,) if len(depths) != len(track.stamps) else ()
 
 
 def _camera(row: dict[str, float], width_px: int, height_px: int) -> CameraIntrinsics | None:

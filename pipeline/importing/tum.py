@@ -69,12 +69,13 @@ def read_tum(folder: Path, intrinsics: Path | None) -> Sequence:
         f"{folder / 'rgb.txt'} or depth.txt",
         "try to unpack the images beside it",
     )
-    candidates, notes = posed(
+    candidates, without, notes = posed(
         there,
         f"pose in {truth.name} at the time of an image" if truth.is_file() else truth.name,
     )
     camera, assumed = camera_of(folder, candidates[0].color, intrinsics, *known_camera(folder))
-    return Sequence(candidates, camera, UNITS_PER_METRE, notes=(*missing, *assumed, *notes))
+    notes = (*missing, *assumed, *notes)
+    return Sequence(candidates, camera, UNITS_PER_METRE, without_poses=without, notes=notes)
 
 
 def associate(first_s: FloatArray, second_s: FloatArray) -> list[tuple[int, int]]:

@@ -43,6 +43,8 @@ MOVED_M = 0.1
 """Given positions farther apart are those of a walk: a corridor looks the same all along."""
 PHOTOGRAPHS = 3
 """Photographs of which the median colour is taken: what stood in one of them is not painted on a wall."""
+READERS = 2
+"""Threads that read depth images: decoding takes longer than what is done with them."""
 NAME = "camera"
 """Name of the node."""
 
@@ -72,8 +74,8 @@ def stands(recording: Recording) -> bool:
     count = len(recording.times_s)
     if count < LEAST_FRAMES or _walks_by_poses(recording):
         return False
-    compared = (recording.view(k) for k in spread(range(count), COMPARED + 1))
-    views = [view for view in compared if view.depth.valid.any()]
+    compared = read_ahead(recording, spread(range(count), COMPARED + 1), READERS)
+    views = [view for _, view in compared if view.depth.valid.any()]
     shares = [unchanged_share(views[0], other) for other in views[1:]]
     return bool(shares) and min(shares) >= AT_REST and _same_photographs(recording)
 
@@ -149,9 +151,8 @@ def iterate_still(recording: Recording, frames: int) -> Generator[Progress, None
         InputError: no frame has depth, no photograph can be read, or nothing keeps its depth.
     """
     available = min(len(recording.times_s), MOST_AVERAGED)
-    numbers, stack = yield from _iterate_stack(recording, min(frames, available))
+    numbers, stack, view = yield from _iterate_stack(recording, min(frames, available))
     yield Progress(f"averaging {len(numbers)} frames", 0.9)
-    view = recording.view(numbers[0])
     vote = voted(stack, view.noise)
     if not vote.depth.valid.any():
         raise InputError(f"No pixel of {recording.name} keeps its depth; try recording.frames=1")
@@ -167,13 +168,16 @@ def iterate_still(recording: Recording, frames: int) -> Generator[Progress, None
 
 def _iterate_stack(
     recording: Recording, count: int
-) -> Generator[Progress, None, tuple[list[int], FloatArray]]:
-    """Read the first ``count`` frames with depth; returns their N numbers and (N, H, W) 1/z."""
-    stack = np.zeros((count, *recording.view(0).depth.z_m.shape), np.float32)
+) -> Generator[Progress, None, tuple[list[int], FloatArray, DepthView]]:
+    """Read the first ``count`` frames with depth; returns N numbers, (N, H, W) 1/z and the first view."""
     numbers: list[int] = []
-    for k, view in read_ahead(recording, range(len(recording.times_s))):
+    for k, view in read_ahead(recording, range(len(recording.times_s)), READERS):
         if k % REPORTED == 0:
             yield Progress(f"reading frame {k}", 0.9 * len(numbers) / count)
+        if k == 0:
+            stack = np.zeros((count, *view.depth.z_m.shape), np.float32)
+        if not numbers:
+            first = view
         if view.depth.valid.any() and view.depth.z_m.shape == stack.shape[1:]:
             stack[len(numbers)] = inverse_depth(view.depth)
             numbers.append(k)
@@ -181,7 +185,7 @@ def _iterate_stack(
             break
     if not numbers:
         raise InputError(f"No frame of {recording.name} has depth; check its depth images and scale")
-    return numbers, stack[: len(numbers)]
+    return numbers, stack[: len(numbers)], first
 
 
 def _photographs(recording: Recording, numbers: Sequence[int]) -> tuple[list[RgbdFrame], list[str]]:

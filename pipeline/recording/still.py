@@ -6,11 +6,13 @@ All values are in 1/z, in which a disparity sensor's steps are equal.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
 
 from pipeline.kernels.kdtree import compiled
+from pipeline.kernels.threads import threads
 from pipeline.types import BoolArray, ByteArray, DepthMap, DepthNoise, FloatArray
 
 WITHIN_SD = 3.0
@@ -29,6 +31,8 @@ SAMPLED = 100_000
 """Measurements, about, from which steps and noise are estimated."""
 BINS = 12
 """Bins of depth, with equally many measurements, in which the step is estimated."""
+BANDS = 8
+"""Bands of rows, on which two threads work: where nothing was measured there is nothing to do."""
 ENTRIES = 1024
 """Entries of the tables of noise and step over 1/z."""
 
@@ -63,7 +67,12 @@ def voted(inverse: FloatArray, noise: DepthNoise) -> Vote:
     """
     range_x, law, step = _tables(inverse, noise)
     limit = np.maximum(WITHIN_SD * law, WITHIN_STEPS * step)
-    mean, variance, counts, measured, spread = _vote(inverse, range_x, limit, law**2, step**2 / 12.0)
+    tables = range_x, limit, law**2, step**2 / 12.0
+    edges = np.linspace(0, inverse.shape[1], BANDS + 1).astype(int).tolist()
+    bands = [threads("vote", 2).submit(_vote, inverse, first, end, *tables) for first, end in pairwise(edges)]
+    mean, variance, counts, measured, spread = map(
+        np.concatenate, zip(*(band.result() for band in bands), strict=True)
+    )
     moving = _with_neighbours(spread) & (measured > 0)
     flickering = (measured > 0) & (measured < FLICKERS_BELOW * len(inverse))
     dropped = flickering & ((measured < LEAST_VOTES) | (counts < measured))
@@ -132,28 +141,32 @@ def step_at(x: FloatArray, values: FloatArray) -> FloatArray:
 @compiled
 def _vote(
     inverse: FloatArray,
+    first: int,
+    end: int,
     range_x: tuple[float, float],
     limit: FloatArray,
     law_variance: FloatArray,
     step_variance: FloatArray,
 ) -> tuple[FloatArray, FloatArray, ByteArray, ByteArray, BoolArray]:
-    """Return (H, W) mean of 1/z, its variance, measurements averaged and taken, and whether they spread.
+    """Return (R, W) mean of 1/z, its variance, measurements averaged and taken, and whether they spread.
 
     Args:
         inverse: (N, H, W) float32 1/z, 0 where unknown.
+        first: first of the R rows.
+        end: row after the last one.
         range_x: 1/z of the tables' first and last entry.
         limit: (K,) largest distance from the median of what is averaged.
         law_variance: (K,) variance of one measurement.
         step_variance: (K,) variance that averaging leaves.
     """
-    frames, rows, columns = inverse.shape
+    frames, rows, columns = inverse.shape[0], end - first, inverse.shape[2]
     mean, variance = np.zeros((rows, columns)), np.zeros((rows, columns))
     counts, measured = np.zeros((rows, columns), np.uint8), np.zeros((rows, columns), np.uint8)
     spread = np.zeros((rows, columns), np.bool_)
     of_row = np.empty((columns, frames), np.float32)
     per_entry = (len(limit) - 1) / max(range_x[1] - range_x[0], 1e-12)
     for row in range(rows):
-        _sort_row(inverse, row, of_row, measured[row])
+        _sort_row(inverse, first + row, of_row, measured[row])
         for column in range(columns):
             own, n = of_row[column], int(measured[row, column])
             if n == 0:

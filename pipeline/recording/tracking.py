@@ -6,6 +6,7 @@ Each frame is registered to the last keyframe; once it shows little of that, it 
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
@@ -143,18 +144,19 @@ def iterate_tracking(
     return tracker.track()
 
 
-def read_ahead(recording: Recording, numbers: Iterable[int]) -> Iterator[tuple[int, DepthView]]:
-    """Yield frames' numbers and depth; the next one is read while the caller works."""
-    reader = threads("recording", 1)
-    waiting: Future[DepthView] | None = None
-    before = -1
+def read_ahead(
+    recording: Recording, numbers: Iterable[int], ahead: int = 1
+) -> Iterator[tuple[int, DepthView]]:
+    """Yield frames' numbers and depth; the next ``ahead`` are read, in parallel, while the caller works."""
+    reader = threads("recording", ahead)
+    waiting: deque[tuple[int, Future[DepthView]]] = deque()
     for k in numbers:
-        following = reader.submit(recording.view, k)
-        if waiting is not None:
-            yield before, waiting.result()
-        before, waiting = k, following
-    if waiting is not None:
-        yield before, waiting.result()
+        waiting.append((k, reader.submit(recording.view, k)))
+        if len(waiting) > ahead:
+            number, view = waiting.popleft()
+            yield number, view.result()
+    for number, view in waiting:
+        yield number, view.result()
 
 
 class _Tracker:

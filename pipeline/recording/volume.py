@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pipeline.importing.depth_views import DepthView
 from pipeline.kernels.geometry import inverse, rigid
 from pipeline.kernels.kdtree import compiled
-from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise, FloatArray, IntArray, PointCloud
+from pipeline.types import DepthNoise, FloatArray, IntArray, PointCloud
 
 LEAST_VOXEL_M = 0.002
 VOXEL_OF_NOISE = 2.0
@@ -79,27 +80,25 @@ class Volume:
         self._images = 0
         self._store = _Blocks(table, keys, stamps, means, seen, np.zeros_like(seen))
 
-    def integrate(
-        self, depth: DepthMap, intrinsics: CameraIntrinsics, T_world_camera: FloatArray, noise: DepthNoise
-    ) -> None:
+    def integrate(self, view: DepthView, T_world_camera: FloatArray) -> None:
         """Average a depth image into the voxels of all blocks near its surface.
 
         A voxel takes the depth of the nearest pixel; its distance is along the optical axis, as is the noise.
-        The weight is 1 / sd^2 at the angle of incidence; depth is ignored
-        whose sd at normal incidence exceeds ``LARGEST_SD`` voxels.
+        The weight is 1 / sd^2 at the angle of incidence, times the view's own; depth is ignored whose sd at
+        normal incidence exceeds ``LARGEST_SD`` voxels.
 
         Args:
-            depth: (H, W) depth, metres.
-            intrinsics: camera without distortion: only the matrix is used.
-            T_world_camera: (4, 4) pose.
-            noise: law of the depth's standard deviation.
+            view: a depth image with its camera and noise.
+            T_world_camera: (4, 4) pose of that camera.
         """
-        z_m = np.pad(depth.z_m.astype(np.float32), _NEAR_PX, constant_values=np.nan)
-        matrix = np.asarray(intrinsics.matrix, dtype=np.float64)
-        pixels, far_m = _weigh(z_m, matrix, *_weights(noise, self.voxel_m), self.voxel_m)
+        z_m = np.pad(view.depth.z_m.astype(np.float32), _NEAR_PX, constant_values=np.nan)
+        matrix = np.asarray(view.camera.matrix, dtype=np.float64)
+        pixels, far_m = _weigh(z_m, matrix, *_weights(view.noise, self.voxel_m), self.voxel_m)
+        if view.weight is not None:
+            pixels[..., 1] *= view.weight
         to_pixels = rigid(matrix, np.zeros(3)) @ inverse(T_world_camera)
         to_pixels[:, :3] *= self.voxel_m
-        step = int(np.clip(2.0 * self.voxel_m * intrinsics.fx_px / max(far_m, self.voxel_m), 1, 4))
+        step = int(np.clip(2.0 * self.voxel_m * view.camera.fx_px / max(far_m, self.voxel_m), 1, 4))
         to_voxels = np.linalg.inv(to_pixels) @ np.diag([step, step, 1.0, 1.0])
         offsets = 1 + math.ceil(0.5 * self.truncation_m / self.voxel_m)  # half a block apart
         offsets_m = np.linspace(-self.truncation_m, self.truncation_m, offsets)
@@ -112,10 +111,6 @@ class Volume:
             self._store = _grown(self._store)
         _update(touched, self._store, pixels, to_pixels, self.truncation_m, min(self._images, _MOST))
         self._images += 1
-
-    def points(self, least_observations: int = 2) -> PointCloud:
-        """Return the points of ``dated_points``."""
-        return self.dated_points(least_observations)[0]
 
     def dated_points(self, least_observations: int = 2) -> tuple[PointCloud, IntArray]:
         """Find where the distance crosses zero between neighbours along x, y or z; ordered by voxel.

@@ -96,7 +96,7 @@ def iterate_map(
             yield Progress(f"mapping frame {k} of {len(T_world_depth)}", count / len(numbers))
         T = T_world_depth[k]
         assert T is not None
-        volume.integrate(view.depth, view.camera, T, view.noise)
+        volume.integrate(view, T)
     least = LEAST_OBSERVATIONS if len(numbers) >= FEW_FRAMES else 1
     points, first = volume.dated_points(least)
     return points, np.array(numbers)[first], voxel_m

@@ -2,7 +2,7 @@
 
 import pytest
 
-from packetmesh.progress import Progress, drain, part
+from packetmesh.progress import Progress, drain, part, spaced
 
 
 def counting(end):
@@ -35,3 +35,8 @@ def test_a_part_of_a_longer_computation_says_its_stage_and_in_detail_what_it_doe
         steps = []
         assert drain(part(work(), "camera", 0.2, 0.6, detail), steps.append) == "done"
         assert steps == [Progress(stage, 0.4)]
+
+
+def test_reports_are_at_least_so_many_steps_apart_and_about_a_hundred():
+    assert [spaced(count, 5) for count in (0, 40, 500, 599, 600, 10_000)] == [5, 5, 5, 5, 6, 100]
+    assert len(range(0, 10_050, spaced(10_050, 5))) == 101

@@ -7,13 +7,17 @@ import pytest
 
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
+from packetmesh.settings import with_settings
 from pipeline.deliver import iterate_delivery
 from pipeline.delivery import CODINGS
 from pipeline.delivery.moments import Rebuilder
 from pipeline.delivery.sending import arrived_bytes, moment_times_ns, received_at, send
 from pipeline.folders.delivery import delivery_metrics, summary
 from pipeline.reconstruct import iterate_reconstruction
-from tests.pipeline.delivery.small import delivery_spec, small_rig
+from pipeline.sources import Recorded
+from pipeline.spec import Spec
+from tests.pipeline.delivery.small import CONFIG, delivery_spec, small_rig
+from tests.pipeline.recording.standing import wall, write_tum
 
 LOSSY = (
     "mac.kind=ideal",
@@ -56,10 +60,13 @@ def same_surface(one, other):
     return np.array_equal(one.vertices_m, other.vertices_m) and np.array_equal(one.triangles, other.triangles)
 
 
-def test_a_rig_that_is_loaded_is_not_loaded_again(rig):
-    """Of a recording it would be tracked again."""
-    other = replace(rig, frames=rig.frames[:1])
-    assert [frame.name for frame in send(delivery_spec(rig, moments=1), other).rig.frames] == ["node_00"]
+def test_a_recording_is_opened_once_with_the_frames_of_the_settings(tmp_path):
+    source = Recorded(str(write_tum(tmp_path / "still", wall(6))))
+    spec = delivery_spec(None, moments=1)
+    config = with_settings(CONFIG, ["recording.frames=3"])
+    result = deliver(replace(spec, spec=Spec(source, config=config)))
+    assert result.sending.rig.frames[0].averaging.frames == 3
+    assert result.lossless.rig is result.sending.rig
 
 
 def test_in_the_end_there_is_what_a_reconstruction_of_the_images_gives(rig, whole):
@@ -97,7 +104,7 @@ def test_depth_first_rebuilds_before_any_colour_is_there(whole):
 
 
 def test_a_moment_says_exactly_the_images_where_bytes_have_arrived(rig):
-    sending = send(delivery_spec(rig, *LOSSY))
+    sending = send(delivery_spec(rig, *LOSSY), rig)
     t_ns = int(sending.times_ns[1])
     for frame, there, received in zip(
         rig.frames, arrived_bytes(sending, t_ns), received_at(sending, t_ns), strict=True
@@ -110,7 +117,7 @@ def test_a_moment_says_exactly_the_images_where_bytes_have_arrived(rig):
 
 
 def test_a_moment_does_not_depend_on_those_before_it(rig):
-    sending = send(delivery_spec(rig, *LOSSY, moments=2))
+    sending = send(delivery_spec(rig, *LOSSY, moments=2), rig)
     in_turn = Rebuilder(sending)
     for index in range(2):
         one, alone = drain(in_turn.moment(index)), drain(Rebuilder(sending).moment(index))
@@ -127,7 +134,7 @@ def test_two_processes_give_the_same_moments(rig, whole):
 
 def test_a_node_that_is_not_heard_yet_is_absent_but_its_rays_count(rig):
     """Of the second node nothing has arrived."""
-    sending = send(delivery_spec(rig, coding="jpeg", moments=1))
+    sending = send(delivery_spec(rig, coding="jpeg", moments=1), rig)
     came = sending.arrivals
     kept = came.node == 0
     columns = {
@@ -141,7 +148,7 @@ def test_a_node_that_is_not_heard_yet_is_absent_but_its_rays_count(rig):
 
 @pytest.mark.parametrize("coding", CODINGS)
 def test_no_coding_claims_more_than_has_arrived(rig, coding):
-    sending = send(delivery_spec(rig, *LOSSY, coding=coding, moments=2))
+    sending = send(delivery_spec(rig, *LOSSY, coding=coding, moments=2), rig)
     received = received_at(sending, int(sending.times_ns[-1]))
     for frame, one in zip(rig.frames, received, strict=True):
         measured = one.depth > 0
@@ -176,7 +183,7 @@ def test_only_colour_arrives(rig):
 
 def test_a_deadline_before_the_first_packet(rig):
     """Only what was on the air already comes through."""
-    sending = send(delivery_spec(rig, "nodes.deadline_s=0.0001", moments=1))
+    sending = send(delivery_spec(rig, "nodes.deadline_s=0.0001", moments=1), rig)
     last = drain(Rebuilder(sending).moment(0))
     assert last.delivered_bytes <= 2 * 1464
     assert last.surface is None

@@ -41,7 +41,6 @@ from pipeline.delivery.sending import (
     send,
     senders_of,
 )
-from pipeline.sources import Recorded
 from pipeline.spec import key as spec_key
 from pipeline.types import (
     BoolArray,
@@ -50,7 +49,6 @@ from pipeline.types import (
     FloatArray,
     PointCloud,
     RgbdFrame,
-    Rig,
     SurfaceResult,
 )
 
@@ -100,19 +98,14 @@ def sending_of(store: Store, spec: Spec) -> Generator[Progress, None, Sending]:
 
 
 def _send(store: Store, spec: Spec) -> Generator[Progress, None, Sending]:
-    rig = yield from _tracked(store, spec)
+    rig = yield from store.stage(spec, "rig")
     yield Progress("sending the images", 0.02)
     sent = _sent_of(spec)
     return send(DeliverySpec(spec, sent.network, sent.coding, sent.moments, sent.down), rig)
 
 
-def _tracked(store: Store, spec: Spec) -> Generator[Progress, None, Rig | None]:
-    """Return the keyframes of a recording, which take long to track; None for a rig."""
-    return (yield from store.stage(spec, "rig")) if isinstance(spec.source, Recorded) else None
-
-
 def _delivered(store: Store, spec: Spec) -> Steps:
-    yield from _tracked(store, spec)
+    yield from store.stage(spec, "rig")
     started = time.perf_counter()
     sending = yield from sending_of(store, spec)
     view = _first_view(sending, _sent_of(spec), time.perf_counter() - started)

@@ -37,7 +37,8 @@ def patient(network: NetworkConfig) -> NetworkConfig:
 def send_trial(task: SendTask) -> Values:
     """Return the cost until the sink has everything; no values if it never has."""
     network = patient(PRESETS[task.network])
-    sending = send(DeliverySpec(Spec(Demo(task.rig)), network, task.coding, moments=1))
+    source = Demo(task.rig)
+    sending = send(DeliverySpec(Spec(source), network, task.coding, moments=1), source.load())
     image_bytes = sum(len(stream) for stream in sending.streams)
     packet_bytes = packet_bytes_of(network)
     values: Values = {

@@ -92,8 +92,8 @@ def sending_table(study: Study) -> Table:
 MEASURES = (
     ("F-score, sensor only", "f_before", 100.0),
     ("F-score, fused", "f_after", 100.0),
-    ("rays without surface, sensor only", "no_hit_before", 100.0),
-    ("rays without surface, fused", "no_hit_after", 100.0),
+    ("rays without a surface, sensor only", "no_hit_before", 100.0),
+    ("rays without a surface, fused", "no_hit_after", 100.0),
     ("hole area, m², fused", "hole_area_m2_after", 1.0),
     ("median depth error, mm, fused", "median_depth_error_m_after", 1000.0),
 )

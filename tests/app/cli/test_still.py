@@ -40,6 +40,22 @@ def test_a_rig_of_recordings_is_averaged_node_by_node(capsys, tmp_path):
     assert [node["averaged"]["frames"] for node in nodes] == [4, 4]
 
 
+def test_what_is_delivered_is_averaged_over_the_frames_of_the_settings_and_replaces_a_walk(capsys, tmp_path):
+    folder, out = write_tum(tmp_path / "still", wall(6)), tmp_path / "run"
+    (out / "keyframes" / "images").mkdir(parents=True)
+    old = [out / "keyframes" / "images" / "a.jpg", out / "trajectory.txt", out / "trajectory.json"]
+    for path in (*old, out / "mine.txt"):
+        path.write_text("old")
+    words = "deliver", "--recording", folder, "--moments", 1, *SETTINGS, "--out", out
+    code, _, said = run(capsys, *words)
+    assert code == 0, said
+    assert "recording: a camera that stands: averaging 4 frames" in said
+    (node,) = json.loads((out / "metrics.json").read_text())["nodes"]
+    assert node["averaged"]["frames"] == 4
+    assert [path.name for path in out.iterdir() if path.name in ("keyframes", "mine.txt")] == ["mine.txt"]
+    assert not any(path.exists() for path in old)
+
+
 def test_a_rig_whose_camera_walks_gets_one_sentence(capsys, tmp_path):
     moving = [depth_m * (1.0 + 0.02 * k) for k, depth_m in enumerate(wall(6))]
     write_tum(tmp_path / "rig" / "node_00", moving)

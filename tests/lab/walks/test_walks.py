@@ -116,8 +116,8 @@ def test_the_folder_imports_as_a_recording_without_poses(folder):
     )
     assert np.array_equal(recording.camera.matrix, CAMERA.matrix)
     assert recording.units_per_metre == UNITS_PER_METRE
-    (note,) = recording.notes
-    assert "poses are not known" in note
+    assert recording.notes == ()
+    assert recording.without_poses == "No groundtruth.txt: poses are not known; reconstruct looks for them"
     assert read_color(recording.candidates[0].color).shape == (60, 80, 3)
 
 

@@ -15,7 +15,8 @@ import pytest
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.folders import keyframes
-from pipeline.folders.keyframes import delete_keyframes, iterate_keyframes, straight
+from pipeline.folders.keyframes import iterate_keyframes, straight
+from pipeline.folders.run import clear_run_folder
 from pipeline.importing import iterate_import
 from pipeline.importing.upright import upright
 from pipeline.io.rigs import load_rig
@@ -152,5 +153,6 @@ def test_keyframes_of_an_earlier_run_are_deleted(tmp_path):
     written(tmp_path)
     assert not (folder / "images" / "frame_00099.jpg").exists()
     assert [path.name for path in (tmp_path / "run").iterdir()] == ["keyframes"]
-    delete_keyframes(tmp_path / "run")
-    assert not folder.exists()
+    (tmp_path / "run" / "notes.txt").write_text("mine")
+    clear_run_folder(tmp_path / "run")
+    assert [path.name for path in (tmp_path / "run").iterdir()] == ["notes.txt"]

@@ -6,11 +6,14 @@ import pytest
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.importing import bag_topics, iterate_import
+from pipeline.importing.bag_reader import SUFFIXES
+from pipeline.importing.recorded import open_recording
 from pipeline.io.extrinsics import read_extrinsics
 from pipeline.io.images import read_depth
 from pipeline.io.rigs import load_rig
 from pipeline.kernels.geometry import rigid, rotation_exp
 from tests.pipeline.importing.bags import DEPTHS, write_bag
+from tests.pipeline.importing.foxglove_files import write_foxglove
 from tests.pipeline.importing.recordings import orbit
 
 
@@ -47,6 +50,25 @@ def test_a_single_file_of_a_bag_is_enough(tmp_path):
     (file,) = (tmp_path / "recording").glob("*.mcap")
     drain(iterate_import(file, tmp_path / "rig"))
     assert len(load_rig(tmp_path / "rig").frames) == 2
+
+
+@pytest.mark.parametrize("kind", ["ros1", "ros2", "mcap", "foxglove"])
+def test_a_bags_suffix_may_be_in_capitals(tmp_path, kind):
+    """As on a card that was written under Windows; a folder with only this bag is the bag, too."""
+    written = orbit(2)
+    if kind == "foxglove":
+        file = write_foxglove(tmp_path / "a.mcap", written)
+    else:
+        write_bag(file_of(tmp_path, kind), written, kind)
+        (file,) = (path for path in tmp_path.rglob("*") if path.suffix in SUFFIXES)
+    (tmp_path / "card").mkdir()
+    loud = file.rename(tmp_path / "card" / f"WALK{file.suffix.upper()}")
+    drain(iterate_import(loud, tmp_path / "rig"))
+    for frame, expected in zip(load_rig(tmp_path / "rig").frames, written.frames, strict=True):
+        assert_same(frame, expected)
+    assert open_recording(tmp_path / "card").path == loud
+    with pytest.raises(InputError, match=r"holds the bag WALK.*; try .*/card/WALK"):
+        drain(iterate_import(tmp_path / "card", tmp_path / "other"))
 
 
 def test_one_camera_gives_moments_spread_over_the_bag(tmp_path):

@@ -238,12 +238,12 @@ def test_a_mean_pose_of_look_at_has_z_up():
 
 
 def test_frames_that_were_not_looked_at_and_extrinsics_that_are_missing_are_said(tmp_path, monkeypatch):
-    monkeypatch.setattr("pipeline.importing.pairing.MOST_CANDIDATES", 4)
+    monkeypatch.setattr("pipeline.importing.import_rig.MOST_CANDIDATES", 4)
     written = orbit(10)
     write_scannet(tmp_path / "recording", written)
     report, _ = imported(tmp_path)
     assert report.candidates == 4
-    assert "Of 10 frames one in 3 was looked at" in report.notes
+    assert "Of the 10 frames one in 3 is used, so that there are at most 4" in report.notes
     assert not any("extrinsic" in note for note in report.notes)
 
 

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
+from pipeline.importing.depth_views import DepthCamera, view_of
 from pipeline.importing.recorded import FRAMES_PER_S, FolderRecording, open_recording
 from pipeline.io.depth_to_color import register_depth
 from pipeline.io.images import NoDepthError, write_color
@@ -27,6 +28,8 @@ from tests.pipeline.importing.recordings import (
     write_tum,
 )
 from tests.pipeline.lenses import KIND, by_opencv, camera
+from tests.pipeline.strangers.containers import write_r3d
+from tests.pipeline.strangers.phones import write_scanner_app
 
 NORMAL, OFFSET_M = np.array([0.28, -0.2, 0.9390]), 1.6
 """A tilted wall normal . p = offset in the camera's frame."""
@@ -53,6 +56,7 @@ def test_every_frame_of_a_recording_is_there_in_order(tmp_path, kind):
         np.testing.assert_array_equal(view.depth.z_m, expected.depth.z_m)
         np.testing.assert_array_equal(view.camera.matrix, CAMERA.matrix)
         np.testing.assert_array_equal(view.T_color_depth, np.eye(4))
+        assert view.weight is None
         np.testing.assert_array_equal(frame.rgb, expected.rgb)
         np.testing.assert_array_equal(frame.depth.z_m, expected.depth.z_m)
         np.testing.assert_allclose(frame.T_world_camera, expected.T_world_camera, atol=1e-6)
@@ -270,6 +274,64 @@ def test_depth_of_the_lowest_confidence_is_unknown_also_if_it_is_all_of_a_frame(
     np.testing.assert_array_equal(known[:, 20:], written.frames[1 - blind].depth.valid[:, 20:])
 
 
+def levels_of(high: int, medium: int) -> np.ndarray:
+    """(30, 40): a third of low, of medium and of high confidence."""
+    levels = np.full((30, 40), high, np.uint8)
+    levels[:10], levels[10:20] = 0, medium
+    return levels
+
+
+def stray(folder, levels):
+    write_stray(folder, orbit(2))
+    return [folder / "confidence" / f"{k:06d}.png" for k in range(2)]
+
+
+def polycam(folder, levels):
+    write_polycam(folder, orbit(2))
+    return list((folder / "keyframes" / "confidence").iterdir())
+
+
+def scanner_app(folder, levels):
+    write_scanner_app(folder, orbit(2))
+    return [folder / depth.name.replace("depth", "conf") for depth in folder.glob("depth_*.png")]
+
+
+def r3d(folder, levels):
+    write_r3d(folder, orbit(2), confidence=levels)
+    return []
+
+
+@pytest.mark.parametrize(
+    ("write", "high", "medium"),
+    [(stray, 2, 1), (scanner_app, 2, 1), (r3d, 2, 1), (polycam, 255, 127), (polycam, 255, 54)],
+)
+def test_medium_confidence_counts_a_quarter_whatever_the_app_calls_it(tmp_path, write, high, medium):
+    """ARKit's 0, 1, 2; Polycam's 0, 127, 255 by its documents, and 0, 54, 255 in its files."""
+    levels = levels_of(high, medium)
+    for path in write(tmp_path / "capture", levels):
+        cv2.imwrite(str(path), levels)
+    recording = open_recording(tmp_path / "capture")
+    view = recording.view(1)
+    assert not view.depth.valid[:10].any()
+    assert view.depth.valid[10:].mean() > 0.9
+    np.testing.assert_array_equal(view.weight[10:20], 0.25)
+    np.testing.assert_array_equal(view.weight[20:], 1.0)
+    (note,) = (note for note in recording.notes if "confidence" in note)
+    assert "lowest confidence (0) is left out" in note
+    assert "medium confidence counts 0.25 in the map of a camera that walks, and 1 elsewhere" in note
+
+
+def test_confidence_moves_with_the_depth_of_a_bent_lens():
+    """Depth and weight differ from column to column, so that a wrong pixel would be seen."""
+    bent = CameraIntrinsics(CAMERA.matrix, np.array([-0.3, 0.1, 0.0, 0.0, 0.0]), 40, 30)
+    columns = np.tile(np.arange(40, dtype=np.float32), (30, 1))
+    straight = view_of(1.0 + columns, DepthCamera(bent, np.eye(4)), 0.01 * columns)
+    known = straight.depth.valid
+    assert known.mean() > 0.5
+    np.testing.assert_allclose(straight.weight[known], 0.01 * (straight.depth.z_m[known] - 1.0), atol=1e-6)
+    assert not np.array_equal(straight.depth.z_m, 1.0 + columns)
+
+
 def all_blind(folder):
     write_tum(folder, orbit(2))
     for path in (folder / "depth").iterdir():
@@ -326,10 +388,10 @@ def test_a_scale_that_cannot_be_is_refused(tmp_path, scale):
 
 
 def test_of_a_long_recording_every_nth_frame_is_used(tmp_path, monkeypatch):
-    monkeypatch.setattr("pipeline.importing.reading.MOST_FRAMES", 3)
+    monkeypatch.setattr("pipeline.importing.recorded.MOST_FRAMES", 3)
     write_tum(tmp_path / "recording", orbit(7))
     recording = open_recording(tmp_path / "recording")
-    monkeypatch.setattr("pipeline.importing.reading.MOST_FRAMES", 7)
+    monkeypatch.setattr("pipeline.importing.recorded.MOST_FRAMES", 7)
     every = open_recording(tmp_path / "recording")
     np.testing.assert_array_equal(recording.times_s, every.times_s[[0, 3, 6]])
     np.testing.assert_array_equal(recording.T_world_camera[2], every.T_world_camera[6])

@@ -152,6 +152,18 @@ def test_only_the_frames_asked_for_are_averaged():
     assert drain(iterate_still(standing(70), 64)).averaging.available == 64
 
 
+def test_each_frame_that_is_averaged_is_read_once():
+    read = []
+
+    class Counted(Frames):
+        def view(self, index):
+            read.append(index)
+            return super().view(index)
+
+    drain(iterate_still(Counted(wall(16), pictures(*[100] * 16)), 16))
+    assert sorted(read) == list(range(16))
+
+
 def test_points_get_the_deviation_of_the_average():
     one, many = (drain(iterate_still(standing(64), frames)) for frames in (1, 64))
     of_wall_m = [np.median(back_project(frame).sigma_m[: 10 * 160]) for frame in (one, many)]

@@ -50,8 +50,8 @@ def test_each_node_is_averaged_over_its_own_frames(rig):
 def test_the_chain_opens_it_with_the_frames_of_the_settings(rig):
     opened = drain(open_rig(RigFolder(str(rig)), 2))
     assert [frame.averaging and frame.averaging.frames for frame in opened.frames] == [2, 2, None]
-    loaded = RigFolder(str(rig)).load()
-    assert [frame.averaging and frame.averaging.frames for frame in loaded.frames] == [6, 4, None]
+    opened = drain(open_rig(RigFolder(str(rig))))
+    assert [frame.averaging and frame.averaging.frames for frame in opened.frames] == [6, 4, None]
 
 
 def test_a_rig_of_images_holds_no_recording(rig, tmp_path):
@@ -102,7 +102,7 @@ def test_another_calibration_is_refused(rig, tmp_path):
 def test_a_recording_in_the_chain_is_averaged_over_the_frames_of_the_settings(tmp_path):
     source = Recorded(str(write_tum(tmp_path / "still", wall(6))))
     assert drain(open_rig(source, 3)).frames[0].averaging.frames == 3
-    assert source.load().frames[0].averaging.frames == 6
+    assert drain(open_rig(source)).frames[0].averaging.frames == 6
 
 
 def test_the_number_of_frames_matters_to_recordings_only():

@@ -1,5 +1,6 @@
 """Tracking through a rendered room, whose camera poses are known."""
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -288,6 +289,25 @@ def test_read_ahead_yields_the_frames_in_order_and_reads_one_ahead():
     assert got == recording.read == numbers
     assert list(read_ahead(recording, [])) == []
     assert [k for k, _ in read_ahead(recording, [7])] == [7]
+
+
+def test_two_readers_yield_the_frames_in_order_and_read_two_ahead():
+    """The first of every three frames takes longest."""
+
+    class Slow(Counting):
+        def view(self, index: int) -> DepthView:
+            time.sleep(0.0 if index % 3 else 0.03)
+            return super().view(index)
+
+    room = in_the_living_room([])
+    recording = Slow(room.vertices_m, room.triangles, around(7))
+    got = []
+    for k, view in read_ahead(recording, range(7), 2):
+        got.append(k)
+        assert len(recording.read) <= len(got) + 2
+        np.testing.assert_array_equal(view.depth.z_m, in_the_living_room(around(7)).view(k).depth.z_m)
+    assert got == list(range(7))
+    assert sorted(recording.read) == got
 
 
 def test_the_error_of_a_damaged_frame_comes_at_its_turn():

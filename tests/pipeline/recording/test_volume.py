@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from pipeline.importing.depth_views import DepthView
 from pipeline.kernels.geometry import inverse, look_at, pixel_rays, rigid, rotation_exp
 from pipeline.kernels.open3d_runtime import o3d
 from pipeline.recording.volume import LEAST_SD, TRUNCATION_VOXELS, Volume, voxel_for
-from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise
+from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise, PointCloud
 
 VOXEL_M = 0.01
 CAMERA = CameraIntrinsics.pinhole(400.0, 400.0, 159.5, 119.5, 320, 240)
@@ -41,8 +42,16 @@ def sphere(T_world_camera: np.ndarray) -> DepthMap:
 def volume_of(*frames, voxel_m: float = VOXEL_M, noise: DepthNoise = NOISE) -> Volume:
     volume = Volume(voxel_m)
     for depth, T_world_camera in frames:
-        volume.integrate(depth, CAMERA, T_world_camera, noise)
+        volume.integrate(view(depth, noise), T_world_camera)
     return volume
+
+
+def view(depth: DepthMap, noise: DepthNoise = NOISE, weight: np.ndarray | None = None) -> DepthView:
+    return DepthView(depth, CAMERA, np.eye(4), noise, weight)
+
+
+def points(volume: Volume, least_observations: int = 2) -> PointCloud:
+    return volume.dated_points(least_observations)[0]
 
 
 def test_the_voxel_is_twice_the_noise_but_not_below_five_millimetres():
@@ -54,7 +63,7 @@ def test_the_voxel_is_twice_the_noise_but_not_below_five_millimetres():
 
 
 def test_a_wall_becomes_a_grid_of_points_that_face_the_camera():
-    cloud = volume_of((wall(1.5034), ORIGIN)).points(1)
+    cloud = points(volume_of((wall(1.5034), ORIGIN)), 1)
     np.testing.assert_allclose(cloud.points_m[:, 2], 1.5034, atol=1e-5)
     np.testing.assert_allclose(cloud.normals, np.tile([0.0, 0.0, -1.0], (len(cloud), 1)), atol=1e-5)
     np.testing.assert_allclose(cloud.points_m[:, :2] / VOXEL_M, np.round(cloud.points_m[:, :2] / VOXEL_M))
@@ -78,7 +87,7 @@ def test_a_tilted_plane_stays_where_it_is(angle_deg):
     """Of one view with nearest pixels: within half a pixel's slope, and in the mean exact."""
     normal = np.array([np.sin(np.radians(angle_deg)), 0.0, np.cos(np.radians(angle_deg))])
     T = rigid(rotation_exp(np.array([0.3, 0.2, 0.1])), np.ones(3))
-    cloud = volume_of((plane(normal, 0.7), T)).points(1).transformed(inverse(T))
+    cloud = points(volume_of((plane(normal, 0.7), T)), 1).transformed(inverse(T))
     away_m = cloud.points_m @ normal - 0.7
     half_pixel_m = 0.5 * cloud.points_m[:, 2] / 400.0 * np.sin(np.radians(angle_deg))
     assert np.mean(np.abs(away_m) < 1.1 * half_pixel_m) > 0.98
@@ -89,7 +98,7 @@ def test_a_tilted_plane_stays_where_it_is(angle_deg):
 
 
 def test_a_sphere_seen_from_six_sides_has_its_radius_and_outward_normals():
-    cloud = volume_of(*((sphere(T), T) for T in SIX_VIEWS)).points(1)
+    cloud = points(volume_of(*((sphere(T), T) for T in SIX_VIEWS)), 1)
     radii_m = np.linalg.norm(cloud.points_m, axis=1)
     outward = np.sum(cloud.normals * cloud.points_m, axis=1) / radii_m
     assert abs(np.median(radii_m) - RADIUS_M) < 0.02 * VOXEL_M
@@ -109,7 +118,7 @@ def test_noise_falls_with_the_root_of_the_number_of_frames():
         (DepthMap((1.505 + 0.002 * rng.standard_normal((240, 320))).astype(np.float32)), ORIGIN)
         for _ in range(frames)
     ]
-    one, all_of_them = volume_of(noisy[0]).points(1), volume_of(*noisy).points(frames)
+    one, all_of_them = points(volume_of(noisy[0]), 1), points(volume_of(*noisy), frames)
     rms_m = []
     for cloud in (one, all_of_them):  # near the axis, where both neighbours of a crossing see the same pixel
         away_m = cloud.points_m[np.hypot(*cloud.points_m[:, :2].T) < 0.08, 2] - 1.505
@@ -126,7 +135,7 @@ def test_two_frames_meet_at_the_mean_that_the_noise_law_gives():
     sd_m = noise.sd_m(np.array([1.0, 2.008]))
     weights = 1.0 / sd_m**2
     for frames in ([near, far], [far, near]):
-        cloud = volume_of(*frames, noise=noise).points()
+        cloud = points(volume_of(*frames, noise=noise))
         expected_m = (weights @ [1.0, 1.008]) / weights.sum()
         central = np.hypot(*cloud.points_m[:, :2].T) < 0.1
         np.testing.assert_allclose(cloud.points_m[central, 2], expected_m, atol=2e-5)
@@ -134,12 +143,41 @@ def test_two_frames_meet_at_the_mean_that_the_noise_law_gives():
     assert expected_m == pytest.approx(1.0 + 0.008 / 17.2, abs=2e-5)
 
 
+def test_depth_of_medium_confidence_counts_a_quarter():
+    """The left half of the second image, 8 mm behind the first: there the mean is a fifth of the way."""
+    weight = np.full((240, 320), 1.0, np.float32)
+    weight[:, :160] = 0.25
+    volume = Volume(VOXEL_M)
+    volume.integrate(view(wall(1.502)), ORIGIN)
+    volume.integrate(view(wall(1.510), weight=weight), ORIGIN)
+    cloud = points(volume)
+    central = np.hypot(*cloud.points_m[:, :2].T) < 0.2
+    left, right = (central & (side * cloud.points_m[:, 0] > 0.01) for side in (-1.0, 1.0))
+    assert min(left.sum(), right.sum()) > 500
+    np.testing.assert_allclose(cloud.points_m[left, 2], 1.5036, atol=2e-5)
+    np.testing.assert_allclose(cloud.points_m[right, 2], 1.506, atol=2e-5)
+    np.testing.assert_allclose(cloud.sigma_m[left], 0.002 / np.sqrt(1.25), rtol=1e-2)
+    np.testing.assert_allclose(cloud.sigma_m[right], 0.002 / np.sqrt(2.0), rtol=1e-2)
+
+
+def test_full_confidence_gives_the_bytes_of_none():
+    ones = np.ones((240, 320), np.float32)
+    found = []
+    for weight in (None, ones):
+        volume = Volume(VOXEL_M)
+        for T in SIX_VIEWS:
+            volume.integrate(view(sphere(T), weight=weight), T)
+        cloud = points(volume)
+        found.append([part.tobytes() for part in (cloud.points_m, cloud.normals, cloud.sigma_m)])
+    assert found[0] == found[1]
+
+
 def test_a_point_is_known_to_a_voxel_and_sigma_has_a_floor():
     noise = DepthNoise(0.0, 0.004, 2.0, 0.0)
-    assert len(volume_of((wall(1.55), ORIGIN), noise=noise).points(1))
-    assert not len(volume_of((wall(1.6), ORIGIN), noise=noise).points(1))  # 1.02 voxels
-    assert len(volume_of((wall(1.6), ORIGIN), (wall(1.6), ORIGIN), noise=noise).points(1))
-    exact = volume_of((wall(1.5), ORIGIN), noise=DepthNoise(0.0, 0.0, 1.0, 0.0)).points(1)
+    assert len(points(volume_of((wall(1.55), ORIGIN), noise=noise), 1))
+    assert not len(points(volume_of((wall(1.6), ORIGIN), noise=noise), 1))  # 1.02 voxels
+    assert len(points(volume_of((wall(1.6), ORIGIN), (wall(1.6), ORIGIN), noise=noise), 1))
+    exact = points(volume_of((wall(1.5), ORIGIN), noise=DepthNoise(0.0, 0.0, 1.0, 0.0)), 1)
     assert exact.sigma_m.min() == pytest.approx(LEAST_SD * VOXEL_M, rel=1e-3)
 
 
@@ -153,7 +191,7 @@ def test_depth_much_noisier_than_a_voxel_is_ignored():
 def test_a_grazing_view_weighs_less_by_the_noise_law(q):
     """Its exponent is at least 1."""
     normal = np.array([np.sin(1.0), 0.0, np.cos(1.0)])
-    cloud = volume_of((plane(normal, 1.0), ORIGIN), noise=DepthNoise(0.001, 0.0, 0.0, q)).points(1)
+    cloud = points(volume_of((plane(normal, 1.0), ORIGIN), noise=DepthNoise(0.001, 0.0, 0.0, q)), 1)
     to_camera = -cloud.points_m / np.linalg.norm(cloud.points_m, axis=1, keepdims=True)
     ratio = cloud.sigma_m * (np.sum(to_camera * -normal, axis=1)) ** max(q, 1.0) / 0.001
     assert np.median(ratio) == pytest.approx(1.0, abs=0.05)
@@ -163,7 +201,7 @@ def test_unknown_and_impossible_depth_changes_nothing():
     z_m = wall(1.5).z_m.copy()
     z_m[:, :160], z_m[:20], z_m[-20:] = np.nan, np.inf, -1.0
     z_m[20:40] = 0.0
-    cloud = volume_of((DepthMap(z_m), ORIGIN)).points(1)
+    cloud = points(volume_of((DepthMap(z_m), ORIGIN)), 1)
     np.testing.assert_allclose(cloud.points_m[:, 2], 1.5, atol=1e-5)
     v_px = cloud.points_m[:, 1] / 1.5 * 400.0 + 119.5
     assert cloud.points_m[:, 0].min() >= 0.0
@@ -174,17 +212,17 @@ def test_unknown_and_impossible_depth_changes_nothing():
 
 def test_one_observation_gives_no_points_but_the_second_does():
     frame = wall(1.5034), ORIGIN
-    assert len(volume_of(frame).points()) == 0
+    assert len(points(volume_of(frame))) == 0
     twice = volume_of(frame, frame)
-    np.testing.assert_array_equal(twice.points().points_m, volume_of(frame).points(1).points_m)
-    assert len(twice.points(3)) == 0
+    np.testing.assert_array_equal(points(twice).points_m, points(volume_of(frame), 1).points_m)
+    assert len(points(twice, 3)) == 0
 
 
 def test_points_do_not_depend_on_the_order_in_which_blocks_were_made():
     frames = [(sphere(T), T) for T in SIX_VIEWS]
     one, other = volume_of(*frames), volume_of(*frames[::-1])
     assert one.blocks == other.blocks
-    a, b = one.points(), other.points()
+    a, b = points(one), points(other)
     np.testing.assert_allclose(a.points_m, b.points_m, atol=1e-5)
     np.testing.assert_allclose(a.normals, b.normals, atol=1e-3)
 
@@ -196,9 +234,9 @@ def test_many_blocks_are_found_again_after_the_storage_has_grown():
     for axis in np.eye(3):
         for side in (1.0, -1.0):
             T = look_at(centre, centre + side * axis, up=np.roll(axis, 1))
-            volume.integrate(wall(2.0), CAMERA, T, NOISE)
+            volume.integrate(view(wall(2.0)), T)
     assert volume.blocks > 2048
-    away_m = np.abs(volume.points(1).points_m - centre).max(axis=1)
+    away_m = np.abs(points(volume, 1).points_m - centre).max(axis=1)
     np.testing.assert_allclose(away_m, 2.0, atol=1e-4)
     assert len(away_m) == pytest.approx(6 * 1.6 * 1.2 / VOXEL_M**2, rel=0.03)
 
@@ -225,7 +263,7 @@ def theirs(frames, least_weight: float) -> tuple[np.ndarray, np.ndarray]:
 
 def test_open3d_finds_the_same_sphere():
     frames = [(sphere(SIX_VIEWS[0]), SIX_VIEWS[0])]
-    ours = volume_of(*frames).points(1)
+    ours = points(volume_of(*frames), 1)
     places_m, normals = theirs(frames, 0.5)
     _, nearest = cKDTree(places_m).query(ours.points_m)
     away_m = np.abs(np.sum((ours.points_m - places_m[nearest]) * normals[nearest], axis=1))
@@ -235,7 +273,7 @@ def test_open3d_finds_the_same_sphere():
 
 def test_six_views_agree_better_than_in_open3d_which_weighs_all_angles_alike():
     frames = [(sphere(T), T) for T in SIX_VIEWS]
-    ours, (places_m, _) = volume_of(*frames).points(), theirs(frames, 1.5)
+    ours, (places_m, _) = points(volume_of(*frames)), theirs(frames, 1.5)
     errors_m = [np.abs(np.linalg.norm(p, axis=1) - RADIUS_M) for p in (ours.points_m, places_m)]
     assert len(ours) == pytest.approx(len(places_m), rel=0.1)
     assert np.percentile(errors_m[0], 95) < 0.5 * np.percentile(errors_m[1], 95)
