@@ -1,5 +1,6 @@
 """Settings of the documentation site, which ``make docs`` builds with Sphinx."""
 
+import json
 import re
 from pathlib import Path
 
@@ -8,7 +9,8 @@ from sphinx.errors import ExtensionError
 project = "PacketMesh"
 copyright = "The PacketMesh authors"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-exclude_patterns = ["examples/*", "results/*"]
+source_suffix = {".md": "markdown", ".ipynb": "markdown"}
+exclude_patterns = ["examples/*.py", "results/*"]
 html_theme = "furo"
 html_title = "PacketMesh"
 myst_heading_anchors = 4
@@ -25,9 +27,23 @@ LINK = re.compile(r"\[([^\]]*)\]\(((?:\.\./|results(?=[/)])|examples(?=[/)]))[^)
 
 
 def setup(app):
-    """Have links that leave the site written as plain text."""
+    """Have notebooks read as pages, and links that leave the site written as plain text."""
+    app.connect("source-read", with_notebooks_as_pages)
     app.connect("source-read", without_links_out)
     app.connect("include-read", seen_from_docs)
+
+
+def with_notebooks_as_pages(app, page, source):
+    """Replace a notebook by its text and code."""
+    if Path(app.env.doc2path(page)).suffix != ".ipynb":
+        return
+    cells = json.loads(source[0])["cells"]
+    texts = ["".join(cell["source"]) for cell in cells]
+    parts = [
+        text if cell["cell_type"] == "markdown" else f"```python\n{text}\n```"
+        for cell, text in zip(cells, texts, strict=True)
+    ]
+    source[0] = "\n\n".join(parts)
 
 
 def seen_from_docs(app, path, page, content):

@@ -14,6 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from app.notebook.show import Shown, show
     from network_sim.config import (
         EnergyConfig,
         LossConfig,
@@ -58,6 +59,9 @@ if TYPE_CHECKING:
     from pipeline.io.demos import DEMO_SCENES, board_views_of, load_demo
     from pipeline.io.meshes import read_mesh, write_mesh
     from pipeline.io.rigs import load_frame, load_rig, save_rig
+    from pipeline.measuring.calls import measure
+    from pipeline.measuring.surface import MeasuredSurface, measured_cloud, measured_surface, read_measured
+    from pipeline.measuring.values import Measure, Value
     from pipeline.reconstruct import Reconstruction, reconstruct
     from pipeline.registration import iterate_registration, point_error_m, register
     from pipeline.surface.ball_pivoting import iterate_ball, roll_ball
@@ -80,6 +84,7 @@ if TYPE_CHECKING:
     )
 
 _NAMES = {
+    "app.notebook.show": "Shown show",
     "network_sim.metrics.arrivals": "Arrivals arrivals",
     "network_sim.config": (
         "EnergyConfig LossConfig MacConfig NetworkConfig NodesConfig RadioConfig RunConfig SchemeConfig "
@@ -108,6 +113,9 @@ _NAMES = {
     "pipeline.io.demos": "DEMO_SCENES board_views_of load_demo",
     "pipeline.io.meshes": "read_mesh write_mesh",
     "pipeline.io.rigs": "load_frame load_rig save_rig",
+    "pipeline.measuring.calls": "measure",
+    "pipeline.measuring.surface": "MeasuredSurface measured_cloud measured_surface read_measured",
+    "pipeline.measuring.values": "Measure Value",
     "pipeline.reconstruct": "Reconstruction reconstruct",
     "pipeline.registration": "iterate_registration point_error_m register",
     "pipeline.surface.ball_pivoting": "iterate_ball roll_ball",
@@ -128,16 +136,18 @@ _PLACES = {name: (module, name) for module, names in _NAMES.items() for name in 
 __all__ = [
     "DEMO_SCENES", "NETWORK_PRESETS", "PRESETS", "AcquisitionConfig", "Arrivals", "BallPivotStep", "Board",
     "CalibratedNode", "CameraIntrinsics", "CameraReport", "Cause", "Delivery", "DepthConfig", "DepthMap",
-    "EnergyConfig", "EventKind", "Events", "FusionConfig", "InputError", "LossConfig", "MacConfig", "Metric",
-    "Moment", "NetworkConfig", "NetworkTrace", "NodesConfig", "PacketMeshError", "PipelineConfig",
-    "PointCloud", "PointSource", "Progress", "RadioConfig", "Reconstruction", "ReconstructionError",
-    "RegistrationConfig", "RegistrationResult", "RegistrationStep", "RelativePose", "RgbdFrame", "Rig",
-    "RigReport", "RigTruth", "RunConfig", "SchemeConfig", "StreetConfig", "Surface", "SurfaceConfig",
-    "SurfaceQuality", "SurfaceResult", "UplinkConfig", "arrivals", "back_project", "board_views_of",
-    "calibrate", "calibrate_cameras", "deliver", "drain", "estimate_normals", "image_delays_s",
-    "iterate_ball", "iterate_registration", "iterate_simulation", "load_demo", "load_frame", "load_rig",
-    "network_metrics", "point_error_m", "read_cloud", "read_mesh", "reconstruct", "register", "roll_ball",
-    "save_rig", "simulate", "spacing", "with_settings", "write_calibration", "write_cloud", "write_mesh",
+    "EnergyConfig", "EventKind", "Events", "FusionConfig", "InputError", "LossConfig", "MacConfig",
+    "Measure", "MeasuredSurface", "Metric", "Moment", "NetworkConfig", "NetworkTrace", "NodesConfig",
+    "PacketMeshError", "PipelineConfig", "PointCloud", "PointSource", "Progress", "RadioConfig",
+    "Reconstruction", "ReconstructionError", "RegistrationConfig", "RegistrationResult", "RegistrationStep",
+    "RelativePose", "RgbdFrame", "Rig", "RigReport", "RigTruth", "RunConfig", "SchemeConfig", "Shown",
+    "StreetConfig", "Surface", "SurfaceConfig", "SurfaceQuality", "SurfaceResult", "UplinkConfig", "Value",
+    "arrivals", "back_project", "board_views_of", "calibrate", "calibrate_cameras", "deliver", "drain",
+    "estimate_normals", "image_delays_s", "iterate_ball", "iterate_registration", "iterate_simulation",
+    "load_demo", "load_frame", "load_rig", "measure", "measured_cloud", "measured_surface",
+    "network_metrics", "point_error_m", "read_cloud", "read_measured", "read_mesh", "reconstruct",
+    "register", "roll_ball", "save_rig", "show", "simulate", "spacing", "with_settings", "write_calibration",
+    "write_cloud", "write_mesh",
 ]  # fmt: skip
 
 

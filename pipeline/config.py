@@ -113,13 +113,19 @@ class DepthConfig:
     normalisation: Normalisation | None = None
     """Scaling of the network's input: by ImageNet's mean and deviation, from 0 to 1 (unit) or to 255 (bytes);
     None takes the value of the preset or the file."""
+    completion: str | None = None
+    """ONNX file of the network that completes measured depth from image and depth; None uses the network that
+    comes with PacketMesh."""
+    completion_normalisation: Normalisation | None = None
+    """Scaling of that network's image, as ``normalisation``; None takes it from the file, or else unit."""
     crop: bool = False
     """Infer on the thesis's 304 x 228 centre crop instead of the whole image."""
     alignment: AlignmentMode = "local"
     """Alignment that makes inferred depth metric by the sensor's (SPEC 3.5)."""
     fill: Fill = "auto"
     """Depth for the sensor's holes: completed from colours and measured depth together (completion), or the
-    colour network's aligned depth (network); auto is network if a model is named, else completion."""
+    colour network's aligned depth (network); auto is network if a model is named and no completion, else
+    completion."""
     reach: float = 0.1
     """Largest distance of inferred depth from measured pixels, as a share of the image's diagonal."""
     least_confidence: float = 0.5
@@ -135,12 +141,15 @@ class DepthConfig:
             fill=plain.fill,
             reach=plain.reach,
             least_confidence=plain.least_confidence,
+            completion=None,
+            completion_normalisation=None,
         )
 
     @property
     def completes(self) -> bool:
         """Whether completion fills the sensor's holes."""
-        return self.fill == "completion" or (self.fill == "auto" and self.model is None)
+        by_default = self.model is None or self.completion is not None
+        return self.fill == "completion" or (self.fill == "auto" and by_default)
 
     def __post_init__(self) -> None:
         _above("depth.reach", self.reach, 0.0)

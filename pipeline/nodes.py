@@ -15,7 +15,7 @@ import numpy as np
 
 from pipeline.acquisition import Acquired, FilterResult, back_project
 from pipeline.config import DepthConfig, FusionMode, RegistrationConfig
-from pipeline.depth import AlignmentResult, DepthNetwork, JudgedDepth, align_depth, complete, judge
+from pipeline.depth import AlignmentResult, DepthNetwork, JudgedDepth, align_depth, completed_by, judge
 from pipeline.kernels.masks import near
 from pipeline.kernels.straight_view import bends_strongly, bent_depth, straight_image, straight_view
 from pipeline.registration import fuse, register
@@ -155,7 +155,7 @@ def prepare_node(
     """
     guide = _guide(frame)
     alignment = _aligned(inferred, guide, depth)
-    completed = complete(guide, frame.rgb) if _completes(guide, inferred, depth) else None
+    completed = completed_by(depth, guide, frame.rgb) if _completes(guide, inferred, depth) else None
     judged = judge(alignment, frame.depth, frame.rgb, depth.reach, depth.least_confidence, completed)
     believed = _guesses(frame, judged.depth if mode == "fill" else alignment.depth)
     node = partial(NodeClouds, frame, acquired, inferred, alignment, judged)

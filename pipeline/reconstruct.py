@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from packetmesh.notebook import ShownInNotebooks
 from packetmesh.progress import drain
 from pipeline.config import PRESETS, PipelineConfig
 from pipeline.merging import MergedClouds
@@ -19,7 +20,7 @@ from pipeline.types import Rig, SurfaceResult
 
 
 @dataclass(frozen=True, slots=True)
-class Reconstruction:
+class Reconstruction(ShownInNotebooks):
     """All results of the chain for one rig."""
 
     spec: Spec

@@ -16,6 +16,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from packetmesh.notebook import ShownInNotebooks
+
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
 BoolArray = NDArray[np.bool_]
@@ -152,6 +154,8 @@ class RgbdFrame:
     """Doubts about the images, one sentence each, with what to try."""
     averaging: Averaging | None = None
     """How ``depth`` was averaged; None for a single image."""
+    scale_sd: float | None = None
+    """Relative standard error that the calibration of lens and depth leaves in lengths; None if unknown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +179,7 @@ MAX_NODES = 200
 
 
 @dataclass(frozen=True, slots=True)
-class Rig:
+class Rig(ShownInNotebooks):
     """One to ``MAX_NODES`` camera nodes that look at the same place; a single RGB-D pair is a rig of one."""
 
     name: str
@@ -192,7 +196,7 @@ class Rig:
 
 
 @dataclass(frozen=True, slots=True)
-class PointCloud:
+class PointCloud(ShownInNotebooks):
     """Points with optional columns, each None or with N rows."""
 
     points_m: FloatArray
@@ -318,7 +322,7 @@ class RegistrationStep:
 
 
 @dataclass(frozen=True, slots=True)
-class RegistrationResult:
+class RegistrationResult(ShownInNotebooks):
     """Final transform and all steps of a registration."""
 
     T_target_source: FloatArray
@@ -346,9 +350,9 @@ class SurfaceQuality:
     """Measures of a mesh's holes and validity (SPEC 5); ``no_hit_ray_share`` is the main one."""
 
     no_hit_ray_share: float
-    """Share of the cameras' pixel rays that miss the mesh, 0 to 1."""
+    """Rays without a surface: share of the cameras' pixel rays that meet no triangle, 0 to 1."""
     boundary_loops: int
-    """Connected components of the graph of edges with exactly one face."""
+    """Number of rims: connected components of the graph of edges with exactly one face."""
     boundary_length_m: float
     hole_area_m2: float
     """Fan-triangulated area of loops shorter than 1 m, except those around a whole component."""
@@ -369,7 +373,7 @@ class SurfaceQuality:
 
 
 @dataclass(frozen=True, slots=True)
-class Surface:
+class Surface(ShownInNotebooks):
     """A triangle mesh, grown from a point cloud or read from a file."""
 
     vertices_m: FloatArray

@@ -33,6 +33,7 @@ def infer_depth(
     channels: Literal["RGB", "BGR"] | None = None,
     sensor: Path | None = None,
     fill: bool = False,
+    completion: Path | None = None,
     depth_scale: float | None = None,
     json: bool = False,
 ) -> None:
@@ -51,6 +52,8 @@ def infer_depth(
         channels: Order of its colour channels.
         sensor: Depth image of the sensor for one photograph; it makes the inferred depth metric.
         fill: Keep the measured depth and fill only its holes, as `reconstruct` does; needs --sensor.
+        completion: An ONNX network that takes image and depth; with --fill it completes the measured depth,
+            instead of the one that comes with PacketMesh.
         depth_scale: Depth units per metre in the sensor image; without it, whole numbers are millimetres
             and floating-point numbers metres.
         json: Print the results as one JSON object.
@@ -61,6 +64,8 @@ def infer_depth(
         wrong_use("--sensor is the depth image of one photograph; give only one photograph")
     if fill and sensor is None:
         wrong_use("--fill needs the depth image whose holes are filled: --sensor DEPTH")
+    if completion is not None and not fill:
+        wrong_use("--completion fills the holes of measured depth: add --fill and --sensor DEPTH")
     from packetmesh.files import writable_folder
     from pipeline.depth import DepthNetwork, Overrides
 
@@ -76,7 +81,7 @@ def infer_depth(
     report = {"model": str(network.model_path), "kind": network.convention.kind, "provider": network.provider}
     say(f"{report['model']} ({report['kind']}) runs on {report['provider']}")
     inferred = {}
-    for photo, record in _infer_photos(photos, network, out, sensor, depth_scale, fill):
+    for photo, record in _infer_photos(photos, network, out, sensor, depth_scale, fill, completion):
         say(_line(photo, record))
         for note in record.get("notes", ()):
             say(f"{sensor}: {note}")
@@ -92,6 +97,7 @@ def _infer_photos(
     sensor: Path | None,
     depth_scale: float | None,
     fill: bool,
+    completion: Path | None,
 ) -> Iterator[tuple[Path, dict[str, Any]]]:
     """Infer each photograph; yield it with a record of the written files."""
     from pipeline.depth import align_depth
@@ -113,7 +119,7 @@ def _infer_photos(
             aligned = align_depth(depth, measured, disparity=network.convention.kind == "inverse")
             depth, record["alignment"] = aligned.depth, _alignment(aligned)
             if fill:
-                depth, record["filled"] = _fill_holes(aligned, measured, rgb, network)
+                depth, record["filled"] = _fill_holes(aligned, measured, rgb, network, completion)
         yield photo, record | _write_depth(depth, network.convention.kind, out, photo.stem)
 
 
@@ -128,18 +134,23 @@ def _alignment(result: AlignmentResult) -> dict[str, Any]:
 
 
 def _fill_holes(
-    aligned: AlignmentResult, measured: DepthMap, rgb: ByteArray, network: DepthNetwork
+    aligned: AlignmentResult,
+    measured: DepthMap,
+    rgb: ByteArray,
+    network: DepthNetwork,
+    completion: Path | None,
 ) -> tuple[DepthMap, dict[str, Any]]:
     """Fill the holes of measured depth: by completion, or by the user's own network (SPEC 3.6)."""
     import numpy as np
 
     from pipeline.config import DepthConfig
-    from pipeline.depth import complete, judge
+    from pipeline.depth import completed_by, judge
     from pipeline.depth.inference import SHIPPED_MODEL
     from pipeline.types import DepthMap
 
     model = None if network.model_path == SHIPPED_MODEL else str(network.model_path)
-    completed = complete(measured, rgb) if DepthConfig(model=model).completes else None
+    config = DepthConfig(model=model, completion=None if completion is None else str(completion))
+    completed = completed_by(config, measured, rgb) if config.completes else None
     judged = judge(aligned, measured, rgb, float("inf"), 0.0, completed)
     depth = DepthMap(np.where(measured.valid, measured.z_m, judged.depth.z_m).astype(np.float32))
     holes = ~measured.valid & depth.valid

@@ -6,6 +6,7 @@ from pipeline.depth.confidence import JudgedDepth, judge
 from pipeline.depth.conventions import Convention, Overrides
 from pipeline.depth.inference import DepthNetwork
 from pipeline.depth.metrics import DepthErrors, depth_errors
+from pipeline.depth.own_completion import OwnCompletion, completed_by
 
 __all__ = [
     "AlignmentResult",
@@ -15,8 +16,10 @@ __all__ = [
     "DepthNetwork",
     "JudgedDepth",
     "Overrides",
+    "OwnCompletion",
     "align_depth",
     "complete",
+    "completed_by",
     "depth_errors",
     "judge",
 ]

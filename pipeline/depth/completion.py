@@ -24,9 +24,11 @@ class CompletedDepth:
     """Output of the completion network for one frame."""
 
     depth: DepthMap
-    """(H, W) metres; measured depth is unchanged."""
+    """(H, W) metres; measured depth is unchanged. NaN where a user's own network gives no depth."""
     log_scale: FloatArray
     """(H, W) float32, the network's estimate of its error: log of the scale of logarithmic depth."""
+    fine: bool = False
+    """Whether it has the image's resolution, so that it replaces aligned depth up to the holes' rims."""
 
 
 def complete(sensor: DepthMap, rgb: ByteArray, model: Path = SHIPPED_COMPLETION) -> CompletedDepth:
@@ -43,13 +45,7 @@ def complete(sensor: DepthMap, rgb: ByteArray, model: Path = SHIPPED_COMPLETION)
     Raises:
         InputError: the images differ in size, or no pixel is measured.
     """
-    if rgb.shape != (*sensor.z_m.shape, 3):
-        raise InputError(
-            f"Sensor depth {sensor.z_m.shape} and colours {rgb.shape} are not on one pixel grid: "
-            "register the images first."
-        )
-    if not sensor.valid.any():
-        raise InputError("The sensor depth has no valid pixel to complete; use another frame.")
+    require_same_grid(sensor, rgb)
     grid = coarse(sensor.z_m, sensor.valid, rgb)
     planes, start = network_input(grid)
     session = open_session(model, modified_ns(model))
@@ -62,6 +58,17 @@ def complete(sensor: DepthMap, rgb: ByteArray, model: Path = SHIPPED_COMPLETION)
         DepthMap(np.where(sensor.valid, sensor.z_m, met_m).astype(np.float32)),
         enlarged(log_scale, shape),
     )
+
+
+def require_same_grid(sensor: DepthMap, rgb: ByteArray) -> None:
+    """Raise an InputError if depth and colours differ in size, or nothing is measured."""
+    if rgb.shape != (*sensor.z_m.shape, 3):
+        raise InputError(
+            f"Sensor depth {sensor.z_m.shape} and colours {rgb.shape} are not on one pixel grid: "
+            "register the images first."
+        )
+    if not sensor.valid.any():
+        raise InputError("The sensor depth has no valid pixel to complete; use another frame.")
 
 
 def enlarged(plane: FloatArray, shape: tuple[int, int]) -> FloatArray:

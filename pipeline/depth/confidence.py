@@ -19,6 +19,8 @@ from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 COMPLETED_FROM = 0.0125
 """Distance from a rim, as a share of the diagonal, at which completed and aligned depth weigh the same: of
 0, 5, 10, 20 and 40 px at 640 x 480 the best on validation rooms (``fit_confidence`` prints the errors)."""
+AT_ONCE = 1e-9
+"""The same for completed depth that has the image's resolution."""
 COMPLETED_ODDS = (-1.92, -1.24, 0.20, -0.08, -0.68)
 """Log odds of completed depth in the sensor's own holes: constant, and per feature of
 ``features_of_completion``. ``python -m lab.training fit_confidence`` fits them on validation rooms."""
@@ -80,7 +82,7 @@ def judge(
         reach: largest distance of a pixel from sensor depth, as a share of the image's diagonal.
         least_confidence: least confidence of the pixels that are kept, 0 to 1.
         completed: (H, W) completed depth; it replaces aligned depth in the sensor's holes with a weight that
-            grows with the distance from their rims.
+            grows with the distance from their rims, or entirely if it is fine.
         hidden: (H, W) True where measured depth was hidden for a test; such holes are easier. None: nowhere.
 
     Raises:
@@ -102,7 +104,7 @@ def judge(
     if completed is not None:
         odds = odds_of_completion(depth, completed, distance, hidden)
         believed = np.where(measured, believed, 1.0 / (1.0 + np.exp(-np.clip(odds, -50.0, 50.0))))
-        depth = joined(depth, completed, measured, distance)
+        depth = joined(depth, completed, measured, distance, AT_ONCE if completed.fine else COMPLETED_FROM)
     usable = positive(depth.z_m)
     flying = usable & flying_pixels(depth, sensor)
     out_of_reach = usable & (distance > reach)
@@ -170,7 +172,8 @@ def joined(
     """Combine aligned depth at and near measured pixels with completed depth inside the holes.
 
     Narrow gaps get aligned depth, which has full resolution; the weight of completed depth is
-    d^2 / (d^2 + d0^2) at the distance d from measured depth, and logarithms of both are averaged.
+    d^2 / (d^2 + d0^2) at the distance d from measured depth, d0 being ``completed_from``, and logarithms of
+    both are averaged.
     """
     usable = positive(aligned.z_m)
     share = distance**2 / (distance**2 + completed_from**2)

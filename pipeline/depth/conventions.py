@@ -145,13 +145,13 @@ def convention_of(
             values = {**_values(PRESETS["packetmesh"]), **values}
     else:
         values = _values(preset_named(preset))
-    values |= _flagged(given)
+    values |= flagged(given)
     if "kind" not in values:
         raise InputError(
             f"{name} does not say what it gives: name a preset ({', '.join(PRESETS)}), or its kind "
             f"({', '.join(get_args(ModelKind))})"
         )
-    return _in_graph(values, signature, given.size_px, name)
+    return in_graph(values, signature, given.size_px, name)
 
 
 def preset_named(name: str) -> Convention:
@@ -205,8 +205,12 @@ def metadata_of(convention: Convention) -> dict[str, str]:
     return metadata
 
 
-def _in_graph(values: Values, signature: Signature, size_px: tuple[int, int] | None, name: str) -> Convention:
-    """Build the convention, with size and layout from the graph where it fixes them."""
+def in_graph(values: Values, signature: Signature, size_px: tuple[int, int] | None, name: str) -> Convention:
+    """Build the convention, with size and layout from the graph where it fixes them.
+
+    Raises:
+        InputError: the size is unknown, impossible, or not the one that the graph fixes.
+    """
     if signature.layout is not None:
         values["layout"] = signature.layout
     fixed = (signature.width_px, signature.height_px)
@@ -253,7 +257,8 @@ def _possible(convention: Convention, name: str) -> Convention:
     return convention
 
 
-def _flagged(given: Overrides) -> Values:
+def flagged(given: Overrides) -> Values:
+    """Return the fields of ``Convention`` that flags set."""
     values: Values = {}
     if given.kind is not None:
         values["kind"] = given.kind

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 
 from packetmesh.errors import InputError, ReconstructionError
 from pipeline.config import DepthConfig
+from pipeline.depth.completion_signature import takes_depth
 from pipeline.depth.conventions import Convention, Overrides, convention_of
 from pipeline.depth.preprocessing import centre_crop, fitted, free_size, padded, resized, unpad
 from pipeline.depth.sessions import modified_ns, open_session, run_session
@@ -42,6 +44,11 @@ class DepthNetwork:
             raise InputError(f"The preset {preset} is for a network of that kind: name its ONNX file as well")
         self.model_path = SHIPPED_MODEL if model_path is None else Path(model_path)
         self._session = open_session(self.model_path, modified_ns(self.model_path))
+        if takes_depth(self._session):
+            raise InputError(
+                f"{self.model_path} takes an image and depth, so it completes depth: name it as "
+                "depth.completion (infer-depth: --completion), not as depth.model"
+            )
         self._signature = signature_of(self._session, str(self.model_path))
         self.convention = convention_of(self._session, preset, overrides, str(self.model_path))
 
@@ -83,7 +90,11 @@ class DepthNetwork:
         window = centre_crop(*rgb.shape[:2]) if crop else (slice(None), slice(None))
         region = rgb[window]
         image, rows, columns = network_image(region, self.convention, crop)
-        output = self._run(network_input(image, self.convention))
+        signature = self._signature
+        given = network_input(image, self.convention).astype(signature.dtype, copy=False)
+        output = run_network(
+            self._session, self.model_path, signature.output_name, {signature.input_name: given}
+        )
         whole = cv2.resize(output, image.shape[1::-1]) if output.shape != image.shape[:2] else output
         z = np.full(rgb.shape[:2], np.nan, np.float32)
         z[window] = depth_of(unpad(whole, rows, columns), region.shape[1::-1], self.convention)
@@ -94,25 +105,29 @@ class DepthNetwork:
             )
         return DepthMap(z, kind="metric" if self.convention.kind == "metric" else "relative")
 
-    def _run(self, tensor: FloatArray) -> FloatArray:
-        """Run the network on the input of one image; returns (H, W) float32."""
-        signature = self._signature
-        try:
-            given = {signature.input_name: tensor.astype(signature.dtype, copy=False)}
-            output = run_session(self._session, self.model_path, signature.output_name, given)
-        except Exception as error:  # onnxruntime raises a dozen unrelated types
-            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise InputError(
-                f"{self.model_path} fails on an input of {list(tensor.shape)} ({reason}): "
-                "try another input size or preset"
-            ) from error
-        plane = output[..., 0] if output.ndim == 4 and output.shape[-1] == 1 else output
-        if plane.ndim < 2 or plane.size != plane.shape[-1] * plane.shape[-2]:
-            raise InputError(
-                f"{self.model_path} gives {list(output.shape)} where one depth map is needed: "
-                "give another network"
-            )
-        return plane.reshape(plane.shape[-2:]).astype(np.float32, copy=False)
+
+def run_network(
+    session: Any, model_path: Path, output_name: str, tensors: dict[str, np.ndarray]
+) -> FloatArray:
+    """Run a network on the input of one image; returns (H, W) float32.
+
+    Raises:
+        InputError: the network cannot process the input, or gives more than one depth map.
+    """
+    try:
+        output = run_session(session, model_path, output_name, tensors)
+    except Exception as error:  # onnxruntime raises a dozen unrelated types
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        sizes = " and ".join(str(list(tensor.shape)) for tensor in tensors.values())
+        raise InputError(
+            f"{model_path} fails on an input of {sizes} ({reason}): try another input size or preset"
+        ) from error
+    plane = output[..., 0] if output.ndim == 4 and output.shape[-1] == 1 else output
+    if plane.ndim < 2 or plane.size != plane.shape[-1] * plane.shape[-2]:
+        raise InputError(
+            f"{model_path} gives {list(output.shape)} where one depth map is needed: give another network"
+        )
+    return plane.reshape(plane.shape[-2:]).astype(np.float32, copy=False)
 
 
 def network_image(region: ByteArray, convention: Convention, crop: bool) -> tuple[ByteArray, int, int]:

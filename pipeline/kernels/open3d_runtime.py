@@ -1,10 +1,12 @@
 """Import of Open3D on a bare Linux: its shared library needs libusb, which a pip package provides.
 
 Open3D's notebook plots, unused here, import dash, which would delay the start of every process
-(``python -X importtime -m pipeline.open3d_runtime``); an empty module replaces dash during the import.
+(``python -X importtime -m pipeline.open3d_runtime``); an empty module replaces dash during the import. Its
+viewer for notebooks, unused too, would print three lines into the first cell.
 """
 
 import ctypes
+import os
 import sys
 from types import ModuleType
 
@@ -18,6 +20,8 @@ if sys.platform == "linux":
 _dash = ModuleType("dash")
 _dash.html = _dash.dcc = _dash.Dash = None  # type: ignore[attr-defined]
 _stands_in = sys.modules.setdefault("dash", _dash) is _dash
+
+os.environ.setdefault("OPEN3D_DISABLE_WEB_VISUALIZER", "true")
 
 import open3d as o3d  # noqa: E402
 

@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from app.compute.records import Sample
-from app.drawing.clouds import POINT_SIZE_M, add_cloud
+from app.drawing.clouds import add_sensor_cloud
 from app.drawing.colors import HOLE
 from app.screens.depth.discs import covered, disc_at
 from app.screens.depth.view import Disc, SeenSample
@@ -18,7 +18,8 @@ REACH_DEG = 1.0
 """Largest angle between a click's ray and the point that it selects."""
 BEHIND = 0.05
 """Points up to this share farther than the nearest one in reach belong to the same surface."""
-SIZE_M = 1.7 * POINT_SIZE_M
+LARGER = 1.7
+"""Size of a painted point over its own size."""
 
 
 class BrushDrawing:
@@ -32,8 +33,8 @@ class BrushDrawing:
         self._scene.remove_by_name(self._name)
         points_m = cloud.points_m[painted(cloud, discs)]
         if len(points_m):
-            sample = Sample(points_m, None, len(points_m))
-            add_cloud(self._scene, self._name, sample, T_world_camera, HOLE, SIZE_M)
+            sample = Sample(points_m, None, len(points_m), spacing=cloud.spacing)
+            add_sensor_cloud(self._scene, self._name, sample, T_world_camera, HOLE, LARGER)
 
 
 def painted(cloud: SeenSample, discs: Sequence[Disc]) -> BoolArray:

@@ -18,7 +18,7 @@ from app.screens.depth.view import Disc, FillRow, HiddenView, HideRequest
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.config import DepthConfig
-from pipeline.depth import align_depth, complete
+from pipeline.depth import align_depth, completed_by
 from pipeline.depth.confidence import judge
 from pipeline.depth.fillers import PEERS
 from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
@@ -46,9 +46,12 @@ def hide_job(store: Store, spec: Spec, request: HideRequest) -> Generator[Progre
     filled_by = partial(
         accepted_depth, node.network.depth, rest, frame.rgb, disparity=node.alignment.disparity, hidden=hidden
     )
+    config = spec.config.depth
+    shipped = replace(config, completion=None, fill="completion")
     ways: dict[str, Callable[[], DepthMap]] = {
-        "ours": partial(filled_by, spec.config.depth),
-        "network": partial(filled_by, replace(spec.config.depth, fill="network")),
+        "ours": partial(filled_by, config),
+        **({"shipped": partial(filled_by, shipped)} if config.completion is not None else {}),
+        "network": partial(filled_by, replace(config, fill="network")),
         **{name: partial(peer, rest, frame.rgb) for name, peer in PEERS.items()},
     }
     rows, maps = [], {"measured": frame.depth, "hidden": rest}
@@ -91,7 +94,7 @@ def accepted_depth(
 ) -> DepthMap:
     """Return the depth accepted with these settings, without the measurements in (H, W) ``hidden``."""
     alignment = align_depth(inferred, rest, config.alignment, disparity)
-    completed = complete(rest, rgb) if config.completes else None
+    completed = completed_by(config, rest, rgb) if config.completes else None
     return judge(alignment, rest, rgb, config.reach, config.least_confidence, completed, hidden).depth
 
 

@@ -16,6 +16,8 @@ from app.compute.records import (
     Picture,
     ResidualView,
     Sample,
+    grid_step,
+    on_grid,
     sample,
 )
 from app.compute.state import Spec
@@ -45,27 +47,28 @@ LEAST_RANGE_M = 0.01
 def depth_job(store: Store, spec: Spec) -> Generator[Progress, None, DepthView]:
     """Return every node's depth, sensed, inferred and fused."""
     rig, nodes = yield from store.stages(spec, "rig", "nodes")
+    step = grid_step(sum(int(frame.depth.valid.sum()) for frame in rig.frames))
     views = []
     for index, clouds in enumerate(nodes):
         yield Progress(f"pictures of {clouds.name}", 0.9 + 0.1 * index / len(nodes))
-        views.append(_depth_node(rig, index, clouds, spec.config.depth))
+        views.append(_depth_node(rig, index, clouds, spec.config.depth, step))
     return DepthView(tuple(views))
 
 
-def _depth_node(rig: Rig, index: int, clouds: NodeClouds, config: DepthConfig) -> DepthNode:
-    drawn = SCREEN_POINTS / len(rig.frames) / max(1, len(clouds.fused))
+def _depth_node(rig: Rig, index: int, clouds: NodeClouds, config: DepthConfig, step: int) -> DepthNode:
+    fused, most = clouds.fused, SCREEN_POINTS // len(rig.frames)
     frame, alignment, judged = rig.frames[index], clouds.alignment, clouds.judged
-    filled = clouds.fused.select(_inferred_rows(clouds.fused))
+    filled = fused.select(_inferred_rows(fused))
     return DepthNode(
         name=clouds.name,
         pictures=_pictures(frame, clouds, judged),
-        sensor=_seen(clouds.sensor, frame, drawn),
-        inferred=_thinned(clouds.inferred, drawn),
-        outliers=_thinned(replace(clouds.filtered.outliers, colors=None), drawn),
-        fused=_thinned(clouds.fused, drawn),
-        filled=_thinned(filled, drawn),
-        inferred_confidence=_confidence(clouds.inferred, judged, drawn),
-        filled_confidence=_confidence(filled, judged, drawn),
+        sensor=_seen(clouds.sensor, frame, step),
+        inferred=_thinned(clouds.inferred, frame, step),
+        outliers=_thinned(replace(clouds.filtered.outliers, colors=None), frame, step),
+        fused=sample(fused.points_m, fused.colors, most),
+        filled=_thinned(filled, frame, step),
+        inferred_confidence=_confidence(clouds.inferred, judged, step),
+        filled_confidence=_confidence(filled, judged, step),
         alignment_mode=alignment.mode,
         disparity=alignment.disparity,
         coefficients=dict(alignment.coefficients),
@@ -74,10 +77,14 @@ def _depth_node(rig: Rig, index: int, clouds: NodeClouds, config: DepthConfig) -
         judged=judged_view(judged, alignment.depth.valid & ~frame.depth.valid),
         truth_error_m=_filled_error_m(rig, index, judged),
         network=(SHIPPED_MODEL if config.model is None else Path(config.model)).name,
-        completion=SHIPPED_COMPLETION.name if config.completes and frame.depth.valid.any() else "",
+        completion=_completion(config).name if config.completes and frame.depth.valid.any() else "",
         provider=clouds.network.provider,
         inference_s=clouds.network.elapsed_s,
     )
+
+
+def _completion(config: DepthConfig) -> Path:
+    return SHIPPED_COMPLETION if config.completion is None else Path(config.completion)
 
 
 def _pictures(frame: RgbdFrame, clouds: NodeClouds, judged: JudgedDepth) -> dict[str, Picture]:
@@ -96,28 +103,33 @@ def _pictures(frame: RgbdFrame, clouds: NodeClouds, judged: JudgedDepth) -> dict
     }
 
 
-def _thinned(cloud: PointCloud, share: float) -> Sample:
-    """Return the same share of every cloud, so that densities can be compared by eye."""
-    return sample(cloud.points_m, cloud.colors, int(share * len(cloud)) + 1)
+def _thinned(cloud: PointCloud, frame: RgbdFrame, step: int) -> Sample:
+    """Return the points of every ``step``-th column and row, so that densities can be compared by eye."""
+    drawn = _on_grid(cloud, step)
+    spacing = step / frame.intrinsics.fx_px
+    return Sample(drawn.points_m.astype(np.float32), drawn.colors, len(cloud), spacing=spacing)
 
 
-def _seen(cloud: PointCloud, frame: RgbdFrame, share: float) -> SeenSample:
+def _seen(cloud: PointCloud, frame: RgbdFrame, step: int) -> SeenSample:
     """Return a cloud thinned as by ``_thinned``, with the pixels of its points."""
-    most = min(len(cloud), int(share * len(cloud)) + 1)
-    drawn = cloud.select(np.sort(np.random.default_rng(0).choice(len(cloud), most, replace=False)))
-    assert drawn.pixels is not None
+    thinned, pixels = _thinned(cloud, frame, step), _on_grid(cloud, step).pixels
+    assert pixels is not None
     height_px, width_px = frame.depth.z_m.shape
-    points_m = drawn.points_m.astype(np.float32)
-    return SeenSample(points_m, drawn.colors, len(cloud), drawn.pixels, width_px, height_px)
+    points_m, colors = thinned.points_m, thinned.colors
+    return SeenSample(points_m, colors, len(cloud), pixels, width_px, height_px, spacing=thinned.spacing)
 
 
-def _confidence(cloud: PointCloud, judged: JudgedDepth, share: float) -> np.ndarray:
+def _confidence(cloud: PointCloud, judged: JudgedDepth, step: int) -> np.ndarray:
     """Return (N, 3) RGB of the points that ``_thinned`` draws."""
+    drawn = _on_grid(cloud, step)
+    assert drawn.pixels is not None
+    u, v = drawn.pixels.T
+    return confidence_colors(judged.confidence[v, u])
+
+
+def _on_grid(cloud: PointCloud, step: int) -> PointCloud:
     assert cloud.pixels is not None
-    u, v = cloud.pixels.T
-    colors = _thinned(replace(cloud, colors=confidence_colors(judged.confidence[v, u])), share).colors
-    assert colors is not None
-    return colors
+    return cloud.select(on_grid(cloud.pixels, step))
 
 
 def _inferred_rows(cloud: PointCloud) -> BoolArray:

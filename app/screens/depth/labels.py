@@ -37,13 +37,15 @@ FILLS = {
     "measured": "as measured",
     "hidden": "hidden",
     "ours": "with these settings",
+    "shipped": "completion that ships",
     "network": "colour network, aligned",
     "nearest": "nearest fill",
     "inpaint-telea": "OpenCV inpainting, Telea",
     "inpaint-ns": "OpenCV inpainting, Navier-Stokes",
     "joint-bilateral": "joint bilateral fill",
 }
-"""The hidden part: as measured, hidden, and filled by each method."""
+"""The hidden part: as measured, hidden, and filled by each method; the completion that ships has a row of its
+own if another one is set."""
 AS_IN_FILE = "from the file"
 
 

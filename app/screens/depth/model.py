@@ -19,13 +19,19 @@ SHIPPED = "the network that ships"
 LIMIT_BYTES = 128 << 20
 TEXT = Markdown(
     """Any ONNX network that infers depth from one image can be used. The app reads its input (size,
-colours) and its output (metric, relative or inverse depth) from the file, or takes them from a preset."""
+colours) and its output (metric, relative or inverse depth) from the file, or takes them from a preset.
+A network that takes **image and depth** (such as LingBot-Depth) is told by its inputs: it completes the
+sensor's depth instead of ours."""
 )
 ADVICE: dict[ModelKind, Markdown] = {
     "metric": Markdown("Its output is in metres: try the alignments *none* and *one scale*."),
     "relative": Markdown(""),
     "inverse": Markdown("Its output is 1/depth: the smooth correction starts from a linear fit of 1/depth."),
 }
+COMPLETES = Markdown(
+    "It takes image and depth and fills the sensor's holes. Hide a part of the depth with the brush above to "
+    "compare it with the completion that ships."
+)
 TRYING = Markdown("Trying the network …")
 KEPT = Markdown("The previous network stays in use. Set the input of this one, or choose another.")
 
@@ -40,7 +46,9 @@ class ModelFolder:
         gui = ui.gui
         with gui.add_folder("Neural network", expand_by_default=False):
             gui.add_markdown(TEXT)
-            self._model = gui.add_dropdown("Network file", [SHIPPED], hint="Network that infers the depth.")
+            self._model = gui.add_dropdown(
+                "Network file", [SHIPPED], hint="Network that infers or completes the depth."
+            )
             self._preset = gui.add_dropdown(
                 "Preset",
                 list(NETWORK_PRESETS),
@@ -86,22 +94,23 @@ class ModelFolder:
 
     def write(self, config: DepthConfig) -> None:
         """Show the network of these settings."""
-        name = next((name for name, path in self._models.items() if path == config.model), None)
+        own = config.completion or config.model
+        name = next((name for name, path in self._models.items() if path == own), None)
         if name is None:
-            name = self._add(Path(str(config.model)).name, str(config.model))
+            name = self._add(Path(str(own)).name, str(own))
         self._model.value = name
         self._preset.value = config.preset or AS_IN_FILE
         self._kind.value = config.model_kind or AS_IN_FILE
         self._size.value = (float(config.input_width_px or 0), float(config.input_height_px or 0))
-        self._normalisation.value = config.normalisation or AS_IN_FILE
-        self._advanced.visible = config.model is not None
+        self._normalisation.value = config.completion_normalisation or config.normalisation or AS_IN_FILE
+        self._advanced.visible = own is not None
 
     def load(self, view: ModelView | None) -> None:
         """Show the tried network; None could not be used, and the previous one stays."""
         if view is None:
             self._status.content = KEPT
             return
-        self._status.content = ADVICE[view.kind]
+        self._status.content = COMPLETES if view.choice.completion is not None else ADVICE[view.kind]
         self._table.content = model_table(view)
 
     def _picked(self) -> None:
@@ -126,7 +135,7 @@ class ModelFolder:
         )
 
     def _keep(self, file: viser.UploadedFile) -> None:
-        instead = "name larger networks with depth.model on the command line"
+        instead = "name larger networks with depth.model or depth.completion on the command line"
         path = keep_upload(file, self._folder / f"{OWN}{len(self._models)}", LIMIT_BYTES, instead)
         self._model.value = self._add(Path(file.name).name, str(path))
         self._picked()
@@ -143,6 +152,11 @@ class ModelFolder:
 def model_table(view: ModelView) -> Markup:
     """Return a table in HTML with the results of the trial and the metadata of the file."""
     rows = [
+        (
+            "Input",
+            "What the network takes.",
+            "image" if view.choice.completion is None else "image and depth",
+        ),
         ("Output", "Meaning of its output.", f"{view.kind} depth"),
         ("Provider", "The execution provider that onnxruntime really used.", view.provider),
         (

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import assets
 from app.compute.records import DepthNode, DepthView, Sample, SceneView
 from app.compute.state import Spec, Step
-from app.drawing.clouds import add_cloud, clear
+from app.drawing.clouds import add_sensor_cloud, clear
 from app.drawing.colors import INFERRED, LOSS, TARGET
 from app.lesson.files import Numbers, read_lesson
 from app.lesson.player import LessonFolder
@@ -52,6 +52,7 @@ class DepthPanel(Panel):
         """Add two pictures to compare, alignment, colouring and one node's numbers; more is in folders."""
         gui, session = self.gui, self.session
         self._look: DepthLook | None = None
+        self._here, self._undrawn = False, True
         self._source, self._key = session.spec.source, session.spec.key("depth")
         gui.add_markdown(TEXT)
         lesson = read_lesson(SHIPPED, SETTINGS, DepthLook(), NUMBERS)
@@ -116,13 +117,26 @@ class DepthPanel(Panel):
         if step != "depth":
             return
         self._node.offer(tuple(node.name for node in view.nodes))
-        self._draw()
+        self._undrawn = True
+        if self._here:
+            self._draw()
         self._show_node()
         self._show_look()
 
     # Drawing.
 
+    def on_show(self) -> None:
+        """Draw the clouds that came while another screen was shown."""
+        self._here = True
+        if self._undrawn:
+            self._draw()
+
+    def on_hide(self) -> None:
+        """Draw nothing until the screen is shown again."""
+        self._here = False
+
     def _draw(self) -> None:
+        self._undrawn = False
         scene: SceneView | None = self.session.results.view("scene")
         depth: DepthView | None = self.session.results.view("depth")
         if scene is None or depth is None or len(scene.nodes) != len(depth.nodes):
@@ -132,13 +146,13 @@ class DepthPanel(Panel):
             clear(self.scene, "/depth")
             for place, node in zip(scene.nodes, depth.nodes, strict=True):
                 below, T = f"/depth/{node.name}", place.T_world_camera
-                add_cloud(self.scene, f"{below}/sensor", node.sensor, T, None if own else TARGET)
+                add_sensor_cloud(self.scene, f"{below}/sensor", node.sensor, T, None if own else TARGET)
                 chosen = self._inferred(node)
                 if chosen is not None:
                     points, color = chosen
-                    add_cloud(self.scene, f"{below}/inferred", points, T, color)
+                    add_sensor_cloud(self.scene, f"{below}/inferred", points, T, color)
                 if self._rejected.value:
-                    add_cloud(self.scene, f"{below}/outliers", node.outliers, T, LOSS)
+                    add_sensor_cloud(self.scene, f"{below}/outliers", node.outliers, T, LOSS)
             self._show_canvas()
 
     def _inferred(self, node: DepthNode) -> tuple[Sample, tuple[int, int, int] | None] | None:

@@ -49,7 +49,7 @@ class FillRow:
     """Errors of one fill method in the hidden part."""
 
     name: str
-    """"ours", "network" or one of ``pipeline.depth.fillers.PEERS``."""
+    """"ours", "shipped", "network" or one of ``pipeline.depth.fillers.PEERS``."""
     abs_rel: float
     """Mean of |filled - measured| / measured over the hidden pixels it filled; NaN if it filled none."""
     within_share: float
@@ -83,6 +83,8 @@ class ModelChoice:
     input_width_px: int | None = None
     input_height_px: int | None = None
     normalisation: Normalisation | None = None
+    completion: str | None = None
+    completion_normalisation: Normalisation | None = None
 
     def put_into(self, config: DepthConfig) -> DepthConfig:
         """Return ``config`` with this network.
@@ -98,6 +100,7 @@ class ModelView:
     """A depth network that was loaded and gave an answer."""
 
     choice: ModelChoice
+    """The choice, with a network that completes depth in its own field."""
     kind: ModelKind
     """Kind of the network's output."""
     provider: str

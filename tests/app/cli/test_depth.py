@@ -115,6 +115,38 @@ def test_a_sensors_holes_are_filled_and_what_it_measured_stays(capsys, tmp_path)
     assert "of the pixels filled in" in err
 
 
+def test_holes_are_filled_by_a_network_that_takes_image_and_depth(capsys, tmp_path):
+    """It gives 3 m wherever it gets no depth, and says so with little confidence."""
+    pytest.importorskip("onnx")
+    from onnx import helper
+
+    from tests.pipeline.depth import networks
+
+    nodes = [
+        helper.make_node("ReduceMean", ["image"], ["m"], keepdims=0),
+        helper.make_node("Sub", ["m", "m"], ["zero"]),
+        helper.make_node("Add", ["depth", "zero"], ["seen"]),
+        helper.make_node("Greater", ["seen", "zero"], ["known"]),
+        helper.make_node("Where", ["known", "seen", "three"], ["y"]),
+    ]
+    shapes = {"image": (1, 3, "h", "w"), "depth": (1, 1, "h", "w")}
+    constants = {"three": np.float32(3.0)}
+    file = networks.completion(tmp_path / "n.onnx", nodes, shapes, shapes["depth"], constants, name="y")
+    words = (PAIR / "color.png", "--out", tmp_path, "--sensor", PAIR / "depth.png", "--fill", "--json")
+    code, out, _ = run(capsys, *words, "--completion", file)
+    assert code == 0
+    (record,) = json.loads(out)["photos"].values()
+    filled, sensor = read_depth(record["depth"]), read_depth(PAIR / "depth.png")
+    np.testing.assert_array_equal(filled.z_m[sensor.valid], sensor.z_m[sensor.valid])
+    far = cv2.erode((~sensor.valid).astype(np.uint8), np.ones((3, 3))) > 0
+    assert far.any()
+    np.testing.assert_allclose(filled.z_m[far], 3.0, rtol=1e-3)
+    assert record["filled"]["mean_confidence"] < 0.3
+    code, _, err = run(capsys, *words, "--model", file)
+    assert code == 1
+    assert "infer-depth: --completion" in err
+
+
 @pytest.mark.parametrize(
     "name", ["grey.png", "alpha.png", "grey_alpha.png", "grey16.png", "palette.png", "cmyk.jpg"]
 )
@@ -166,10 +198,14 @@ def test_what_cannot_be_done_is_one_sentence_and_leaves_nothing_behind(capsys, t
     (tmp_path / "cut.png").write_bytes(good.read_bytes()[:-20])
     (tmp_path / "text.jpg").write_text("no photograph")
     cv2.imwrite(str(tmp_path / "huge.png"), np.zeros((5001, 5000), np.uint8))
+    depth = tmp_path / "depth.png"
+    cv2.imwrite(str(depth), np.full((20, 30), 1500, np.uint16))
     cases = [
         ([], 2, "photograph"),
         ([good, good, "--sensor", good], 2, "--sensor"),
         ([good, "--fill"], 2, "--fill needs the depth image"),
+        ([good, "--completion", good], 2, "add --fill and --sensor"),
+        ([good, "--completion", tmp_path / "none.onnx", "--sensor", depth, "--fill"], 1, "none.onnx"),
         ([good, same_name], 1, "photo"),
         ([good, "--model", tmp_path / "cut.onnx"], 1, "cut.onnx"),
         ([good, "--model", tmp_path / "none.onnx"], 1, "none.onnx"),

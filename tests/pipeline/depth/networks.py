@@ -85,3 +85,29 @@ def input_side(path: Path, axis: int, metadata: dict[str, str] | None = None) ->
     ]
     constants = {"axis": np.array(axis), "zero": np.array(0.0, np.float32)}
     return save(path, nodes, [1, 3, "height", "width"], [[1, "height", "width"]], constants, metadata)
+
+
+def completion(
+    path: Path,
+    nodes: list,
+    inputs: dict[str, tuple],
+    output: tuple = (1, 1, 48, 64),
+    constants: dict[str, np.ndarray] | None = None,
+    metadata: dict[str, str] | None = None,
+    types: dict[str, int] | None = None,
+    name: str = "depth_out",
+) -> Path:
+    """A file whose ``nodes`` map inputs of these shapes, float unless ``types`` says so, to one output."""
+    kinds = dict.fromkeys(inputs, TensorProto.FLOAT) | (types or {})
+    graph = helper.make_graph(
+        nodes,
+        "completion",
+        [helper.make_tensor_value_info(key, kinds[key], shape) for key, shape in inputs.items()],
+        [helper.make_tensor_value_info(name, kinds.get("depth", TensorProto.FLOAT), output)],
+        [numpy_helper.from_array(value, key) for key, value in (constants or {}).items()],
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
+    helper.set_model_props(model, metadata or {})
+    onnx.checker.check_model(model)
+    onnx.save(model, path)
+    return path

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from app.compute.records import SENSOR_POINTS
 from app.compute.state import Spec
 from app.drawing.colors import HOLE
 from app.drawing.pictures import UNKNOWN, confidence_colors
@@ -101,6 +102,10 @@ def test_the_drawn_sensor_points_know_their_pixels(rig, view):
         depth = acquire(frame, SPEC.config.acquisition).depth
         np.testing.assert_allclose(seen.points_m[:, 2], depth.z_m[v, u], rtol=1e-6)
         np.testing.assert_array_equal(seen.colors, frame.rgb[v, u])
+        step = round(seen.spacing * frame.intrinsics.fx_px)
+        valid = depth.valid[::step, ::step]
+        assert len(seen.points_m) + len(node.outliers.points_m) == valid.sum()
+        assert sum(len(one.sensor.points_m) for one in view.nodes) <= SENSOR_POINTS < step**2 * 250_000
 
 
 def test_the_residuals_are_those_of_the_alignment(store, view):
@@ -239,7 +244,7 @@ def test_a_node_that_is_not_there_is_one_sentence(store):
 
 def test_the_words_of_the_screen_are_those_of_the_pipeline():
     assert set(NETWORK_PRESETS) == {AS_IN_FILE, *PRESETS}
-    assert set(FILLS) == {"measured", "hidden", "ours", "network", *PEERS}
+    assert set(FILLS) == {"measured", "hidden", "ours", "shipped", "network", *PEERS}
 
 
 def test_the_network_that_ships_says_what_it_is():

@@ -27,6 +27,7 @@ def session(store, server, tmp_path_factory):
     uploads = tmp_path_factory.mktemp("uploads")
     session = Bench(DepthPanel, ui_of(server.scene), store, uploads, steps=("scene", "depth"))
     session.advance()
+    session.panel.on_show()
     return session
 
 
@@ -35,8 +36,26 @@ def node_of(session):
 
 
 def drawn(session, name):
-    """The points of the first node's cloud, or None."""
-    return session.drawn(f"/depth/{node_of(session).name}/{name}")
+    """The (N, 6) points and colours of a cloud, from left to right; None if it is not drawn.
+
+    Args:
+        name: name of the cloud below ``/depth``.
+    """
+    scene = session.ui.scene
+    parts = [scene.get_handle_by_name(part) for part in scene.names(f"/depth/{name}")]
+    found = [
+        np.column_stack([part.points, np.broadcast_to(part.colors, part.points.shape)]) for part in parts
+    ]
+    return by_place(np.concatenate(found)) if found else None
+
+
+def of_node(session, name):
+    """The same of the first node."""
+    return drawn(session, f"{node_of(session).name}/{name}")
+
+
+def by_place(rows):
+    return rows[np.lexsort(rows.T[::-1])]
 
 
 def test_the_screen_begins_with_photo_beside_sensor_and_the_filled_points(session):
@@ -45,7 +64,7 @@ def test_the_screen_begins_with_photo_beside_sensor_and_the_filled_points(sessio
     (image,) = session.gui.all("image")
     np.testing.assert_array_equal(image.image[:, :300], photo[:, :300])
     np.testing.assert_array_equal(image.image[:, -300:], sensor[:, -300:])
-    assert len(drawn(session, "inferred").points) == len(node.filled.points_m)
+    assert len(of_node(session, "inferred")) == len(node.filled.points_m)
     assert "z′ = (" in session.gui.text("Residuals of the alignment")
     (histogram,) = session.gui.all("plotly")
     assert histogram.figure.data[0].y.sum() == node.residuals.counts.sum()
@@ -89,12 +108,31 @@ def test_inferred_points_are_drawn_where_and_as_wanted(session):
     gui, node = session.gui, node_of(session)
     gui.set("Inferred points", EVERYWHERE)
     gui.set("Colours", next(name for name, key in COLORINGS.items() if key == "confidence"))
-    np.testing.assert_array_equal(drawn(session, "inferred").colors, node.inferred_confidence)
+    points = node.inferred.points_m.astype(np.float16)
+    wanted = by_place(np.column_stack([points, node.inferred_confidence]).astype(float))
+    np.testing.assert_array_equal(of_node(session, "inferred"), wanted)
     gui.set("Inferred points", UNSEEN)
-    assert drawn(session, "inferred") is None
+    assert of_node(session, "inferred") is None
     gui.set("Inferred points", HOLES)
     gui.set("Colours", next(iter(COLORINGS)))
-    assert len(drawn(session, "inferred").points) == len(node.filled.points_m)
+    assert len(of_node(session, "inferred")) == len(node.filled.points_m)
+
+
+def test_clouds_that_come_while_another_screen_is_shown_are_drawn_with_the_next_visit(session):
+    panel, view = session.panel, session.results.view("depth")
+    panel.on_hide()
+    before = of_node(session, "sensor")
+    seen = view.nodes[0].sensor
+    seen = replace(seen, points_m=seen.points_m[:5], colors=None, pixels=seen.pixels[:5])
+    fewer = replace(view, nodes=(replace(view.nodes[0], sensor=seen), *view.nodes[1:]))
+    session.results.put("depth", session.spec.key("depth"), fewer)
+    panel.on_view("depth", fewer)
+    np.testing.assert_array_equal(of_node(session, "sensor"), before)
+    panel.on_show()
+    assert len(of_node(session, "sensor")) == 5
+    session.results.put("depth", session.spec.key("depth"), view)
+    panel.on_view("depth", view)
+    np.testing.assert_array_equal(of_node(session, "sensor"), before)
 
 
 def test_a_bad_network_is_one_sentence_and_the_settings_stay(session):
@@ -121,7 +159,7 @@ def click(session, pixel_row):
 
 def marked(session):
     """The painted points, or None."""
-    return session.drawn("/depth/painted")
+    return drawn(session, "painted")
 
 
 def test_clicks_paint_what_is_hidden_and_filled(session):
@@ -133,7 +171,7 @@ def test_clicks_paint_what_is_hidden_and_filled(session):
         click(session, row)
     assert "2 discs painted" in gui.text(HIDE)
     discs = [Disc(*(seen.pixels[row] / (639, 479)), 0.12) for row in rows]
-    wanted, got_m = seen.points_m[painted(seen, discs)], marked(session).points
+    wanted, got_m = seen.points_m[painted(seen, discs)], marked(session)
     assert len(got_m) == pytest.approx(len(wanted), rel=0.2)  # a degree beside the point is 9 pixels
     assert len(got_m) > 100
     gui.set("Outliers", False)
@@ -142,7 +180,7 @@ def test_clicks_paint_what_is_hidden_and_filled(session):
     assert "measured pixels of node_00 hidden" in gui.text(HIDE)
     session.drawn("/depth").visible = False
     click(session, rows[0])
-    assert len(marked(session).points) == len(got_m)
+    assert len(marked(session)) == len(got_m)
     session.drawn("/depth").visible = True
     gui.set("Node", "node_00")
     assert "painted" not in gui.text(HIDE)

@@ -1,0 +1,1 @@
+"""3-D views of results in Jupyter and marimo."""
