@@ -15,10 +15,11 @@ from app.cli.deliver import deliver
 from app.cli.doctor import doctor
 from app.cli.import_rig import import_rig
 from app.cli.infer_depth import infer_depth
+from app.cli.measure import measure
 from app.cli.mesh import mesh
 from app.cli.reconstruct import reconstruct
 from app.cli.register import register
-from app.cli.repeated import joined
+from app.cli.repeated import joined, with_negative_places
 from app.cli.reproduce import reproduce
 from app.cli.scenes import scenes
 from app.cli.serve import serve
@@ -36,6 +37,7 @@ COMMANDS: dict[str, Any] = {
     "target": target,
     "register": register,
     "mesh": mesh,
+    "measure": measure,
     "infer-depth": infer_depth,
     "simulate": simulate,
     "deliver": deliver,
@@ -54,7 +56,7 @@ def run(argv: list[str] | None) -> None:
             COMMANDS,
             prog="packetmesh",
             description="From a camera node's packets to a surface mesh.",
-            args=joined(sys.argv[1:] if argv is None else argv),
+            args=with_negative_places(joined(sys.argv[1:] if argv is None else argv)),
             config=(tyro.conf.FlagCreatePairsOff,),
         )
         sys.stdout.flush()

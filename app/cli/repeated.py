@@ -1,13 +1,24 @@
-"""Options with several values that are given more than once, such as ``--set a=1 --set b=2``.
+"""Arguments that the parser would misunderstand.
 
-The parser would keep the last one's values only.
+Of an option with several values that is given more than once, such as ``--set a=1 --set b=2``, it would keep
+the last one's values only; a place such as ``-0.2,1,1.5`` it would take for an option.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 REPEATABLE = ("--set", "--down", "--only", "--without")
+
+
+_NEGATIVE_PLACE = re.compile(r"-[\d.][^\s,]*,")
+"""Beginning of coordinates, the first of them negative."""
+
+
+def with_negative_places(argv: Sequence[str]) -> list[str]:
+    """Return the arguments with a blank before coordinates that begin with a minus sign."""
+    return [f" {argument}" if _NEGATIVE_PLACE.match(argument) else argument for argument in argv]
 
 
 def joined(argv: Sequence[str]) -> list[str]:

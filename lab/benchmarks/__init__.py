@@ -32,6 +32,7 @@ CASES: dict[str, Callable[[], Benchmark]] = {
     "recording: every frame": partial(_measure, "recording"),
     "recording: every fifth frame": partial(_measure, "recording", every=5),
     "surface": partial(_measure, "surface"),
+    "measuring": partial(_measure, "measuring"),
     "depth": partial(_measure, "depth"),
     "network": partial(_measure, "network"),
 }

@@ -40,6 +40,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "bench_problems": ("packetmesh", "bench", "--problems", "runs/problems"),
     "bench_places": ("packetmesh", "bench", "--only", "places"),
     "bench_recording": ("packetmesh", "bench", "--only", "recording"),
+    "bench_measuring": ("packetmesh", "bench", "--only", "measuring"),
     "bench_depth": ("packetmesh", "bench", "--only", "depth"),
     "bench_network": ("packetmesh", "bench", "--only", "network"),
     "real_frames": ("python", "-m", "lab.benchmarks.real_frames"),

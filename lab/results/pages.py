@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from lab.benchmarks.filling import FLAT, OURS
 from lab.claims.claim import VERDICTS, is_beyond
 from lab.claims.registry import CLAIMS
-from lab.results import completion, places, recordings, tables, verdicts
+from lab.results import completion, measuring, places, recordings, tables, verdicts
 from lab.results.markdown import Row, listed, percent
 from lab.results.record import ROOT, Record, Records, read_records
 from packetmesh.files import atomic_path
@@ -42,6 +42,7 @@ SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "bench_recording": ("Recordings: a camera that walks", recordings.recordings),
     "surface_claims": ("Ball pivoting: the thesis's claims", tables.claims),
     "bench_surface": ("Ball pivoting: speed", tables.rolling_speed),
+    "bench_measuring": ("Measuring on the surface", measuring.measuring),
     "network_claims": ("The camera network: the thesis's claims", tables.claims),
     "bench_network": ("The camera network: speed", tables.network_speed),
     "delivery_claims": ("What a lost packet costs: ours, beyond the thesis", tables.our_claims),
@@ -135,8 +136,8 @@ def _fusion(numbers: Row) -> str:
     scores = [found for presets in numbers.values() if (found := tables.f_scores(presets["packetmesh"]))]
     falls = sum(after < before for before, after in scores)
     return (
-        "**What fills a hole is a guess.** Fewer rays miss the mesh after fusion, but its F-score falls in "
-        f"{falls} of {len(scores)} scenes ({_link('all scenes', 'what-comes-out')})."
+        "**What fills a hole is a guess.** Fewer rays are without a surface after fusion, but its F-score "
+        f"falls in {falls} of {len(scores)} scenes ({_link('all scenes', 'what-comes-out')})."
     )
 
 

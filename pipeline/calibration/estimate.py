@@ -105,6 +105,14 @@ class Calibration:
         return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     @property
+    def focal_sd(self) -> float:
+        """Standard error of the focal lengths, the larger of both, as a share of them."""
+        values = self.parameters
+        return max(
+            error / values[name] for name, error in self.standard_errors.items() if name in ("fx", "fy")
+        )
+
+    @property
     def intervals(self) -> dict[str, tuple[float, float]]:
         """95 % intervals of the estimated parameters."""
         values = self.parameters

@@ -40,7 +40,7 @@ def _write_cameras(report: CameraReport, folder: Path) -> list[str]:
     if report.depth is not None:
         write_depth_correction(folder / DEPTH_CORRECTION, report.depth.correction)
     camera = report.intrinsics
-    write_intrinsics(folder / "intrinsics.json", camera)
+    write_intrinsics(folder / "intrinsics.json", camera, report.calibration.focal_sd)
     missing = []
     for name in WRITERS:
         try:

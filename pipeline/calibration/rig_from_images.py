@@ -45,7 +45,8 @@ class RigReport:
         for name, report in self.cameras.items():
             if name.endswith(INFRARED):
                 continue
-            node = CalibratedNode(report.intrinsics, T_world_first @ poses[name])
+            sd = report.calibration.focal_sd
+            node = CalibratedNode(report.intrinsics, T_world_first @ poses[name], focal_sd=sd)
             beside = name + INFRARED
             if beside in self.cameras:
                 node = replace(

@@ -56,6 +56,8 @@ class CalibratedNode:
     """Intrinsics of a separate depth camera, whose images are not registered to the colour camera's."""
     T_color_depth: FloatArray | None = None
     """(4, 4) pose of the depth camera in the colour camera's frame, metres."""
+    focal_sd: float | None = None
+    """Standard error of the focal lengths as a share of them; None if unknown."""
 
 
 def write_calibration(folder: AnyPath, nodes: Mapping[str, CalibratedNode]) -> None:
@@ -75,7 +77,7 @@ def write_calibration(folder: AnyPath, nodes: Mapping[str, CalibratedNode]) -> N
     for name, node in nodes.items():
         own = Path(folder) / name
         if node.intrinsics is not None:
-            write_intrinsics(own / "intrinsics.json", node.intrinsics)
+            write_intrinsics(own / "intrinsics.json", node.intrinsics, node.focal_sd)
         if node.T_world_camera is not None:
             write_pose(own / "pose.txt", node.T_world_camera)
         if node.depth_intrinsics is not None and node.T_color_depth is not None:

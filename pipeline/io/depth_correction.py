@@ -20,6 +20,8 @@ FORMAT = "packetmesh depth correction 1"
 MAP_SHAPE = (3, 4)
 """Rows and columns of the map's coefficients."""
 DEGREE = 2
+Z95 = 1.959964
+"""Half the width of a 95 % interval in standard deviations."""
 MOST_SHARE = 0.5
 """A larger bias, as a share of the depth, is implausible: the file has another unit."""
 
@@ -65,6 +67,14 @@ class DepthCorrection:
             raise InputError("Relative depth has no scale to correct; align it with a sensor's first")
         corrected_m = self._corrected_m(depth.z_m.astype(np.float64), self.map_over_image())
         return DepthMap(np.where(corrected_m > 0.0, corrected_m, np.nan).astype(np.float32))
+
+    @property
+    def scale_sd(self) -> float | None:
+        """Standard deviation of the scale, by its 95 % interval; None if that is unknown."""
+        if "scale" not in self.ci95:
+            return None
+        low, high = self.ci95["scale"]
+        return float(high - low) / (2.0 * Z95)
 
     def corrected_m(self, z_m: FloatArray, pixels: FloatArray | IntArray) -> FloatArray:
         """Return (N,) true depths of (N,) measured depths at (N, 2) pixels."""

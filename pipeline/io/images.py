@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import cv2
@@ -53,8 +55,13 @@ class ReadDepth:
 
     depth: DepthMap
     units_per_metre: float
-    notes: tuple[str, ...]
-    """Doubts about it, one sentence each."""
+    find_notes: Callable[[], tuple[str, ...]]
+    """Returns ``notes``; most readers of a recording's frames need none."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Doubts about it, one sentence each."""
+        return self.find_notes()
 
 
 def read_depth(path: AnyPath, depth_scale: float | None = None) -> DepthMap:
@@ -81,7 +88,7 @@ def read_depth_noted(path: AnyPath, depth_scale: float | None = None) -> ReadDep
     check_median(path, values, scale)
     z_m = (values / scale).astype(np.float32)
     z_m[~known_in(values)] = np.nan
-    return ReadDepth(DepthMap(z_m), scale, doubts(values, scale, depth_scale is not None))
+    return ReadDepth(DepthMap(z_m), scale, partial(doubts, values, scale, depth_scale is not None))
 
 
 def read_depth_values(path: AnyPath) -> NDArray[Any]:

@@ -19,6 +19,8 @@ from pipeline.types import AnyPath, CameraIntrinsics, FloatArray
 FOCAL_LENGTHS = (0.05, 100.0)
 """Least and largest focal length in image widths or heights: angles of view of 169 and half a degree."""
 MOST_DISTORTION = 1e4
+FOCAL_SD = "focal_sd"
+"""Key of the focal lengths' standard error, as a share of them."""
 _YAML_ENTRY = re.compile(r"^([ \t]*)(\w+):(.*(?:\n(?![ \t]*\w+:).*)*)", re.MULTILINE)
 _MODEL = re.compile(r"^[ \t]+distortion_model:\s*[\"']?(\w+)", re.MULTILINE)
 """Kalibr's distortion model, which is that of one of several cameras."""
@@ -136,8 +138,26 @@ def _in_matrix(path: AnyPath, numbers: FloatArray, size_px: tuple[int, int] | No
     return camera
 
 
-def write_intrinsics(path: AnyPath, intrinsics: CameraIntrinsics) -> None:
+def read_focal_sd(path: AnyPath) -> float | None:
+    """Read the focal lengths' standard error, as a share of them, from a file of ``write_intrinsics``.
+
+    Returns:
+        None if the file, which may be of another program, has none.
+    """
+    try:
+        value = json.loads(read_text(path, "intrinsics file"))[FOCAL_SD]
+    except (ValueError, KeyError, TypeError):
+        return None
+    return float(value) if isinstance(value, int | float) and 0.0 <= value < 1.0 else None
+
+
+def write_intrinsics(path: AnyPath, intrinsics: CameraIntrinsics, focal_sd: float | None = None) -> None:
     """Write ``width height fx fy cx cy distortion`` as JSON, exact to the last bit; a fisheye is named.
+
+    Args:
+        path: the file.
+        intrinsics: the camera.
+        focal_sd: standard error of its focal lengths as a share of them, if it is known.
 
     Raises:
         InputError: the folder cannot be written.
@@ -153,6 +173,8 @@ def write_intrinsics(path: AnyPath, intrinsics: CameraIntrinsics) -> None:
     }
     if intrinsics.fisheye:
         values["distortion_model"] = FISHEYE
+    if focal_sd is not None:
+        values[FOCAL_SD] = focal_sd
     with atomic_path(path) as sibling:
         sibling.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n")
 

@@ -22,7 +22,7 @@ from pipeline.io.depth_correction import (
 from pipeline.io.depth_to_color import register_depth
 from pipeline.io.extrinsics import read_extrinsics_noted
 from pipeline.io.images import read_color, read_depth_noted, write_color, write_depth_mm
-from pipeline.io.intrinsics import read_intrinsics, write_intrinsics
+from pipeline.io.intrinsics import read_focal_sd, read_intrinsics, write_intrinsics
 from pipeline.io.poses import read_pose_noted, write_pose
 from pipeline.io.same_view import depth_camera_of, same_view_note
 from pipeline.io.truth import read_truth, write_truth
@@ -72,10 +72,11 @@ def load_frame(
     rgb = read_color(color)
     camera = read_intrinsics(intrinsics, rgb.shape[1::-1])
     read = read_depth_noted(depth, depth_scale)
-    sensed, noise = read.depth, None
+    sensed, noise, sds = read.depth, None, [read_focal_sd(intrinsics)]
     if depth_correction is not None:
         correction = read_depth_correction(depth_correction)
         sensed, noise = correction.apply(sensed), correction.noise
+        sds.append(correction.scale_sd)
     _check_size(camera, intrinsics, "colour image", color, rgb.shape)
     if depth_intrinsics is None and extrinsics is None:
         sensed, notes = _same_view(sensed, depth, camera, color)
@@ -84,7 +85,15 @@ def load_frame(
     T_world_camera, pose_notes = (LEVEL_POSE.copy(), ()) if pose is None else read_pose_noted(pose)
     notes = (*read.notes, *notes, *pose_notes)
     return RgbdFrame(
-        name, rgb, sensed, camera, T_world_camera, noise=noise, pose_known=pose is not None, notes=notes
+        name,
+        rgb,
+        sensed,
+        camera,
+        T_world_camera,
+        noise=noise,
+        pose_known=pose is not None,
+        notes=notes,
+        scale_sd=max((sd for sd in sds if sd is not None), default=None),
     )
 
 
@@ -221,7 +230,7 @@ def save_rig(directory: AnyPath, rig: Rig) -> None:
         folder = directory / name
         write_color(folder / "color.png", frame.rgb)
         write_depth_mm(folder / "depth.png", frame.depth)
-        write_intrinsics(folder / "intrinsics.json", frame.intrinsics)
+        write_intrinsics(folder / "intrinsics.json", frame.intrinsics, frame.scale_sd)
         if frame.pose_known:
             write_pose(folder / "pose.txt", frame.T_world_camera)
         _write_noise(folder, frame)

@@ -16,8 +16,9 @@ from pipeline.registration.finding.poses import same
 from pipeline.registration.finding.search import Found, search
 from pipeline.registration.finding.starts import Start
 from pipeline.registration.finding.verdict import Verdict
-from pipeline.registration.graph.edges import PoseEdge, registration_information
+from pipeline.registration.graph.edges import WEAK_SHARE, PoseEdge, registration_information
 from pipeline.registration.neighbourhood import Normals
+from pipeline.registration.observability import OPEN_SHARE
 from pipeline.types import FloatArray, RegistrationResult
 
 LEAST_OVERLAP = 0.05
@@ -199,9 +200,12 @@ def _edge(
     """Return the evidence of a registration of two nodes' clouds; None if it degenerated."""
     if not _usable(result):
         return None
-    normals = [Normals(cloud.points_m, cloud.normals).all for cloud in (source.cloud, target.cloud)]
-    information = registration_information(result, source.cloud.points_m, *normals)
-    return PoseEdge(*link, result.T_target_source, information, strength, agrees)
+    one, other = (Normals(cloud.points_m, cloud.normals).all for cloud in (source.cloud, target.cloud))
+    information, weak = (
+        registration_information(result, source.cloud.points_m, one, other, share)
+        for share in (OPEN_SHARE, WEAK_SHARE)
+    )
+    return PoseEdge(*link, result.T_target_source, information, strength, agrees, weak)
 
 
 def _without_pairs(result: RegistrationResult) -> RegistrationResult:

@@ -67,6 +67,9 @@ class Placement:
     """Verdict on each node; empty means that all are placed."""
     agreements: tuple[NodeAgreement, ...] = ()
     """Agreements of all pairs of placed nodes whose views meet."""
+    covariances: tuple[FloatArray, ...] = ()
+    """(6, 6) covariance of each node's small motion (turn in rad about the world's origin, then shift in m)
+    relative to the node whose pose is kept; NaN for nodes that no registration reaches. Empty if unknown."""
 
     def placed(self, items: Sequence[Item]) -> list[Item]:
         """Return the items of placed nodes, from one item per node."""

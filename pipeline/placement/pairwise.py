@@ -18,9 +18,9 @@ from pipeline.placement.samples import NodeSample, both_ways, sample_of, shared_
 from pipeline.placement.unknown import UnknownPoses
 from pipeline.placement.verdicts import verdicts_of
 from pipeline.placement.views import Views
-from pipeline.registration.graph.edges import PoseEdge
+from pipeline.registration.graph.edges import PoseEdge, adjoint
 from pipeline.registration.graph.loops import Groups
-from pipeline.registration.graph.pose_graph import PoseGraph, solve_pose_graph
+from pipeline.registration.graph.pose_graph import PoseGraph, motion_covariances, solve_pose_graph
 from pipeline.types import FloatArray, RgbdFrame
 
 
@@ -48,7 +48,7 @@ def place_nodes(
     known = [config.start == "given" and frame.pose_known for frame in frames]
     if len(nodes) == 1:
         alone = NodeVerdict(nodes[0].name, True, NOTHING_SHARED)
-        return Placement((), (frames[0].T_world_camera,), (alone,))
+        return Placement((), (frames[0].T_world_camera,), (alone,), covariances=(np.zeros((6, 6)),))
     samples = [sample_of(*node, config, align_with) for node in zip(frames, nodes, strict=True)]
     tried = _from_given_poses(samples, known, config)
     if not all(known):
@@ -57,6 +57,9 @@ def place_nodes(
     reference, group = _reference(known, edges)
     graph = solve_pose_graph([sample.graph_points_m for sample in samples], edges, reference)
     poses = _poses(frames, graph.T_reference_node, reference, group, tried)
+    held = [edge for edge, used in zip(edges, graph.used, strict=True) if used]
+    covariances = motion_covariances(graph.T_reference_node, held, reference)
+    to_world = adjoint(poses[reference])
     agreements = dict(_agreements(samples, poses, group))
     names = [node.name for node in nodes]
     verdicts = verdicts_of(names, group, agreements, tried)
@@ -69,6 +72,7 @@ def place_nodes(
             for (source, target), pair in agreements.items()
             if verdicts[source].placed and verdicts[target].placed
         ),
+        tuple(to_world @ covariance @ to_world.T for covariance in covariances),
     )
 
 

@@ -51,7 +51,7 @@ def _nodes(known: CamerasFound, rig: Rig) -> dict[str, CalibratedNode]:
     """Return the nodes by name; poses only if all were placed, since others have another world frame."""
     if known.rig is None:
         return {
-            name: CalibratedNode(report.intrinsics)
+            name: CalibratedNode(report.intrinsics, focal_sd=report.calibration.focal_sd)
             for name, report in known.reports.items()
             if not name.endswith(INFRARED)
         }

@@ -15,6 +15,9 @@ where the pairs are."""
 SLACK_RAD, SLACK_M = 0.003, 0.006
 """Further error of a right registration, from the sensors' bias and wrong pairs, which loops must allow:
 three edges close within 5 cm (a right registration has up to 2 cm, SPEC 4.7)."""
+WEAK_SHARE = 1e-4
+"""As ``OPEN_SHARE``, for the standard errors of measures: in rendered rooms, motions that the pairs hold by a
+share of 2e-4 to 2e-3 are right to millimetres, and noise alone holds 2e-5."""
 OPEN_M = 1.0
 """Standard error given to a motion that the pairs do not determine at all."""
 
@@ -34,6 +37,8 @@ class PoseEdge:
     """Weight of the evidence, above 0: where edges contradict each other, the larger sum of weights stays."""
     agrees: bool = True
     """False for an edge that other evidence contradicts: it determines no pose and checks no loop."""
+    weak_information: FloatArray | None = None
+    """(6, 6) information that also counts what holds a motion weakly, for standard errors; None: the same."""
 
     @property
     def loop_covariance(self) -> FloatArray:
@@ -42,14 +47,18 @@ class PoseEdge:
 
 
 def registration_information(
-    result: RegistrationResult, source_m: FloatArray, source_normals: FloatArray, target_normals: FloatArray
+    result: RegistrationResult,
+    source_m: FloatArray,
+    source_normals: FloatArray,
+    target_normals: FloatArray,
+    open_share: float = OPEN_SHARE,
 ) -> FloatArray:
     """Compute an edge's information from the normal matrix of its registration's last pairs.
 
     The covariance is that of least squares on the point-to-plane distances, s^2 (J^T W J)^-1 / n with n
     effective pairs, plus ``FLOOR_M``. One J has the source's normals and the other the target's: their noise
     is independent and cancels, while the square of one normal's noise would seem to hold every motion. A
-    share of the matrix below ``OPEN_SHARE`` counts as nothing, so a corridor does not hold the motion along
+    share of the matrix below ``open_share`` counts as nothing, so a corridor does not hold the motion along
     itself.
 
     Args:
@@ -57,6 +66,7 @@ def registration_information(
         source_m: (N, 3) source points, to which the pairs refer, in the source's frame.
         source_normals: (N, 3) their unit normals.
         target_normals: (M, 3) unit normals of the target's points, in the target's frame.
+        open_share: share of the best held motion below which a motion is open.
 
     Returns:
         (6, 6) information as in ``PoseEdge``.
@@ -75,7 +85,7 @@ def registration_information(
     )
     matrix = (by_source * weights[:, None]).T @ by_target
     values, motions = np.linalg.eigh(0.5 * (matrix + matrix.T))
-    held = np.maximum(values - OPEN_SHARE * values[-1], 0.0)
+    held = np.maximum(values - open_share * values[-1], 0.0)
     mean_squared_m2 = max(last.objective, FLOOR_M**2)
     with np.errstate(divide="ignore"):
         variances_m2 = np.minimum(mean_squared_m2 / (last.effective_pairs * held), OPEN_M**2)

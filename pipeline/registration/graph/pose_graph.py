@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix, diags
+from scipy.sparse import coo_matrix, csc_matrix, diags
 from scipy.sparse.linalg import splu
 
 from pipeline.kernels.geometry import rigid, rotation_exp
@@ -183,6 +183,55 @@ def _step(
 
     The diagonal of the normal matrix is multiplied by 1 + ``damping``.
     """
+    normal, gradient = _normal_equations(T, T_source_target, information, sources, targets, free)
+    normal += diags(damping * normal.diagonal(), format="csc")
+    solved: FloatArray = splu(normal).solve(-gradient)
+    return solved.reshape(-1, 6)
+
+
+def motion_covariances(
+    T_reference_node: Sequence[FloatArray], edges: Sequence[PoseEdge], reference: int
+) -> tuple[FloatArray, ...]:
+    """Compute the covariance of every node's pose, by the information of the edges that gave it.
+
+    Args:
+        T_reference_node: (4, 4) solved pose of every node; NaN for nodes that no edge reaches.
+        edges: the registrations that were used.
+        reference: node whose pose is the identity.
+
+    Returns:
+        (6, 6) covariance of each node's small motion (turn in rad about the reference's origin, then shift in
+            m; both along the reference's axes): 0 for the reference, NaN for a node without a pose.
+    """
+    reached = np.array([bool(np.isfinite(T).all()) for T in T_reference_node])
+    T = np.array([T if there else np.eye(4) for T, there in zip(T_reference_node, reached, strict=True)])
+    found = [np.zeros((6, 6)) if there else np.full((6, 6), np.nan) for there in reached]
+    held = [edge for edge in edges if reached[edge.source] and reached[edge.target]]
+    free = np.array([node for node in np.flatnonzero(reached) if node != reference], int)
+    if not held or not len(free):
+        return tuple(found)
+    sources, targets = (np.array([getattr(edge, end) for edge in held]) for end in ("source", "target"))
+    T_source_target = np.linalg.inv([edge.T_target_source for edge in held])
+    information = np.array(
+        [edge.information if edge.weak_information is None else edge.weak_information for edge in held]
+    )
+    normal, _ = _normal_equations(T, T_source_target, information, sources, targets, free)
+    covariance = np.linalg.inv(normal.toarray())
+    for row, node in enumerate(free):
+        own, to_reference = covariance[6 * row : 6 * row + 6, 6 * row : 6 * row + 6], adjoint(T[node])
+        found[node] = to_reference @ own @ to_reference.T
+    return tuple(found)
+
+
+def _normal_equations(
+    T: FloatArray,
+    T_source_target: FloatArray,
+    information: FloatArray,
+    sources: IntArray,
+    targets: IntArray,
+    free: IntArray,
+) -> tuple[csc_matrix, FloatArray]:
+    """Return the (6 F, 6 F) normal matrix and the (6 F,) gradient over the free nodes' own motions."""
     T_target_source = np.linalg.inv(T[targets]) @ T[sources]
     error = small_motion(T_source_target @ T_target_source)
     by_target = -adjoint(np.linalg.inv(T_target_source))  # the source's own motion enters as it is
@@ -206,6 +255,4 @@ def _step(
     column = np.broadcast_to(6 * column[:, None, None] + axis, block.shape)
     size = 6 * len(free)
     normal = coo_matrix((block.ravel(), (row.ravel(), column.ravel())), shape=(size, size)).tocsc()
-    normal += diags(damping * normal.diagonal(), format="csc")
-    solved: FloatArray = splu(normal).solve(-gradient.ravel())
-    return solved.reshape(-1, 6)
+    return normal, gradient.ravel()

@@ -55,7 +55,7 @@ def test_json_is_the_only_thing_on_stdout_and_holds_what_is_promised(pair_run):
 
 def test_every_promised_file_is_written_and_agrees_with_the_metrics(pair_run):
     out, metrics, _ = pair_run
-    names = {"config.json", "metrics.json", "poses.json", "report.html", "surface.glb"}
+    names = {"config.json", "measuring.npz", "metrics.json", "poses.json", "report.html", "surface.glb"}
     names |= {f"{name}.ply" for name in ("sensor", "inferred", "fused", "surface_before", "surface_after")}
     assert {path.name for path in out.iterdir()} == names
     assert json.loads((out / "metrics.json").read_text()) == metrics

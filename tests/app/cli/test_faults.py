@@ -25,7 +25,7 @@ from tests.pipeline.delivery.small import small_rig
 
 QUICK = ("--set", "surface.max_points=3000")
 ROOM_BYTES = 10_000
-FILES = {"config.json", "metrics.json", "poses.json", "report.html", "surface.glb"} | {
+FILES = {"config.json", "measuring.npz", "metrics.json", "poses.json", "report.html", "surface.glb"} | {
     f"{name}.ply" for name in ("sensor", "inferred", "fused", "surface_before", "surface_after")
 }
 
@@ -120,7 +120,7 @@ def test_a_run_over_an_older_one_leaves_none_of_its_surfaces(capsys, rig, tmp_pa
     assert run(capsys, "reconstruct", "--rig", rig, "--out", out, *QUICK)[0] == 0
     too_small = ("surface.radius_rule=manual", "surface.radii_m=0.0001")
     run(capsys, "reconstruct", "--rig", rig, "--out", out, *QUICK, *too_small)
-    meshes = {"surface_before.ply", "surface_after.ply", "surface.glb"}
+    meshes = {"surface_before.ply", "surface_after.ply", "surface.glb", "measuring.npz"}
     assert {path.name for path in out.iterdir()} == FILES - meshes
 
 

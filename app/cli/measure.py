@@ -1,0 +1,141 @@
+"""``packetmesh measure``: lengths, angles, areas and boxes on a reconstruction."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from app.cli.text import aligned, print_json, say, wrong_use
+
+if TYPE_CHECKING:
+    from pipeline.measuring.surface import MeasuredSurface
+    from pipeline.measuring.values import Measure, Value
+
+Place = tuple[float, float, float]
+Places = Annotated[tuple[str, ...], tyro.conf.arg(metavar="X,Y,Z")]
+OnePlace = Annotated[str | None, tyro.conf.arg(metavar="X,Y,Z")]
+
+
+def measure(
+    run: Annotated[Path, tyro.conf.Positional],
+    points: Places = (),
+    planes: Places = (),
+    box: OnePlace = None,
+    hole: OnePlace = None,
+    snap: Literal["surface", "vertex", "edge", "plane"] = "surface",
+    scale_by: float | None = None,
+    json: bool = False,
+) -> None:
+    """Measure on the surface that `reconstruct` wrote; every number with its 95 % interval.
+
+    Places are in metres, in the world of the run, as a viewer shows them for surface_after.ply.
+
+    Args:
+        run: Folder of the reconstruction.
+        points: Two points give a length; more give the length from each to the next, and the angle at each
+            one between. One point and one of --planes give its distance from the plane.
+        planes: A point on each of two planes gives their distance if they are parallel, else their angle;
+            points on three faces of a box give its width, depth and height.
+        box: A point on the top of a thing that stands on a plane, for its width, depth and height.
+        hole: A point in a hole or on its rim, for its area.
+        snap: Move --points to the nearest vertex, to the edge where two planes meet, or onto their plane.
+        scale_by: True length, in metres, of the first length that is measured: the surface is scaled by it,
+            and everything is measured again.
+        json: Print the values as JSON.
+    """
+    from pipeline.measuring.measures import with_scale
+    from pipeline.measuring.surface import read_measured
+
+    places = {"points": _places(points, "--points"), "planes": _places(planes, "--planes")}
+    singles = {
+        name: _places((text,), f"--{name}")[0] for name, text in (("box", box), ("hole", hole)) if text
+    }
+    _check(places, singles)
+    surface = read_measured(run)
+    found = _measured(surface, places, singles, snap, 1.0)
+    if scale_by is not None:
+        length = next((one for one in found if len(one.values) == 1 and one.values[0].unit == "m"), None)
+        if length is None:
+            wrong_use("--scale-by needs a length that is measured: give two --points")
+        surface, check = with_scale(surface, scale_by, length)
+        found = _measured(surface, places, singles, snap, check.factor)
+        say(check.sentence)
+    if json:
+        print_json([record for one in found for record in one.records()])
+        return
+    print(aligned([_row(one, value) for one in found for value in one.values]))
+    say(surface.scale_source)
+
+
+def _places(texts: tuple[str, ...], option: str) -> list[Place]:
+    """Return the places of an option; exit if a text is not three numbers."""
+    places = []
+    for text in texts:
+        try:
+            x, y, z = (float(number) for number in text.split(","))
+        except ValueError:
+            wrong_use(
+                f"{option} takes places such as 0.2,1.1,0.75 (metres, without blanks), not '{text.strip()}'"
+            )
+        places.append((x, y, z))
+    return places
+
+
+def _check(places: dict[str, list[Place]], singles: dict[str, Place]) -> None:
+    """Exit if the places make no measure."""
+    points, planes = len(places["points"]), len(places["planes"])
+    if not (points or planes or singles):
+        wrong_use("say what to measure: --points, --planes, --box or --hole")
+    if points == 1 and planes != 1:
+        wrong_use("--points takes two or more points, or one with one of --planes")
+    if planes > 3 or (planes == 1 and points != 1):
+        wrong_use(
+            "--planes takes a point on each of two planes or of three faces, or one with one of --points"
+        )
+
+
+def _measured(
+    surface: MeasuredSurface,
+    places: dict[str, list[Place]],
+    singles: dict[str, Place],
+    snap: Literal["surface", "vertex", "edge", "plane"],
+    factor: float,
+) -> list[Measure]:
+    """Return all measures; the places are multiplied by the factor of the surface's scale."""
+    import numpy as np
+
+    from pipeline.measuring import measures
+    from pipeline.measuring.marks import mark
+    from pipeline.measuring.planes import plane_at
+
+    marks = [mark(surface, factor * np.array(place), snap) for place in places["points"]]
+    planes = [plane_at(surface, factor * np.array(place)) for place in places["planes"]]
+    found = [measures.distance(surface, a, b) for a, b in pairwise(marks)]
+    corners = zip(marks, marks[1:], marks[2:], strict=False)
+    found += [measures.angle(surface, a, corner, b) for a, corner, b in corners]
+    if len(planes) == 1:
+        found.append(measures.point_to_plane(surface, marks[0], planes[0]))
+    elif len(planes) == 2:
+        parallel = measures.are_parallel(*planes)
+        of = measures.plane_to_plane if parallel else measures.angle_of_planes
+        found.append(of(surface, *planes))
+    elif len(planes) == 3:
+        found.append(measures.box_of_planes(surface, (planes[0], planes[1], planes[2])))
+    if "box" in singles:
+        found.append(measures.box_of_part(surface, factor * np.array(singles["box"])))
+    if "hole" in singles:
+        found.append(measures.hole_area(surface, factor * np.array(singles["hole"])))
+    return found
+
+
+def _row(one: Measure, value: Value) -> tuple[str, ...]:
+    """Return a line of the table; millimetres where the interval has them."""
+    unit = {"m": "m", "deg": "°", "m2": "m²"}[value.unit]
+    digits = {"m": 4, "deg": 2, "m2": 5}[value.unit]
+    low, high = (f"{end:.{digits}f}" for end in value.ci95)
+    guessed = "an end is guessed" if value.guessed else ""
+    name = value.name if one.kind in ("angle", "box", "hole") else f"{value.name} ({one.kind})"
+    return name, f"{value.value:.{digits}f} {unit}", f"95 %: {low} to {high}", guessed

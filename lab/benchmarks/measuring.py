@@ -1,0 +1,57 @@
+"""Lengths, heights and angles measured in rendered rooms: how often their intervals hold, and how fast."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lab.benchmarks.benchmark import Benchmark
+from lab.measuring.judging import RoomTask, Row, judged_room, summaries
+from lab.measuring.rooms import HELD_OUT
+from lab.trials import iterate_trials
+from packetmesh.memory import peak_memory_bytes
+from packetmesh.progress import drain
+
+ROOMS = 20
+FOLDER = Path("runs/measuring")
+"""Folder of the rooms' measures, which are not computed again."""
+BATCH = 4
+"""Rooms that are tried at a time: some have no two views that overlap as asked."""
+
+
+def benchmark(rooms: int = ROOMS) -> Benchmark:
+    """Measure in the first held-out rooms that two cameras can see; the time is that of a length.
+
+    Args:
+        rooms: number of rooms.
+    """
+    found: list[list[Row]] = []
+    first = HELD_OUT
+    while len(found) < rooms:
+        tasks = [RoomTask(seed) for seed in range(first, first + BATCH)]
+        answers = drain(iterate_trials("measuring", judged_room, tasks, FOLDER, processes=1))
+        found += [rows for rows in answers if rows is not None]
+        first += BATCH
+    groups = summaries([row for rows in found[:rooms] for row in rows])
+    lengths = next(group for group in groups if group["kind"] == "distance" and not group["guessed"])
+    return Benchmark(
+        lengths["median_s"],
+        {},
+        peak_memory_bytes(),
+        runs=tuple(groups),
+        notes=tuple(_line(group) for group in groups),
+    )
+
+
+def _line(group: Row) -> str:
+    """Return one kind of measure as a sentence."""
+    low, high = group["coverage_ci95"]
+    unit, times = ("°", 1.0) if group["kind"] == "angle" else (" mm", 1000.0)
+    ratio = group["error_over_raw"]
+    beside = "" if ratio is None else f", {ratio:.2f} x that of single measurements"
+    return (
+        f"{group['kind']}, {'guessed' if group['guessed'] else 'measured'}: {group['measures']} in "
+        f"{group['rooms']} rooms, {100.0 * group['coverage']:.1f} % of the intervals hold "
+        f"({100.0 * low:.1f} to {100.0 * high:.1f} %), median error {times * group['median_error']:.2f}{unit}"
+        f"{beside}, median half width {times * group['median_half_width']:.2f}{unit}, "
+        f"{1000.0 * group['p95_s']:.0f} ms at the 95th percentile"
+    )

@@ -1,0 +1,188 @@
+"""Width, depth and height of a box: of three faces, or of a thing that stands on a plane."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import cv2
+import numpy as np
+
+from packetmesh.errors import InputError
+from pipeline.measuring.lookup import lookup_of
+from pipeline.measuring.near import spot_near
+from pipeline.measuring.planes import Plane, plane_at
+from pipeline.measuring.propagation import Z95
+from pipeline.measuring.surface import MeasuredSurface
+from pipeline.measuring.values import Measure, Value
+from pipeline.surface.boundary import connected_parts
+from pipeline.types import BoolArray, FloatArray, IntArray
+
+SQUARE_DEG = 20.0
+"""Faces of a box are square to each other within this angle."""
+EXTENT = (1.0, 99.0)
+"""Percentiles of the vertices between which a thing extends (SPEC 7)."""
+LEVEL_DEG = 25.0
+"""Largest angle between a supporting plane's normal and the vertical."""
+BESIDE_M = 0.6
+"""Distance in which a thing's supporting plane is looked for."""
+ABOVE_M = 0.015
+"""Least height of a part over its plane; lower, they cannot be told apart."""
+TRIED = 4
+"""Heights at which a supporting plane is looked for, and places at each."""
+GROOVE_DEG = 25.0
+"""Angle between converging normals from which two things touch there."""
+LARGEST_SHARE = 0.5
+"""A part of more of the surface is no single thing."""
+
+
+def box_of_planes(surface: MeasuredSurface, planes: tuple[Plane, Plane, Plane]) -> Measure:
+    """Return width, depth and height of the box of which three faces are given.
+
+    Each length is from a face to where the vertices of the other two end. These stand up to half a spacing
+    before the true edge, which is added to the length; half a spacing is also its standard deviation.
+
+    Raises:
+        InputError: the planes are not square to each other.
+    """
+    normals = np.stack([plane.normal for plane in planes])
+    cosines = np.abs((normals @ normals.T)[np.triu_indices(3, 1)])
+    if cosines.max() > np.sin(np.radians(SQUARE_DEG)):
+        least = np.degrees(np.arccos(cosines.max()))
+        raise InputError(
+            f"Two of the three planes are {least:.0f} degrees apart, and faces of a box are square; "
+            "mark three faces that meet at one corner"
+        )
+    left, _, right = np.linalg.svd(normals)
+    axes = left @ right
+    corner_m = np.linalg.solve(normals, [plane.normal @ plane.point_m for plane in planes])
+    ragged_m = 0.5 * lookup_of(surface).spacing_m
+    lengths_m, sds_m = [], []
+    for k, plane in enumerate(planes):
+        others = np.concatenate([other.rows for j, other in enumerate(planes) if j != k])
+        deep_m = (corner_m - surface.vertices_m[others]) @ axes[k]
+        lengths_m.append(float(np.percentile(deep_m, EXTENT[1])) + ragged_m)
+        sds_m.append(np.hypot(np.sqrt(plane.covariance[0, 0]), ragged_m))
+    guessed = tuple(plane.guessed for plane in planes)
+    return _box(surface, corner_m, -axes, np.array(lengths_m), np.array(sds_m), guessed)
+
+
+def box_of_part(surface: MeasuredSurface, point_m: FloatArray) -> Measure:
+    """Return width, depth and height of a thing that stands on a plane, marked by one point on it.
+
+    The plane is the level one below the point with most vertices near it. Of a thing with a flat top that is
+    marked there, the footprint is the smallest rectangle around the top; of another, around all that is
+    connected with the point above the plane, up to grooves: things that touch it there count as one with it.
+
+    Raises:
+        InputError: nothing stands there.
+    """
+    spot = spot_near(surface, point_m)
+    where = "({:.3g}, {:.3g}, {:.3g})".format(*spot.point_m)
+    seed = int(spot.corners[np.argmax(spot.shares)])
+    plane = _support(surface, seed, where)
+    rows = _top(surface, spot.point_m, plane)
+    if rows is None:
+        rows = _part(surface, seed, plane, where)
+    points_m = surface.vertices_m[rows] - plane.point_m
+    flat_m = points_m @ plane.axes.T
+    turn_rad = np.radians(cv2.minAreaRect(flat_m.astype(np.float32))[2])
+    turned = np.array([[np.cos(turn_rad), np.sin(turn_rad)], [-np.sin(turn_rad), np.cos(turn_rad)]])
+    low_m, high_m = np.percentile(flat_m @ turned.T, EXTENT, axis=0)
+    ragged_m = 0.5 * lookup_of(surface).spacing_m
+    height_m = float(np.percentile(points_m @ plane.normal, EXTENT[1]))
+    axes = np.stack([*(turned @ plane.axes), plane.normal])
+    origin_m = plane.point_m + (low_m - ragged_m) @ axes[:2]
+    lengths_m = np.append(high_m - low_m + 2.0 * ragged_m, height_m)
+    foot_m = origin_m + 0.5 * lengths_m[:2] @ axes[:2]
+    top_m = float(np.median(surface.sigma_m[rows]))
+    sds_m = np.array([np.sqrt(2.0) * ragged_m] * 2 + [np.sqrt(plane.offset_variance_m2(foot_m) + top_m**2)])
+    guessed = bool(np.mean(surface.guessed[rows]) > 0.5)
+    return _box(surface, origin_m, axes, lengths_m, sds_m, (guessed, guessed, guessed or plane.guessed))
+
+
+def _support(surface: MeasuredSurface, seed: int, where: str) -> Plane:
+    """Return the level plane below a vertex on which most stands near it."""
+    away_m = surface.vertices_m - surface.vertices_m[seed]
+    level = surface.normals[:, 2] > np.cos(np.radians(LEVEL_DEG))
+    below = level & (np.linalg.norm(away_m, axis=1) < BESIDE_M) & (away_m[:, 2] < -ABOVE_M)
+    candidates = np.flatnonzero(below)
+    floors = np.round(away_m[candidates, 2] / ABOVE_M).astype(int)
+    levels, counts = np.unique(floors, return_counts=True)
+    for level_number in levels[np.argsort(-counts)][:TRIED]:
+        some = candidates[floors == level_number]
+        some = some[np.argsort(np.linalg.norm(away_m[some, :2], axis=1))]
+        for row in some[:: max(1, len(some) // TRIED)]:
+            try:
+                plane = plane_at(surface, surface.vertices_m[row])
+            except InputError:
+                continue
+            if plane.normal[2] > np.cos(np.radians(LEVEL_DEG)):
+                return plane
+    raise InputError(
+        f"No level plane is below the point {where} m, so its height is open; mark three faces of it instead"
+    )
+
+
+def _top(surface: MeasuredSurface, point_m: FloatArray, plane: Plane) -> IntArray | None:
+    """Return the vertices of the flat top of a thing; None if no level plane is at the point."""
+    try:
+        top = plane_at(surface, point_m)
+    except InputError:
+        return None
+    return top.rows if float(top.normal @ plane.normal) > np.cos(np.radians(SQUARE_DEG)) else None
+
+
+def _part(surface: MeasuredSurface, seed: int, plane: Plane, where: str) -> IntArray:
+    """Return the vertices above a plane that are connected with a vertex."""
+    least_m = max(ABOVE_M, 3.0 * plane.rms_m)
+    above = (surface.vertices_m - plane.point_m) @ plane.normal > least_m
+    if not above[seed]:
+        raise InputError(
+            f"The point {where} m is not above the plane that it stands on; mark a point higher up"
+        )
+    edges = lookup_of(surface).edges
+    edges = edges[above[edges].all(axis=1)]
+    labels = connected_parts(edges[~_hollow(surface, edges)], len(above))
+    rows = np.flatnonzero(above & (labels == labels[seed]))
+    if len(rows) > LARGEST_SHARE * len(above):
+        raise InputError(
+            f"What the point {where} m marks is connected with most of the surface; mark three of its "
+            "faces instead"
+        )
+    if len(rows) < 4:
+        raise InputError(f"Nothing stands at the point {where} m; mark a point on a thing")
+    return rows
+
+
+def _hollow(surface: MeasuredSurface, edges: IntArray) -> BoolArray:
+    """Return (E,) True for edges in a groove, where two things touch: the normals at their ends converge."""
+    (a, b), (n, m) = surface.vertices_m[edges].swapaxes(0, 1), surface.normals[edges].swapaxes(0, 1)
+    converge = np.sum((b - a) * (m - n), axis=1) < 0.0
+    return converge & (np.sum(n * m, axis=1) < np.cos(np.radians(GROOVE_DEG)))
+
+
+def _box(
+    surface: MeasuredSurface,
+    corner_m: FloatArray,
+    axes: FloatArray,
+    lengths_m: FloatArray,
+    sds_m: FloatArray,
+    guessed: tuple[bool, ...],
+) -> Measure:
+    """Return the measure of a box from a corner along three (3, 3) axes; the steepest is its height."""
+    halves_m = Z95 * np.hypot(sds_m, lengths_m * surface.scale_sd)
+    upright = int(np.argmax(np.abs(axes[:, 2])))
+    level = sorted((k for k in range(3) if k != upright), key=lambda k: -lengths_m[k])
+    names = ("width", "depth", "height")
+    values = tuple(
+        Value(
+            name,
+            float(lengths_m[k]),
+            "m",
+            (max(0.0, float(lengths_m[k] - halves_m[k])), float(lengths_m[k] + halves_m[k])),
+            bool(guessed[k]),
+        )
+        for name, k in zip(names, (*level, upright), strict=True)
+    )
+    corners_m = [corner_m + (np.array(some) * lengths_m) @ axes for some in product((0.0, 1.0), repeat=3)]
+    return Measure("box", values, np.stack(corners_m))

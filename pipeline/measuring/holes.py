@@ -1,0 +1,55 @@
+"""Area of a hole in a surface, with the interval that its ragged rim allows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from packetmesh.errors import InputError
+from pipeline.measuring.lookup import lookup_of
+from pipeline.measuring.near import NEAR_M, NEAR_SPACINGS
+from pipeline.measuring.propagation import Z95
+from pipeline.measuring.surface import MeasuredSurface
+from pipeline.measuring.values import Measure, Value
+from pipeline.surface.holes import find_holes
+from pipeline.types import FloatArray
+
+
+def hole_area(surface: MeasuredSurface, point_m: FloatArray) -> Measure:
+    """Return the area of the hole whose rim is nearest to a point, or around it.
+
+    A rim vertex stands up to half a spacing inside the surface, so that is the standard deviation of its
+    place in the surface, besides its noise along the ray.
+
+    Raises:
+        InputError: there is no hole near the point.
+    """
+    point_m = np.asarray(point_m, float)
+    holes = [hole for hole in find_holes(surface.vertices_m, surface.triangles) if hole.open]
+    spacing_m = lookup_of(surface).spacing_m
+    away_m = [_away_m(surface.vertices_m[hole.loop], hole.center_m, point_m) for hole in holes]
+    nearest = int(np.argmin(away_m)) if holes else -1
+    if not holes or away_m[nearest] > max(NEAR_M, NEAR_SPACINGS * spacing_m):
+        where = "({:.3g}, {:.3g}, {:.3g})".format(*point_m)
+        raise InputError(
+            f"No hole of the surface is near the point {where} m; mark a point on the rim of a hole or in it"
+        )
+    loop = holes[nearest].loop
+    rim_m = surface.vertices_m[loop]
+    chord_m = np.roll(rim_m, -1, axis=0) - np.roll(rim_m, 1, axis=0)
+    vector_m2 = 0.5 * np.sum(np.cross(rim_m - rim_m[0], np.roll(rim_m, -1, axis=0) - rim_m[0]), axis=0)
+    area_m2 = float(np.linalg.norm(vector_m2))
+    slopes_m = 0.5 * np.cross(chord_m, vector_m2 / max(area_m2, 1e-12))
+    along_m2 = np.einsum("vi,vi->v", slopes_m, surface.rays[loop]) ** 2 * surface.sigma_m[loop] ** 2
+    ragged_m2 = np.sum(slopes_m**2, axis=1) * (0.5 * spacing_m) ** 2
+    variance = float(np.sum(along_m2 + ragged_m2)) + (2.0 * area_m2 * surface.scale_sd) ** 2
+    half_m2 = Z95 * float(np.sqrt(variance))
+    guessed = bool(np.mean(surface.guessed[loop]) > 0.5)
+    value = Value("area", area_m2, "m2", (max(0.0, area_m2 - half_m2), area_m2 + half_m2), guessed)
+    return Measure("hole", (value,), rim_m)
+
+
+def _away_m(rim_m: FloatArray, center_m: FloatArray, point_m: FloatArray) -> float:
+    """Return the distance of a point from a hole: 0 inside the ball of its rim, else to the rim."""
+    to_rim_m = float(np.min(np.linalg.norm(rim_m - point_m, axis=1)))
+    inner_m = float(np.min(np.linalg.norm(rim_m - center_m, axis=1)))
+    return 0.0 if np.linalg.norm(point_m - center_m) <= inner_m else to_rim_m

@@ -1,0 +1,224 @@
+"""Lengths, angles, areas and boxes whose values and variances are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from packetmesh.errors import InputError
+from pipeline.measuring import measures
+from pipeline.measuring.marks import mark, mark_on_ray
+from pipeline.measuring.planes import plane_at
+from pipeline.measuring.propagation import Z95
+from tests.pipeline.measuring.scenes import BOX_M, box_on_table, joined, measured, sheet
+
+SIGMA_M = 0.002
+
+
+def facing_walls(**other):
+    """Two walls, x = 0 and x = 2, that face each other; the second is of node 1."""
+    left = sheet(20, 20, 0.05, (0, 0, 0), (0, 1, 0), (0, 0, 1))
+    right = sheet(20, 20, 0.05, (2, 0, 0), (0, 0, 1), (0, 1, 0))
+    nodes = np.repeat([0, 1], len(left[0]))
+    return measured(
+        joined(left, right), SIGMA_M, nodes=nodes, **({"pose_covariances": np.zeros((2, 6, 6))} | other)
+    )
+
+
+def half(value):
+    low, high = value.ci95
+    assert value.value - low == pytest.approx(high - value.value)
+    return high - value.value
+
+
+def length(surface, a=(0.0, 0.5, 0.5), b=(2.0, 0.5, 0.5)):
+    (value,) = measures.distance(surface, mark(surface, np.array(a)), mark(surface, np.array(b))).values
+    return value
+
+
+def test_a_length_along_the_noise_has_both_ends_variances():
+    value = length(facing_walls())
+    assert (value.name, value.unit, value.guessed) == ("length", "m", False)
+    assert value.value == pytest.approx(2.0)
+    assert half(value) == pytest.approx(Z95 * np.sqrt(2.0) * SIGMA_M, rel=1e-3)
+
+
+def test_a_length_across_the_noise_has_none_of_it():
+    assert half(length(facing_walls(), b=(0.0, 0.8, 0.5))) < 1e-6
+
+
+def test_the_scale_makes_long_lengths_less_sure():
+    surface = facing_walls(scale_sd=0.01)
+    assert half(length(surface, b=(0.0, 0.8, 0.5))) == pytest.approx(Z95 * 0.3 * 0.01, rel=1e-3)
+    both = np.hypot(np.sqrt(2.0) * SIGMA_M, 0.02)
+    assert half(length(surface)) == pytest.approx(Z95 * both, rel=1e-3)
+
+
+def test_the_pose_between_two_nodes_counts_once_and_within_a_node_not_at_all():
+    motions = np.zeros((2, 6, 6))
+    motions[1] = np.diag([0.0, 0.0, 0.01, 0.005, 0.0, 0.0]) ** 2
+    surface = facing_walls(pose_covariances=motions)
+    turned_m = 0.01 * 0.5  # a turn about the world's z moves the far end by y times the angle
+    expected = np.sqrt(2.0 * SIGMA_M**2 + 0.005**2 + turned_m**2)
+    assert half(length(surface)) == pytest.approx(Z95 * expected, rel=1e-3)
+    assert half(length(surface, (2.0, 0.2, 0.5), (2.0, 0.8, 0.5))) < 1e-6
+
+
+def test_95_of_100_intervals_hold_the_true_length():
+    surface, rng, covered = facing_walls(), np.random.default_rng(7), 0
+    rows = [
+        np.argmin(np.linalg.norm(surface.vertices_m - end, axis=1)) for end in ([0, 0.5, 0.5], [2, 0.3, 0.2])
+    ]
+    ends = [mark(surface, surface.vertices_m[row], "vertex") for row in rows]
+    true_m = float(np.linalg.norm(ends[0].point_m - ends[1].point_m))
+    for _ in range(2000):
+        noisy = [replace(end, point_m=end.point_m + rng.normal(0.0, SIGMA_M) * end.ray) for end in ends]
+        low, high = measures.distance(surface, *noisy).values[0].ci95
+        covered += low <= true_m <= high
+    assert 0.935 <= covered / 2000 <= 0.965
+
+
+def test_a_click_meets_the_first_surface_on_its_ray():
+    surface = facing_walls()
+    clicked = mark_on_ray(surface, np.array([1.0, 0.52, 0.47]), np.array([3.0, 0.0, 0.0]))
+    assert clicked.point_m == pytest.approx([2.0, 0.52, 0.47], abs=1e-6)
+    assert clicked.normal == pytest.approx([-1.0, 0.0, 0.0])
+    assert clicked.node == 1
+    with pytest.raises(InputError, match="no surface under the pointer"):
+        mark_on_ray(surface, np.array([1.0, 0.5, 0.5]), np.array([0.0, 0.0, 1.0]))
+
+
+def test_marks_snap_to_vertices_edges_and_planes():
+    surface = measured(box_on_table())
+    near_edge = np.array([0.104, 0.003, 0.148])
+    assert mark(surface, near_edge, "vertex").point_m == pytest.approx([0.1, 0.0, 0.15], abs=1e-6)
+    edge = mark(surface, near_edge, "edge")
+    assert edge.point_m == pytest.approx([0.104, 0.0, 0.15], abs=1e-6)
+    assert edge.covariance_m2 @ [1.0, 0.0, 0.0] == pytest.approx(0.0, abs=1e-12)
+    assert mark(surface, np.array([0.1, 0.1, 0.16]), "plane").point_m == pytest.approx([0.1, 0.1, 0.15])
+    with pytest.raises(InputError, match="No edge is near"):
+        mark(surface, np.array([0.15, 0.1, 0.15]), "edge")
+
+
+def test_heights_and_gaps_of_planes():
+    surface = measured(box_on_table())
+    table, top = (plane_at(surface, np.array(place)) for place in ([-0.2, -0.2, 0.0], [0.1, 0.1, 0.15]))
+    (height,) = measures.point_to_plane(surface, mark(surface, np.array([0.1, 0.1, 0.15])), table).values
+    assert height.value == pytest.approx(0.15)
+    assert half(height) == pytest.approx(Z95 * 0.001, rel=0.01)
+    gap = measures.plane_to_plane(surface, table, top)
+    assert gap.values[0].value == pytest.approx(0.15)
+    assert np.ptp(gap.ends_m, axis=0) == pytest.approx([0.0, 0.0, 0.15])
+    side = plane_at(surface, np.array([0.0, 0.1, 0.07]))
+    with pytest.raises(InputError, match="not parallel: 90 degrees apart"):
+        measures.plane_to_plane(surface, table, side)
+    with pytest.raises(InputError, match="on one plane"):
+        measures.plane_to_plane(surface, table, plane_at(surface, np.array([0.5, 0.4, 0.0])))
+
+
+@pytest.mark.parametrize("inner_deg", [60.0, 90.0, 135.0])
+def test_the_angle_of_two_planes_is_the_one_between_their_visible_sides(inner_deg):
+    turn = np.radians(inner_deg)
+    floor = sheet(20, 20, 0.05)
+    wall = sheet(20, 20, 0.05, (0, 0, 0), (0, 1, 0), (np.cos(turn), 0.0, np.sin(turn)))
+    surface = measured(joined(floor, wall))
+    planes = [plane_at(surface, 0.5 * (mesh[0].min(axis=0) + mesh[0].max(axis=0))) for mesh in (floor, wall)]
+    found = measures.angle_of_planes(surface, *planes)
+    assert found.values[0].value == pytest.approx(inner_deg)
+    assert found.ends_m[1] == pytest.approx([0.0, 0.5, 0.0], abs=1e-6)
+
+
+def test_an_angle_of_three_points():
+    surface = measured(sheet(20, 20, 0.05), rays=np.tile([1.0, 0.0, 0.0], (441, 1)))
+    a, corner, b = (mark(surface, np.array(place)) for place in ([0.5, 0, 0], [0, 0, 0], [0.5, 0.5, 0]))
+    (value,) = measures.angle(surface, a, corner, b).values
+    assert value.value == pytest.approx(45.0, abs=1e-4)
+    ends = [replace(end, covariance_m2=1e-6 * np.eye(3)) for end in (a, corner, b)]
+    (value,) = measures.angle(surface, *ends).values
+    by_paper = 0.001 * np.sqrt(
+        1 / 0.5**2 + 1 / 0.5 + (1 / 0.5**2 + 1 / 0.5 - 2 / (0.5 * np.sqrt(0.5)) * np.cos(np.pi / 4))
+    )
+    assert half(value) == pytest.approx(Z95 * np.degrees(by_paper), rel=0.01)
+    with pytest.raises(InputError, match="at its corner"):
+        measures.angle(surface, a, a, b)
+
+
+def test_three_faces_of_a_box_and_the_box_as_a_part():
+    surface = measured(box_on_table(), scale_sd=0.001)
+    places = ([0.1, 0.1, 0.15], [0.0, 0.1, 0.07], [0.1, 0.0, 0.07])
+    faces = tuple(plane_at(surface, np.array(place)) for place in places)
+    for found in (
+        measures.box_of_planes(surface, faces),
+        measures.box_of_part(surface, np.array([0.1, 0.1, 0.15])),
+    ):
+        assert [one.name for one in found.values] == ["width", "depth", "height"]
+        for one, true_m in zip(found.values, BOX_M, strict=True):
+            assert one.ci95[0] <= true_m <= one.ci95[1]
+            assert one.value == pytest.approx(true_m, abs=0.012)
+        assert found.ends_m.shape == (8, 3)
+        assert np.ptp(found.ends_m, axis=0) == pytest.approx(BOX_M, abs=0.015)
+    with pytest.raises(InputError, match="degrees apart, and faces of a box are square"):
+        measures.box_of_planes(surface, (faces[0], faces[0], faces[1]))
+    with pytest.raises(InputError, match="No level plane is below"):
+        measures.box_of_part(surface, np.array([-0.2, -0.2, 0.0]))
+
+
+def test_the_area_of_a_hole():
+    vertices_m, triangles, normals = sheet(20, 20, 0.05)
+    middle_m = vertices_m[triangles].mean(axis=1)
+    inside = np.all(np.abs(middle_m[:, :2] - 0.5) < 0.1, axis=1)
+    surface = measured((vertices_m, triangles[~inside], normals))
+    found = measures.hole_area(surface, np.array([0.5, 0.5, 0.0]))
+    (area,) = found.values
+    assert (area.value, area.unit) == (pytest.approx(0.04), "m2")
+    assert area.ci95[0] < 0.04 < area.ci95[1]
+    assert len(found.ends_m) == 16
+    assert measures.hole_area(surface, np.array([0.41, 0.4, 0.0])).values[0].value == pytest.approx(0.04)
+    with pytest.raises(InputError, match="No hole"):
+        measures.hole_area(surface, np.array([0.1, 0.1, 0.0]))
+
+
+def test_a_true_length_checks_and_sets_the_scale():
+    surface = facing_walls(scale_sd=0.02)
+    ends = [np.array([0.0, 0.5, 0.5]), np.array([2.0, 0.5, 0.5])]
+    found = measures.distance(surface, *(mark(surface, end) for end in ends))
+    scaled, check = measures.with_scale(surface, 2.05, found)
+    assert check.factor == pytest.approx(1.025)
+    assert check.agrees
+    own = np.sqrt(2.0) * SIGMA_M / 2.0
+    assert scaled.scale_sd == pytest.approx(own, rel=0.01)
+    assert check.ci95 == pytest.approx((1.025 * (1 - Z95 * own), 1.025 * (1 + Z95 * own)), rel=1e-3)
+    again = measures.distance(scaled, *(mark(scaled, 1.025 * end) for end in ends))
+    assert again.values[0].value == pytest.approx(2.05)
+    assert not measures.with_scale(surface, 2.5, found)[1].agrees
+    assert "does not agree" in measures.with_scale(surface, 2.5, found)[1].sentence
+    with pytest.raises(InputError, match="try a positive one"):
+        measures.with_scale(surface, 0.0, found)
+
+
+def test_two_equal_points_have_no_length():
+    surface = facing_walls()
+    end = mark(surface, np.array([0.0, 0.5, 0.5]))
+    with pytest.raises(InputError, match="the same point"):
+        measures.distance(surface, end, end)
+
+
+def test_a_guessed_end_has_the_odds_of_its_confidence():
+    count = 2 * 441
+    guessed = np.repeat([False, True], 441)
+    widths = []
+    for confidence in (0.55, 0.95):
+        surface = facing_walls(
+            guessed=guessed,
+            rays=np.tile([1.0, 0.0, 0.0], (count, 1)),
+            ranges_m=np.full(count, 3.0),
+            confidence=np.where(guessed, confidence, np.nan),
+        )
+        value = length(surface)
+        assert value.guessed
+        assert value.ci95 == length(surface).ci95
+        assert value.ci95[0] <= 2.0 <= value.ci95[1]
+        assert abs((value.ci95[1] - 2.0) - (2.0 - value.ci95[0])) > 0.01
+        widths.append(np.ptp(value.ci95))
+        assert not length(surface, b=(0.0, 0.8, 0.5)).guessed
+    assert widths[0] > widths[1] > 0.02
