@@ -21,7 +21,12 @@ hypothesis.settings.load_profile("untimed")
 SLOW = (
     *("lab", "real", "bad_input", "app/cli", "app/lesson", "app/web/attack", "app/test_one_chain.py"),
     *("app/compute/test_ahead.py", "app/compute/test_faults.py", "app/screens/*/test_*panel.py"),
-    *("app/screens/*/test_*jobs.py", "app/screens/*/test_lesson.py", "app/screens/surface/test_[bhsw]*.py"),
+    *(
+        "app/screens/*/test_*jobs.py",
+        "app/screens/*/test_measures.py",
+        "app/screens/*/test_lesson.py",
+        "app/screens/surface/test_[bhsw]*.py",
+    ),
     *("app/screens/fuse/test_race*.py", "pipeline/calibration/test_[de]*.py", "pipeline/test_*.py"),
     *(
         "pipeline/calibration/test_rig*.py",

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
-from pipeline.types import ByteArray, FloatArray, IntArray, SurfaceQuality
+from pipeline.types import BoolArray, ByteArray, FloatArray, IntArray, SurfaceQuality
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +21,8 @@ class Sample:
     """(N, 3) RGB."""
     total: int
     """Number of points in the full cloud."""
+    spacing: float | None = field(default=None, kw_only=True)
+    """Distance between neighbours over their depth, for the points of a grid of pixels; else None."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,6 +186,8 @@ class MeshView:
 
 SCREEN_POINTS = 60_000
 """Number of points sent to a browser for one kind of cloud, over all nodes."""
+SENSOR_POINTS = 250_000
+"""Most points of all sensors together that are sent to a browser."""
 
 
 def sample(
@@ -191,7 +196,24 @@ def sample(
     """Return at most ``most`` points of a cloud, drawn uniformly without replacement."""
     total = len(points_m)
     if total > most:
-        rng = rng or np.random.default_rng(0)
-        rows = np.sort(rng.choice(total, most, replace=False))
+        rows = drawn_rows(total, most, rng)
         points_m, colors = points_m[rows], None if colors is None else colors[rows]
     return Sample(points_m.astype(np.float32), colors, total)
+
+
+def drawn_rows(total: int, most: int, rng: np.random.Generator | None = None) -> IntArray:
+    """Return the rows of a cloud of ``total`` points that ``sample`` keeps, ascending."""
+    if total <= most:
+        return np.arange(total)
+    return np.sort((rng or np.random.default_rng(0)).choice(total, most, replace=False))
+
+
+def grid_step(total: int) -> int:
+    """Return the step in columns and rows at which at most ``SENSOR_POINTS`` of so many pixels remain."""
+    return max(1, math.ceil(math.sqrt(total / SENSOR_POINTS)))
+
+
+def on_grid(pixels: IntArray, step: int) -> BoolArray:
+    """Return (N,) whether (N, 2) pixels are on the grid with this step."""
+    found: BoolArray = (pixels % step == 0).all(axis=1)
+    return found

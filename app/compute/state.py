@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import threading
-from collections import OrderedDict
 from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
+from app.compute.measures import NO_MEASURES, Tape
 from app.compute.records import Shown
-from app.compute.turns import Turns
 from network_sim.config import NetworkConfig
 from pipeline import spec
 from pipeline.config import Baseline, Lens, Pattern
@@ -71,6 +69,8 @@ class Spec(spec.Spec):
 
     shown: Shown = "after"
     """The surface that is drawn and exported."""
+    tape: Tape = NO_MEASURES
+    """Measures on the surface after fusion, for the report and the exports."""
     networks: tuple[NetworkConfig, ...] = ()
     """Settings of the simulated networks that are compared; empty until the screen is first opened."""
     sent: Sent | None = None
@@ -97,31 +97,6 @@ class Spec(spec.Spec):
             chain = () if self.sent is None else spec.key(self, "truth")
             return (step, self.networks, self.sent, chain)
         return spec.key(self, STAGE_OF[step])
-
-
-class SharedViews:
-    """The newest views of all sessions: a view that one session has computed is reused by the others."""
-
-    def __init__(self, capacity: int = 24) -> None:
-        self.turns = Turns()
-        self._views: OrderedDict[Hashable, Any] = OrderedDict()
-        self._capacity = capacity
-        self._lock = threading.Lock()
-
-    def get(self, key: Hashable) -> Any:
-        """Return the view with this key, or None."""
-        with self._lock:
-            if key in self._views:
-                self._views.move_to_end(key)
-            return self._views.get(key)
-
-    def put(self, key: Hashable, view: Any) -> None:
-        """Keep a view and drop the least recently used one if there are too many."""
-        with self._lock:
-            self._views[key] = view
-            self._views.move_to_end(key)
-            while len(self._views) > self._capacity:
-                self._views.popitem(last=False)
 
 
 @dataclass(slots=True)

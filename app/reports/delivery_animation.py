@@ -92,7 +92,7 @@ def _numbers(pen: ImageDraw.ImageDraw, hand_out: HandOut, moment: HandOutMoment,
     if any(each.f_score is not None for each in hand_out.moments):
         rows.append(("F-score at 5 cm", _percent(moment.f_score), "", TARGET))
     if any(each.no_hit_share is not None for each in hand_out.moments):
-        rows.append(("rays without surface", _percent(moment.no_hit_share), "", LOSS))
+        rows.append(("rays without a surface", _percent(moment.no_hit_share), "", LOSS))
     for label, value, beside, color in rows:
         pen.text((left, top), label, SOFT, font(17))
         pen.text((left, top + 19), value, color, font(34))

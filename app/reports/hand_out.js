@@ -73,7 +73,7 @@ const TILES = [
   {name: "Energy", now: (record, moment) => `${energy(moment?.energy_j ?? 0)} J`, of: () => "of all nodes"},
   {name: "F-score at 5 cm", color: "curve target", known: CURVES[0].known, now: (record, moment) => shareText(moment?.f_score),
     of: record => record.lossless_f_score === null ? "against the truth" : `of ${shareText(record.lossless_f_score)} without loss`},
-  {name: "Rays without surface", color: "curve lost", known: CURVES[1].known, now: (record, moment) => shareText(moment?.no_hit_share),
+  {name: "Rays without a surface", color: "curve lost", known: CURVES[1].known, now: (record, moment) => shareText(moment?.no_hit_share),
     of: () => "of the cameras' rays"},
 ];
 const allBytes = record => Math.max(...record.moments.map(moment => moment.sent_bytes), 1);

@@ -48,7 +48,7 @@ class HandOutMoment:
     f_score: float | None = None
     """F-score at 5 cm, 0 to 1; None without ground truth or surface."""
     no_hit_share: float | None = None
-    """Share of the cameras' rays without surface, 0 to 1."""
+    """Share of the cameras' rays without a surface, 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)

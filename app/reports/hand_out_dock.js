@@ -334,7 +334,7 @@ class Dock {
 // The curves, with the names and colours of the numbers above.
 const CURVES = [
   {name: "F-score at 5 cm", color: "target", dash: [], share: true, of: moment => moment.f_score},
-  {name: "Rays without surface", color: "lost", dash: [9, 5], share: true, of: moment => moment.no_hit_share},
+  {name: "Rays without a surface", color: "lost", dash: [9, 5], share: true, of: moment => moment.no_hit_share},
   {name: "Bytes delivered", color: "delivered", dash: [2, 4], share: false, of: moment => moment.delivered_bytes},
 ];
 for (const curve of CURVES) curve.known = record => record.moments.some(moment => curve.of(moment) !== null);

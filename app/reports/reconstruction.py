@@ -9,6 +9,7 @@ from typing import Any
 
 from app.drawing.pictures import depth_picture, depth_range_m
 from app.reports.html import picture, pictures, table, write_page
+from app.reports.measures import measured_sections
 from app.web.markup import Markup
 from pipeline.folders.walk import lost_sentences
 from pipeline.kernels.rays import Camera
@@ -20,8 +21,8 @@ from pipeline.types import ByteArray, Surface
 MOST_SHOWN = 6
 """Most nodes of which the report has pictures."""
 QUALITY_ROWS = (
-    ("no_hit_ray_share", "camera rays that miss the surface (%)", 100.0),
-    ("guessed_ray_share", "camera rays that meet inferred surface (%)", 100.0),
+    ("no_hit_ray_share", "rays without a surface (%)", 100.0),
+    ("guessed_ray_share", "rays on inferred surface (%)", 100.0),
     (
         "within_2pct_share",
         "measured pixels whose ray meets the surface within 2 % of the measurement (%)",
@@ -29,8 +30,8 @@ QUALITY_ROWS = (
     ),
     ("within_5pct_share", "the same within 5 % of the measurement (%)", 100.0),
     ("hole_area_m2", "area of the holes inside the surface (m²)", 1.0),
-    ("boundary_loops", "boundary loops", None),
-    ("boundary_length_m", "length of the boundary (m)", 1.0),
+    ("boundary_loops", "rims around holes and at the ends of the surface", None),
+    ("boundary_length_m", "length of the rims (m)", 1.0),
     ("non_manifold_edges", "edges with more than two faces", None),
     ("components", "connected pieces", None),
     ("area_m2", "area (m²)", 1.0),
@@ -40,17 +41,29 @@ QUALITY_ROWS = (
 )
 
 
-def write_reconstruction_report(result: Reconstruction, metrics: dict[str, Any], path: Path) -> None:
-    """Write the self-contained HTML report of a run to ``path``."""
-    write_page(path, f"PacketMesh: {metrics['scene']}", Markup("").join(_sections(result, metrics)))
+def write_reconstruction_report(
+    result: Reconstruction, metrics: dict[str, Any], path: Path, measures: dict[str, Any] | None = None
+) -> None:
+    """Write the self-contained HTML report of a run to ``path``.
+
+    Args:
+        result: the reconstruction.
+        metrics: its metrics.
+        path: file of the report.
+        measures: record of what was measured on the surface (``app.measuring.results``); None for nothing.
+    """
+    sections = Markup("").join(_sections(result, metrics, measures))
+    write_page(path, f"PacketMesh: {metrics['scene']}", sections)
 
 
-def _sections(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[Markup]:
+def _sections(
+    result: Reconstruction, metrics: dict[str, Any], measures: dict[str, Any] | None
+) -> Iterator[Markup]:
     before, after = metrics["surface_before"], metrics["surface_after"]
     yield Markup("<h1>{}</h1>").format(metrics["scene"])
     yield Markup(
-        '<p class="lead">Preset <code>{}</code>. Of all camera rays, <b>{:.1%}</b> miss the surface before '
-        "fusion and <b>{:.1%}</b> after it.{}{}</p>"
+        '<p class="lead">Preset <code>{}</code>. Of all camera rays, <b>{:.1%}</b> are without a surface '
+        "before fusion and <b>{:.1%}</b> after it.{}{}</p>"
     ).format(
         metrics["preset"],
         before["no_hit_ray_share"],
@@ -61,6 +74,8 @@ def _sections(result: Reconstruction, metrics: dict[str, Any]) -> Iterator[Marku
     yield from _recording(metrics)
     yield from _doubts(metrics)
     yield from _surfaces(result, before, after)
+    if measures is not None:
+        yield from measured_sections(measures)
     yield from _truth(metrics)
     yield from _nodes(result, metrics)
     yield from _registrations(metrics)
@@ -123,7 +138,7 @@ def _surfaces(result: Reconstruction, before: dict[str, Any], after: dict[str, A
     yield Markup("<h2>The surface before and after fusion</h2>")
     radii = ", ".join(f"{1000 * radius:.1f}" for radius in before["radii_m"])
     yield Markup(
-        '<p class="note">Ball radii {} mm for both. Magenta: a ray that misses the surface. '
+        '<p class="note">Ball radii {} mm for both. Magenta: a ray without a surface. '
         "First with the photographs' colours, from a place next to the first camera; then from {}.</p>"
     ).format(radii, _whose(len(result.placement.placed(result.rig.frames))))
     frames, placed = result.placement.placed(result.rig.frames), cameras_of(result.rig, result.placement)
@@ -178,7 +193,7 @@ def _truth(metrics: dict[str, Any]) -> Iterator[Markup]:
 
 def _truth_label(key: str) -> str:
     known = {
-        "no_hit_ray_share": "rays that miss the surface but not the truth (%)",
+        "no_hit_ray_share": "rays without a surface where the truth has one (%)",
         "within_5pct_depth_share": "rays that hit within 5 % of the true depth (%)",
         "median_depth_error_m": "median depth error of the rays that hit (mm)",
     }

@@ -12,6 +12,7 @@ from typing import Any, get_args
 from app.compute.records import Shown
 from app.compute.state import Spec
 from app.compute.store import Store
+from app.measuring.results import measures_of
 from app.reports.reconstruction import write_reconstruction_report
 from packetmesh.files import write_json
 from packetmesh.progress import Progress
@@ -58,18 +59,26 @@ def export_job(store: Store, spec: Spec, name: str, shown: Shown = "after") -> G
                 write_json(path, metrics)
             else:
                 baseline = (yield from store.stage(spec, shown)) if shown in get_args(Baseline) else None
+                measures = (yield from measures_of(store, spec)) if spec.tape.taken else None
                 yield Progress("writing the run folder", 0.8)
-                _archive(result, metrics, path, shown, baseline)
+                _archive(result, metrics, path, shown, baseline, measures)
         return path.read_bytes()
 
 
 def _archive(
-    result: Reconstruction, metrics: dict[str, Any], path: Path, shown: Shown, baseline: SurfaceResult | None
+    result: Reconstruction,
+    metrics: dict[str, Any],
+    path: Path,
+    shown: Shown,
+    baseline: SurfaceResult | None,
+    measures: dict[str, Any] | None,
 ) -> None:
     run = path.parent / "run"
     run.mkdir()
     write_run_folder(result, metrics, run)
-    write_reconstruction_report(result, metrics, run / "report.html")
+    write_reconstruction_report(result, metrics, run / "report.html", measures)
+    if measures is not None:
+        write_json(run / "measures.json", measures)
     if baseline is not None:
         write_baseline(shown, baseline, result, run)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:

@@ -65,7 +65,7 @@ def moment_table(view: DeliveryView, now: MomentView | None, now_ns: int) -> Mar
             "–",
         ),
         (
-            "Rays without surface",
+            "Rays without a surface",
             "Share of the rays through all cameras' pixels that meet no triangle: the holes.",
             *_shares(
                 None if now is None else now.no_hit_share,
@@ -174,7 +174,8 @@ def difference(before: DeliveryView, after: DeliveryView, what: str) -> Markdown
         f"it took {two.energy_j:.0f} J instead of {one.energy_j:.0f} J",
     ]
     mesh = [
-        f"{_percent(two.no_hit_share)} of the rays meet no surface instead of {_percent(one.no_hit_share)}"
+        f"{_percent(two.no_hit_share)} of the rays are without a surface instead of "
+        f"{_percent(one.no_hit_share)}"
     ]
     if one.f_score is not None and two.f_score is not None:
         mesh.append(f"the F-score is {_percent(two.f_score)} instead of {_percent(one.f_score)}")

@@ -15,7 +15,6 @@ import numpy as np
 from app.compute.state import Spec
 from app.compute.store import Store
 from app.drawing.colors import NEUTRAL
-from app.drawing.timeline import Lane
 from app.reports.captioned import png
 from app.reports.delivery import delivery_animation, delivery_page
 from app.reports.hand_out import HandOut
@@ -24,7 +23,7 @@ from app.reports.timeline_picture import timeline_picture
 from app.screens.network.delivery_job import cloud_of, moment_of, sending_of
 from app.screens.network.delivery_view import DeliveryView
 from app.screens.network.job import network_job
-from app.screens.network.lanes import frames_lane, growth_lane, run_curves, run_names
+from app.screens.network.lanes import lanes_of
 from app.screens.network.packets import Frames
 from app.screens.network.view import NetworkView
 from network_sim.simulate import iterate_simulation
@@ -100,18 +99,15 @@ def cloud_job(store: Store, spec: Spec, index: int) -> Content:
 def timeline_job(store: Store, spec: Spec, labels: tuple[str, ...]) -> Content:
     """Return the whole timeline as PNG; the labels are those of compared runs."""
     seen = yield from network_job(store, spec)
-    lanes: list[Lane]
+    delivery = seen if isinstance(seen, DeliveryView) else None
     if isinstance(seen, DeliveryView):
         runs: tuple[NetworkView, ...] = (seen.run,)
-        lanes = [frames_lane(seen.run, Frames(seen.run)), growth_lane(seen)]
         title = f"{spec.source.title}: frames on the air, and what has arrived"
     else:
         runs = tuple(replace(run, label=label) for run, label in zip(seen, labels, strict=True))
-        named = zip(runs, run_names(runs), strict=True)
-        lanes = [frames_lane(run, Frames(run), name) for run, name in named]
-        lanes += [run_curves(runs[0])] if len(runs) == 1 else []
         title = f"Frames on the air: {', '.join(labels)}"
     start_ns, end_ns = min(run.start_ns for run in runs), max(run.end_ns for run in runs)
+    lanes = lanes_of(delivery, runs, [Frames(run) for run in runs])
     return png(timeline_picture(title, lanes, start_ns, end_ns))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.drawing.colors import DELIVERED, INFERRED, LOSS, SOURCE
-from app.drawing.timeline import Curve, CurvesLane, FramesLane
+from app.drawing.timeline import Curve, CurvesLane, FramesLane, Lane
 from app.screens.network.delivery_view import DeliveryView
 from app.screens.network.labels import CAUSES
 from app.screens.network.packets import Frames
@@ -18,6 +18,16 @@ from pipeline.types import FloatArray
 
 HALTS = (What.AIR, What.LOSS, What.DROP, What.ARRIVE, What.EXPIRE)
 """Events at which the step buttons stop."""
+
+
+def lanes_of(
+    delivery: DeliveryView | None, runs: Sequence[NetworkView], frames: Sequence[Frames]
+) -> list[Lane]:
+    """Return the lanes of a delivery, or of runs on streets, each with its frames."""
+    if delivery is not None:
+        return [frames_lane(delivery.run, frames[0]), growth_lane(delivery)]
+    lanes: list[Lane] = [frames_lane(*one) for one in zip(runs, frames, run_names(runs), strict=True)]
+    return [*lanes, run_curves(runs[0])] if len(runs) == 1 else lanes
 
 
 def frames_lane(view: NetworkView, frames: Frames, run: str = "") -> FramesLane:
@@ -57,7 +67,7 @@ def _growth(view: DeliveryView) -> list[Curve]:
     arrived = 100.0 * view.arrived_bytes / max(view.total_bytes, 1)
     curves = [
         Curve("bytes", "%", DELIVERED, view.arrived_ns, arrived, 0.0, 100.0, 0),
-        Curve("rays without surface", "%", LOSS, t_ns, holes, 0.0, 100.0, 0),
+        Curve("rays without a surface", "%", LOSS, t_ns, holes, 0.0, 100.0, 0),
     ]
     if np.isfinite(score).any() or not view.moments:
         curves.insert(1, Curve("F-score", "%", INFERRED, t_ns, score, 0.0, 100.0, 0))

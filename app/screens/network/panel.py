@@ -30,7 +30,7 @@ from app.screens.network.draw import NetworkDrawing, look_at_ground, road_legend
 from app.screens.network.export import delivery_offers, network_offers
 from app.screens.network.inspector import Inspector
 from app.screens.network.labels import NETWORKS, ORIGIN, RUNNING, STREET_TEXT, TEXT, WALK_TEXT
-from app.screens.network.lanes import frames_lane, growth_lane, run_curves, run_names, stops_ns
+from app.screens.network.lanes import lanes_of, stops_ns
 from app.screens.network.lesson import (
     CROSSING,
     LOST_PACKET,
@@ -41,6 +41,7 @@ from app.screens.network.lesson import (
     numbers,
     street_numbers,
 )
+from app.screens.network.measures import MomentMeasures
 from app.screens.network.numbers import metric_tables, runs_summary, verdict
 from app.screens.network.packets import Frames, legend_html
 from app.screens.network.setup import NetworkSetup
@@ -94,8 +95,7 @@ class NetworkPanel(Panel):
         self._lessons = {}
         for key, path in LESSONS.items():
             lesson = read_lesson(path, SETTINGS, NetworkLook(), NUMBERS)
-            take = partial(self._take_look, key)
-            self._lessons[key] = LessonFolder(ui, lesson, take, self._lesson_numbers)
+            self._lessons[key] = LessonFolder(ui, lesson, partial(self._take_look, key), self._lesson_numbers)
         self._setup = NetworkSetup(ui, self._resting.restart)
         self._about = gui.add_markdown(Markdown(""))
         self._status = gui.add_markdown(Markdown("Nothing is sent yet."))
@@ -104,12 +104,14 @@ class NetworkPanel(Panel):
             self._setup.add_what_if(f"{self.drawn_below}/what-if")
         self._inspector = Inspector(ui, self.session)
         self._legend = gui.add_html(Markup(""))
+        self._measures = MomentMeasures(self.session)
+        ui.when_clicked(self.drawn_below, self._measures.clicked)
         with gui.add_folder("All other numbers", expand_by_default=False):
             self._others = gui.add_html(Markup(""))
         with gui.add_folder("Advanced", expand_by_default=False):
             self._setup.add_advanced()
         self._dock = Dock(ui, self._moved, self._inspector.pick)
-        self.in_address |= self._lessons
+        self.in_address |= self._lessons | {"measure": self._measures}
         self.in_address["net"] = CallbackState(self._setup.place, self._take_place)
         self.in_address["t"] = CallbackState(self._moment, self._take_moment)
 
@@ -199,8 +201,7 @@ class NetworkPanel(Panel):
 
     def offers(self) -> tuple[Offers, ...]:
         """Return the offers of the delivery or runs shown, once they are complete."""
-        session = self.session
-        if not session.results.fresh("network", session.spec):
+        if not self.session.results.fresh("network", self.session.spec):
             return ()
         if self._delivery is None:
             return (network_offers(self._labels, self.command),) if self._runs else ()
@@ -267,6 +268,7 @@ class NetworkPanel(Panel):
     def _take_runs(self, runs: tuple[NetworkView, ...]) -> None:
         self._runs, self._delivery, self._before = runs, None, None
         self._setup.what_if.clear()
+        self._measures.follow(None, None)
         self._frames = [Frames(run) for run in runs]
         self._status.content = runs_summary(runs)
         self._table.content, self._others.content = metric_tables(runs)
@@ -353,11 +355,7 @@ class NetworkPanel(Panel):
         self._moved(self._dock.now_ns)
 
     def _lanes(self) -> list[Lane]:
-        if self._delivery is not None:
-            return [frames_lane(self._delivery.run, self._frames[0]), growth_lane(self._delivery)]
-        named = zip(self._runs, self._frames, run_names(self._runs), strict=True)
-        lanes: list[Lane] = [frames_lane(*one) for one in named]
-        return [*lanes, run_curves(self._runs[0])] if len(self._runs) == 1 else lanes
+        return lanes_of(self._delivery, self._runs, self._frames)
 
     def _next_name(self) -> str:
         self._drawn += 1
@@ -369,6 +367,7 @@ class NetworkPanel(Panel):
         self._runs, self._delivery, self._drawing, self._streaming = (), None, None, False
         self._before = None
         self._setup.what_if.clear()
+        self._measures.follow(None, None)
         self._inspector.load(())
         self._dock.show(False)
         for html in (self._table, self._others, self._difference, self._legend):
@@ -396,5 +395,6 @@ class NetworkPanel(Panel):
         moment = view.moment_at(self._dock.now_ns)
         with self.ui.atomic():
             drawing.show_moment(moment, most_j(view))
+            self._measures.follow(view, moment)
             self._table.content = moment_table(view, moment, self._dock.now_ns)
             self._others.content = more_rows(view, moment) + metric_tables((view.run,))[1]

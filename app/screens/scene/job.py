@@ -6,7 +6,7 @@ from collections.abc import Generator
 
 import numpy as np
 
-from app.compute.records import SCREEN_POINTS, AveragedView, Picture, SceneNode, SceneView, sample
+from app.compute.records import AveragedView, Picture, Sample, SceneNode, SceneView, grid_step, on_grid
 from app.compute.state import Spec
 from app.compute.store import Store
 from app.drawing.pictures import depth_picture, depth_range_m
@@ -19,8 +19,8 @@ from pipeline.types import RgbdFrame, Rig
 def scene_job(store: Store, spec: Spec) -> Generator[Progress, None, SceneView]:
     """Return the rig as it was loaded."""
     rig = yield from store.stage(spec, "rig")
-    most = SCREEN_POINTS // len(rig.frames)
-    nodes = tuple(_scene_node(frame, most) for frame in rig.frames)
+    step = grid_step(sum(int(frame.depth.valid.sum()) for frame in rig.frames))
+    nodes = tuple(_scene_node(frame, step) for frame in rig.frames)
     notes = rig.notes if rig.walk is None else (*walk_sentences(rig.walk, len(nodes)), *rig.notes)
     return SceneView(
         spec.source.title, nodes, rig.truth is not None, notes, rig.walk is not None, averaged_view(rig)
@@ -43,15 +43,19 @@ def averaged_view(rig: Rig) -> AveragedView | None:
     )
 
 
-def _scene_node(frame: RgbdFrame, most: int) -> SceneNode:
+def _scene_node(frame: RgbdFrame, step: int) -> SceneNode:
     cloud = back_project(frame)
+    assert cloud.pixels is not None
+    drawn = cloud.select(on_grid(cloud.pixels, step))
     range_m = depth_range_m(frame.depth)
     camera = frame.intrinsics
     return SceneNode(
         name=frame.name,
         color=Picture(frame.rgb, f"Colour image of {frame.name}"),
         depth=depth_picture(frame.depth, range_m, "Sensor depth"),
-        sensor=sample(cloud.points_m, cloud.colors, most),
+        sensor=Sample(
+            drawn.points_m.astype(np.float32), drawn.colors, len(cloud), spacing=step / camera.fx_px
+        ),
         T_world_camera=frame.T_world_camera,
         fov_rad=2.0 * float(np.arctan2(camera.height_px / 2, camera.fy_px)),
         aspect=camera.width_px / camera.height_px,

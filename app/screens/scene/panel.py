@@ -11,7 +11,8 @@ import numpy as np
 from app.compute.records import SceneView
 from app.compute.state import Spec, Step
 from app.drawing.cameras import add_camera
-from app.drawing.clouds import add_cloud, clear
+from app.drawing.clouds import add_sensor_cloud, clear
+from app.measuring.folder import MeasureFolder
 from app.screens.scene.own import OwnFolder
 from app.screens.scene.recording import ReadRecording
 from app.web.markup import Markdown, Markup
@@ -23,12 +24,12 @@ from pipeline.sources import ImagePair, Recorded, RigFolder, demo_of
 
 TEXT = Markdown(
     """**What you see.** Each camera node delivers a colour image and a depth image. The points are the
-depth pixels at their places in space; gaps are pixels that the sensor could not measure. Go on with
+depth pixels at their places in space; holes are pixels that the sensor could not measure. Go on with
 **Depth**."""
 )
 WALK_TEXT = Markdown(
     """**What you see.** One camera walked through the room; each node is a keyframe of its recording, with
-its points and its pose as tracking found it. Gaps are pixels that the sensor could not measure. Go on with
+its points and its pose as tracking found it. Holes are pixels that the sensor could not measure. Go on with
 **Fuse** to see the walk."""
 )
 TITLES = {name: scene.title for name, scene in DEMOS.items()}
@@ -68,6 +69,11 @@ class ScenePanel(Panel):
         self._own = OwnFolder(
             self.ui, self.session.folder, self.session.new_folder, self._use_pair, self._read_recording
         )
+        self._measures = MeasureFolder(
+            self.session, "/scene/measures", "scene.measure_job:measure_job", without=("Hole", "Box")
+        )
+        self.in_address["measure"] = self._measures
+        self.ui.when_clicked(self.drawn_below, self._measures.clicked)
         self._notes = gui.add_markdown(Markdown(""))
         self._color = gui.add_image(EMPTY, label="Colour image")
         self._depth = gui.add_image(EMPTY, label="Sensor depth", format="png")
@@ -80,6 +86,8 @@ class ScenePanel(Panel):
         if title not in self._demo.options:
             self._demo.options = (title, *TITLES.values())
         self._demo.value = title
+        if not self.session.results.fresh("scene", spec):
+            self._measures.unload()
 
     def on_view(self, step: Step, view: Any) -> None:
         """Draw a newly loaded rig."""
@@ -90,7 +98,7 @@ class ScenePanel(Panel):
             clear(self.scene, "/scene")
             self._text.content = WALK_TEXT if view.has_walk else TEXT
             for node in view.nodes:
-                add_cloud(self.scene, f"/scene/{node.name}/cloud", node.sensor, node.T_world_camera)
+                add_sensor_cloud(self.scene, f"/scene/{node.name}/cloud", node.sensor, node.T_world_camera)
                 add_camera(self.scene, f"/scene/{node.name}/camera", node, node.T_world_camera)
             self._notes.content = Markdown("\n\n").join(
                 Markdown("**{}.**").format(note) for note in view.notes
@@ -98,6 +106,7 @@ class ScenePanel(Panel):
             names = tuple(node.name for node in view.nodes)
             if names != self._node.options:
                 self._node.options = names
+            self._measures.load()
         self.session.frame_view(anew=True)
         self._show_node()
 

@@ -1,1 +1,1 @@
-"""The Surface screen: a ball rolls over the points; its radius decides which gaps become holes."""
+"""The Surface screen: a ball rolls over the points; its radius decides where holes stay open."""

@@ -9,6 +9,7 @@ from app.screens.surface.view import SweepView
 from app.web.markup import Markdown, Markup
 from app.window.tables import number, table
 from app.window.ui import Ui
+from pipeline.config import SurfaceConfig
 from pipeline.surface.findings import Suggestion
 
 TEXT = Markdown(
@@ -36,6 +37,7 @@ class AdviceFolder:
         self._on_sweep, self._on_radius_m = on_sweep, on_radius_m
         self._radii_m: dict[str, float] = {}
         self._view: SweepView | None = None
+        self._cloud: tuple[int, int] | None = None
         gui = ui.gui
         with gui.add_folder("Which radius?", expand_by_default=False):
             gui.add_markdown(TEXT)
@@ -77,6 +79,13 @@ class AdviceFolder:
         self._draw()
         running = Markdown("{} of {} balls have rolled.").format(len(view.points), view.planned)
         self._status.content = sweep_sentence(view) if view.done else running
+
+    def keep_for(self, surface: SurfaceConfig) -> None:
+        """Remove the radii if these settings give another cloud than the settings before."""
+        cloud = surface.max_points, surface.smoothing_passes
+        if cloud != self._cloud:
+            self.forget()
+        self._cloud = cloud
 
     def forget(self) -> None:
         """Remove the radii, which belong to another cloud."""

@@ -39,7 +39,7 @@ def _note(clouds: FusedCloud, name: BaselineName, spec: Spec) -> str:
         return (
             f"Open3D's alpha shape (Edelsbrunner and Mücke 1994) with alpha {100 * largest_m:.3g} cm, the "
             "radius of the largest ball: it keeps only faces of small tetrahedra, so a rough wall "
-            "becomes a slab with two sides, and a smooth wall has gaps that the full alpha shape would "
+            "becomes a slab with two sides, and a smooth wall has holes that the full alpha shape would "
             "not have."
         )
     return (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from app.compute.measures import Tape
 from app.screens.surface.labels import BASELINES, COLORINGS
 from app.screens.surface.view import Coloring
 from app.web.markup import Markdown
@@ -12,6 +13,9 @@ between before and after; an animation of a flight along the cameras, for slides
 NOTE = Markdown(
     "No command writes these files: they show the current view. Their meshes are those of the command above."
 )
+
+MEASURES_HINT = """The measures on the Surface screen: their points, numbers in metres, degrees and square
+metres with 95 % intervals, and what was guessed. They are also in the run folder and in its report."""
 
 
 def surface_offers(shown: str, colors: str, rims: bool) -> Offers:
@@ -24,3 +28,11 @@ def surface_offers(shown: str, colors: str, rims: bool) -> Offers:
         Offer("This view, PNG", "view.png", f"{job}:view_job", (coloring, rims), photographs=True),
     )
     return Offers("To show", HINT, files, note=NOTE)
+
+
+def measure_offers(tape: Tape) -> tuple[Offers, ...]:
+    """Return the offer of the list of measures; none without a measure."""
+    if not tape.taken:
+        return ()
+    files = (Offer("JSON", "measures.json", "surface.measure_job:measures_job"),)
+    return (Offers("Measures", MEASURES_HINT, files),)

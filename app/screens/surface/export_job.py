@@ -15,8 +15,10 @@ from app.compute.state import Spec
 from app.compute.store import Store
 from app.drawing.colors import BACKGROUND, LOSS
 from app.drawing.meshes import VIOLET
+from app.measuring.results import measures_of
 from app.reports.captioned import captioned, gif, on_background, png
 from app.reports.hand_out import viewpoint_of
+from app.reports.measures import measured_sentence
 from app.reports.surface_page import Side, SurfacePage, surface_page
 from app.screens.surface.labels import NAMES, legend_of
 from app.screens.surface.paint_job import colored_glb, vertex_colors
@@ -48,12 +50,13 @@ def page_job(store: Store, spec: Spec, coloring: Coloring) -> Generator[Progress
     left, right = _pair(spec.shown)
     one, other, rig, placement = yield from store.stages(spec, left, right, "rig", "placement")
     _check(one, other)
+    measured = measured_sentence((yield from measures_of(store, spec))) if spec.tape.taken else ""
     yield Progress("writing the page", 0.8)
     points_m = np.vstack([surface.vertices_m for surface in (one, other)])
     cameras = cameras_of(rig, placement)
     page = SurfacePage(
         title=rig.name,
-        sentence=_sentence(len(rig.frames)),
+        sentence=f"{_sentence(len(rig.frames))} {measured}".rstrip(),
         left=_side(left, one, coloring, rig, placement),
         right=_side(right, other, coloring, rig, placement),
         view=viewpoint_of([camera.T_world_camera for camera in cameras], points_m),
@@ -111,7 +114,7 @@ def _sentence(cameras: int) -> str:
 
 
 def _side(name: Shown, surface: SurfaceResult, coloring: Coloring, rig: Rig, placement: Placement) -> Side:
-    note = f"{100 * surface.quality.no_hit_ray_share:.1f} % of the cameras' rays meet no surface"
+    note = f"{100 * surface.quality.no_hit_ray_share:.1f} % of the cameras' rays are without a surface"
     return Side(NAMES[name], note, colored_glb(surface, coloring, rig, placement))
 
 

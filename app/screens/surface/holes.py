@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from app.screens.surface.draw_holes import HoleDrawing, picked_hole
+from app.drawing.picking import picked_hole
+from app.screens.surface.draw_holes import HoleDrawing
 from app.screens.surface.view import ExplainView, FilledView, HoleView, Which
 from app.web.markup import Markdown, Markup
 from app.window.tables import number, table
@@ -15,9 +16,9 @@ from pipeline.surface.findings import Explanation, RayParts
 from pipeline.types import FloatArray
 
 TEXT = Markdown(
-    """**Click a red rim in the picture, or choose one here**, and read its cause. The list has all boundary
-loops of the mesh, also those that no camera sees: a *hole* is a loop shorter than 1 m with surface all
-around it; at a *rim* the surface ends, or the loop is longer."""
+    """**Click a red rim in the picture, or choose one here**, and read its cause. The list has all rims
+of the mesh, also those that no camera sees: that of a *hole* is shorter than 1 m with surface all around it;
+at an *outer rim* the surface ends, or the rim is longer."""
 )
 NONE = "none"
 LISTED_HOLES, LISTED_RIMS = 30, 10
@@ -62,7 +63,7 @@ class HolesFolder:
         with gui.add_folder("Holes", expand_by_default=False):
             gui.add_markdown(TEXT)
             self._list = gui.add_dropdown(
-                "Hole", [NONE], hint="Holes by area, the largest first, then rims by length, at the end."
+                "Hole", [NONE], hint="Holes by area, the largest first, then outer rims by length."
             )
             ui.when_changed(self._list, self._listed)
             steps = {"Previous": lambda: self._step(-1), "Next": lambda: self._step(1)}
@@ -80,8 +81,8 @@ class HolesFolder:
             FILL_MOST_CM,
             5.0,
             0.0,
-            hint="Closes every hole after fusion whose loop is at most this long, with the least area; 0 "
-            "is off. Rims, where the surface ends, stay open.",
+            hint="Closes every hole after fusion whose rim is at most this long, with the least area; 0 "
+            "is off. Outer rims, where the surface ends, stay open.",
         )
         ui.when_changed(self._fill, self._dragged)
         self._filled = ui.gui.add_markdown(FILL_OFF)
@@ -212,7 +213,7 @@ class HolesFolder:
         if self._which is None:
             return Markdown("Click a red rim, or show one surface alone to have its holes listed here.")
         rims = sum(hole.rim for hole in self._shown)
-        counts = f"{_count(len(self._shown) - rims, 'hole')} and {_count(rims, 'rim')}"
+        counts = f"{_count(len(self._shown) - rims, 'hole')} and {_count(rims, 'outer rim')}"
         return Markdown("{} {} fusion; choose one.").format(counts, self._which)
 
     def _dragged(self) -> None:
@@ -233,7 +234,7 @@ def _count(number_of: int, what: str) -> str:
 def hole_name(index: int, hole: HoleView) -> str:
     """Return a hole's number, kind, length and area as text."""
     if hole.rim:
-        return f"{index + 1}: rim, {100.0 * hole.length_m:,.0f} cm long"
+        return f"{index + 1}: outer rim, {100.0 * hole.length_m:,.0f} cm long"
     return f"{index + 1}: {100.0 * hole.length_m:,.0f} cm around, {1e4 * hole.area_m2:,.1f} cm²"
 
 
@@ -279,8 +280,8 @@ def parts_sentence(parts: RayParts) -> Markdown:
     missed = parts.missed_measured + parts.missed_inferred + parts.missed_unknown
     return Markdown(
         "**All pixel rays, after fusion:** {} end on measured surface and {} on inferred surface. {} "
-        "miss it: {} where the sensor measured depth, {} where there is only inferred depth, {} where "
-        "there is no depth."
+        "are without a surface: {} where the sensor measured depth, {} where there is only inferred "
+        "depth, {} where there is no depth."
     ).format(
         share(parts.on_sensor),
         share(parts.on_inferred),
@@ -303,7 +304,7 @@ def filled_sentence(view: FilledView) -> Markdown:
     )
     area, missed = number(view.area_m2, 1, "cm²", 1e4), view.mesh.quality.no_hit_ray_share
     return Markdown(
-        "**{} filled, {}.** The magenta surface is invented, not measured. With it {} of the rays miss "
-        "the surface{}. Compare with the surfaces before and after fusion: fusion adds surface inferred "
-        "from the colour image, not extrapolated from the rim."
+        "**{} filled, {}.** The magenta surface is invented, not measured. With it {} of the rays "
+        "are without a surface{}. Compare with the surfaces before and after fusion: fusion adds surface "
+        "inferred from the colour image, not extrapolated from the rim."
     ).format(_count(view.holes, "hole"), area, number(missed, 1, "%", 100.0), worth)

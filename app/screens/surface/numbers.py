@@ -21,8 +21,8 @@ def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_trut
 
     rows = [
         row(
-            "No-hit rays",
-            "Share of the cameras' pixel rays that miss the surface: the visible holes.",
+            "Rays without a surface",
+            "Share of the cameras' pixel rays that meet no surface: the holes that the cameras see.",
             lambda m: number(m.quality.no_hit_ray_share, 1, "%", 100),
         ),
         row(
@@ -31,14 +31,9 @@ def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_trut
             lambda m: UNKNOWN if m.quality.gaps is None else number(m.quality.gaps.area_m2, 2, "m²"),
         ),
         row(
-            "Large holes",
-            "Holes of 100 cm² or more, as large as a hand.",
+            "Holes from 100 cm²",
+            "Holes as large as a hand or larger. Smaller ones count in the area only.",
             lambda m: UNKNOWN if m.quality.gaps is None else f"{m.quality.gaps.large:,}",
-        ),
-        row(
-            "All holes",
-            "Holes of any size, down to a single ray.",
-            lambda m: UNKNOWN if m.quality.gaps is None else f"{m.quality.gaps.count:,}",
         ),
         row(
             "On inferred surface",
@@ -60,7 +55,7 @@ def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_trut
         row("Triangles", "Triangles of the surface.", lambda m: f"{m.triangles:,}"),
         row(
             "Rim length",
-            "Length of all edges with one triangle: around holes, at the borders of the scene, and where "
+            "Length of all edges with one triangle: around holes, at the outer rim of the scene, and where "
             "an object occludes its background.",
             lambda m: number(m.quality.boundary_length_m, 1, "m"),
         ),
@@ -106,18 +101,21 @@ def quick_line(view: PaintedView) -> Markup:
 
 
 def _rule(view: SurfaceView) -> Markup:
-    """Return the rule for holes and, if there are more after fusion, the reason."""
+    """Return the rule for holes, and the number of small ones, which the table leaves out."""
     text = Markup(
-        "A <b>hole</b> is a patch of a camera's picture, of any size, whose rays miss the surface. The "
-        "outer rim of the scene is not a hole."
+        "A <b>hole</b> is a patch of a camera's picture whose rays are without a surface. The outer rim of "
+        "the scene is not a hole."
     )
     before, after = (mesh and mesh.quality.gaps for mesh in (view.before, view.after))
-    if before and after and after.count > before.count and after.area_m2 < before.area_m2:
+    if before and after:
         text += Markup(
-            " Fusion leaves <b>more but smaller</b> ones: it fills the middle of a large hole and leaves "
-            "a seam of tiny ones where inferred and measured surface do not quite meet. Their area falls "
-            "from {:.2f} to {:.2f} m²."
-        ).format(before.area_m2, after.area_m2)
+            " There are {:,} smaller holes before and {:,} after fusion, most of them of a few rays."
+        ).format(before.count - before.large, after.count - after.large)
+        if after.count > before.count and after.area_m2 < before.area_m2:
+            text += Markup(
+                " Fusion fills the middle of a hole and leaves a seam of tiny ones where inferred and "
+                "measured surface do not quite meet."
+            )
     return Markup("<div style='padding: 0.2em 0.8em; font-size: 13px'>{}</div>").format(text)
 
 

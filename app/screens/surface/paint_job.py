@@ -14,7 +14,7 @@ from app.drawing.colors import DISTANCE_STOPS, INFERRED, LOSS, MOST_DISTANCE_M, 
 from app.drawing.glb import lines_glb
 from app.drawing.meshes import photographed_glb, rim_segments_m, surface_glb
 from app.screens.surface.unused import POINT_SHARE, resting_ball_m, unused_view
-from app.screens.surface.view import Coloring, PaintedMesh, PaintedView, PaintRequest, Which
+from app.screens.surface.view import Coloring, PaintedMesh, PaintedView, PaintRequest, Ray, Which
 from packetmesh.progress import Progress
 from pipeline.kernels.rays import Camera
 from pipeline.placement.outcome import Placement
@@ -25,7 +25,7 @@ from pipeline.surface.fill import without_seams
 from pipeline.surface.radii import spacing
 from pipeline.surface.truth import distances_to_truth_m
 from pipeline.surface.voxel import voxel_average, voxel_for_count
-from pipeline.types import ByteArray, PointCloud, PointSource, Rig, Surface
+from pipeline.types import ByteArray, FloatArray, PointCloud, PointSource, Rig, Surface
 
 PHOTOGRAPHED: tuple[Coloring, ...] = ("photo", "violet", "color")
 """Colourings that contain a camera's light and shadow."""
@@ -61,8 +61,15 @@ def paint_job(store: Store, spec: Spec, request: PaintRequest) -> Generator[Prog
         name: unused_view(thin[name], surface, POINT_SHARE * spacing_m, QUICK_UNUSED)
         for name, surface in surfaces.items()
     }
-    ball_m = None if request.ray is None else resting_ball_m(thin[first], request.ray, request.radius_m)
-    return replace(view, unused=unused, ball_m=ball_m)
+    return replace(view, unused=unused)
+
+
+def ball_job(
+    store: Store, spec: Spec, request: PaintRequest, ray: Ray
+) -> Generator[Progress, None, FloatArray | None]:
+    """Return (3,) the centre of a quick look's ball at rest where a ray meets the cloud; None if nowhere."""
+    thin = yield from _thinned(store, spec, request.most_points)
+    return resting_ball_m(thin[request.which[0]], ray, request.radius_m or 0.0)
 
 
 def _spacing_m(store: Store, spec: Spec, most_points: int) -> Generator[Progress, None, float]:

@@ -7,20 +7,21 @@ from typing import Any, ClassVar
 
 from app.compute.records import SceneView
 from app.compute.state import Spec, Step
-from app.drawing.cameras import stage_of, turn
+from app.drawing.cameras import stage_of
 from app.lesson.files import Numbers, read_lesson
 from app.lesson.player import LessonFolder
 from app.screens.surface import labels
 from app.screens.surface.advice import AdviceFolder
 from app.screens.surface.baselines import Baselines
-from app.screens.surface.export import surface_offers
+from app.screens.surface.export import measure_offers, surface_offers
 from app.screens.surface.frames import FramesSlider
 from app.screens.surface.holes import HolesFolder
 from app.screens.surface.lesson import NUMBERS, SETTINGS, SHIPPED, SurfaceLook, numbers, surface_of
+from app.screens.surface.measures import SurfaceMeasures
 from app.screens.surface.numbers import quality_table, quick_line
 from app.screens.surface.quick import QuickLook
 from app.screens.surface.rolling import Walks
-from app.screens.surface.settings import ADVANCED, picked, slider_range_mm, with_rule
+from app.screens.surface.settings import ADVANCED, STEP_MM, on_slider_mm, picked, slider_range_mm, with_rule
 from app.screens.surface.stage import ChosenBall, SurfaceStage
 from app.screens.surface.sweep_plot import spacing_figure
 from app.screens.surface.view import (
@@ -53,12 +54,11 @@ class SurfacePanel(Panel):
         self._look: SurfaceLook | None = None
         self._quick_line = Markup("")
         self._by_click = self._quickly_drawn = False
-        self._thinning: tuple[int, int] | None = None
         self._key = session.spec.key("surface")
         gui.add_markdown(labels.TEXT)
         lesson = read_lesson(SHIPPED, SETTINGS, SurfaceLook(), NUMBERS)
         self._lesson = LessonFolder(self.ui, lesson, self._take_look, self._lesson_numbers)
-        self._radius = gui.add_slider("Radius (mm)", 1.0, 120.0, 0.5, 20.0, hint=labels.HINTS["Radius"])
+        self._radius = gui.add_slider("Radius (mm)", 1.0, 120.0, STEP_MM, 20.0, hint=labels.HINTS["Radius"])
         self.ui.when_changed(self._radius, self._dragged)
         self._frames = FramesSlider(session)
         rule = labels.RULE_NAMES[session.spec.config.surface.radius_rule]
@@ -75,13 +75,14 @@ class SurfacePanel(Panel):
         self.ui.when_changed(self._shown, self._picked_shown)
         for shown in (self._loops, self._unused):
             self.ui.when_changed(shown, self._arrange)
+        self._stage = SurfaceStage(self.scene)
+        self._measures = SurfaceMeasures(session)
         self._quick = gui.add_html(Markup(""))
         self._table = gui.add_html(Markup(""))
         self._histogram = gui.add_plotly(spacing_figure(None), aspect=0.62, config={"displayModeBar": False})
         self._build_folders()
-        self.in_address |= {STOP: self._lesson, "ball": self._walks.folder}
+        self.in_address |= {STOP: self._lesson, "ball": self._walks.folder, "measure": self._measures}
         self.in_address |= picked(self._shown, self._picked_shown, self._coloring, self._picked_coloring)
-        self._stage = SurfaceStage(self.scene)
         self._ball = ChosenBall(session, self._stage)
         self._baselines = Baselines(session, self._stage, self._quick, self._made)
         self.ui.when_clicked(self.drawn_below, self._clicked)
@@ -122,14 +123,12 @@ class SurfacePanel(Panel):
         self._controls.write(spec.config)
         self._frames.write(spec.config)
         self._rule.value = labels.RULE_NAMES[spec.config.surface.radius_rule]
-        thinning = (spec.config.surface.max_points, spec.config.surface.smoothing_passes)
-        if thinning != self._thinning:
-            self._advice.forget()
-        self._thinning = thinning
+        self._advice.keep_for(spec.config.surface)
         self._baselines.forget()
         if self._shown.value in labels.BASELINES:
             self._shown.value = labels.AFTER
         self._walks.close()
+        self._measures.follow()
         self._arrange()
 
     def on_view(self, step: Step, view: Any) -> None:
@@ -142,6 +141,7 @@ class SurfacePanel(Panel):
             self._frames.show(view.averaged)
         if step == "surface":
             self.on_partial(view)
+            self._measures.follow()
 
     def on_partial(self, view: SurfaceView) -> None:
         """Draw the partial result; while the radius is dragged, only keep it."""
@@ -155,7 +155,7 @@ class SurfacePanel(Panel):
             self._shown.value = labels.AFTER
             self._arrange()
         which, coloring = self._stage.which, labels.COLORINGS[self._coloring.value]
-        request = PaintRequest(which, coloring, self._radius.value / 1000.0, ray=self._ball.ray())
+        request = PaintRequest(which, coloring, self._radius.value / 1000.0)
         self._look_quickly.want(request)
         self.session.show_staleness()
 
@@ -175,7 +175,7 @@ class SurfacePanel(Panel):
 
     def _take_radius(self, radius_m: float) -> None:
         self.session.edit(with_rule("manual", 1000.0 * radius_m))
-        self._radius.value = round(2000.0 * radius_m) / 2.0
+        self._radius.value = on_slider_mm(radius_m)
 
     def _picked_rule(self) -> None:
         self.session.edit(with_rule(labels.RULES[self._rule.value], self._radius.value))
@@ -195,7 +195,7 @@ class SurfacePanel(Panel):
                 self._look_quickly.sent()
             if self.session.spec.config.surface.radius_rule != "manual":
                 self._radius.min, self._radius.max = slider_range_mm(view.spacing, view.radii_m)
-                self._radius.value = round(2000.0 * view.radii_m[-1]) / 2.0
+                self._radius.value = on_slider_mm(view.radii_m[-1])
             self._show_numbers()
             self._quick.content = Markup("")
             self._arrange()
@@ -225,7 +225,7 @@ class SurfacePanel(Panel):
         if coloring != "photo" and self.session.results.view("fuse") is not None:
             session = self.session
             request = PaintRequest(("after", "before"), coloring)
-            session.quick_job("surface.paint_job:paint_job", request, on_end=self._painted)
+            session.quick_job(request.job, request, on_end=self._painted, key=request.key(session.spec))
 
     def _painted(self, view: PaintedView | None) -> None:
         """Draw the painted surface, unless another one is due by now."""
@@ -238,7 +238,7 @@ class SurfacePanel(Panel):
             drawn = [mesh for which, mesh in view.meshes.items() if self._stage.draw(which, mesh, quick)]
             if quick:
                 self._stage.draw_unused(view.unused)
-                self._ball.show(view)
+                self._ball.show(view.request)
                 self._quickly_drawn = True
             self._look_quickly.sent([mesh.vertices for mesh in drawn if mesh.triangles] if quick else ())
         self._quick_line = quick_line(view) if quick else Markup("")
@@ -293,15 +293,15 @@ class SurfacePanel(Panel):
 
     def offers(self) -> tuple[Offers, ...]:
         """Return the offers of the surfaces as they are drawn."""
-        return (surface_offers(self._shown.value, self._coloring.value, bool(self._loops.value)),)
+        surface = surface_offers(self._shown.value, self._coloring.value, bool(self._loops.value))
+        return (surface, *measure_offers(self.session.spec.tape))
 
     # The folders.
 
     def _sweep(self) -> None:
-        session = self.session
-        if session.results.view("fuse") is not None:
+        if self.session.results.view("fuse") is not None:
             load = self._advice.load
-            session.side_job("surface.sweep_job:sweep_job", on_partial=load, on_end=load)
+            self.session.side_job("surface.sweep_job:sweep_job", on_partial=load, on_end=load)
 
     def _load_holes(self) -> None:
         if self._view is not None and self._view.holes:
@@ -309,8 +309,9 @@ class SurfacePanel(Panel):
             self._holes.load(self._view.holes, shown)
 
     def _clicked(self, origin_m: FloatArray, direction: FloatArray) -> None:
-        """Explain the hole that was clicked."""
-        if self._rolling.showing or self._shown.value in labels.BASELINES:
+        """Measure at the click, or explain the hole that was clicked."""
+        measures = self._measures.clicked(origin_m, direction)
+        if measures or self._rolling.showing or self._shown.value in labels.BASELINES:
             return
         self._ball.clicked(origin_m, direction)
         for which in self._stage.which:
@@ -333,11 +334,10 @@ class SurfacePanel(Panel):
         self._by_click = False
 
     def _fill(self, longest_m: float | None) -> None:
-        session = self.session
         if longest_m is None:
             self._filled(None)
         else:
-            session.side_job("surface.holes_job:fill_job", 100.0 * longest_m, on_end=self._filled)
+            self.session.side_job("surface.holes_job:fill_job", 100.0 * longest_m, on_end=self._filled)
 
     def _filled(self, view: FilledView | None) -> None:
         with self.ui.atomic():
@@ -350,11 +350,7 @@ class SurfacePanel(Panel):
 
     def look(self) -> bool:
         """Show a close-up's patch in the picture. False leaves the view to the session."""
-        focus = self._rolling.focus
-        if focus is not None:
-            for client in self.session.clients():
-                turn(client, *focus)
-        return focus is not None
+        return self._walks.look()
 
     def _take_look(self, look: SurfaceLook) -> None:
         """Set the controls for a stop of the lesson; parts that need the surface wait for it."""

@@ -71,7 +71,7 @@ class QuickLook:
             self._rolling, self._next = True, None
             self._submitted_s = time.monotonic()
             request = replace(request, most_points=self._detail.points)
-            session.quick_job("surface.paint_job:paint_job", request, on_end=self._came)
+            session.quick_job(request.job, request, on_end=self._came, key=request.key(session.spec))
 
     def _came(self, view: PaintedView | None) -> None:
         self._rolling = False

@@ -9,6 +9,7 @@ from collections.abc import Callable, Hashable
 import numpy as np
 
 from app.dock.dock import COUNT_NS, Dock
+from app.drawing.cameras import turn
 from app.drawing.clouds import clear
 from app.drawing.colors import DELIVERED, LOSS, NEUTRAL
 from app.drawing.timeline import Curve, CurvesLane
@@ -236,6 +237,14 @@ class Walks:
         self.folder.forget()
         if near:
             self._session.frame_view(anew=True)
+
+    def look(self) -> bool:
+        """Turn the view to a close-up's patch; False if there is none."""
+        focus = self.folder.focus
+        if focus is not None:
+            for client in self._session.clients():
+                turn(client, *focus)
+        return focus is not None
 
     def _watch(self, request: WalkRequest | None) -> None:
         session = self._session

@@ -14,6 +14,8 @@ from app.window.controls import Number
 from app.window.in_address import InAddress, Picked
 from pipeline.config import PipelineConfig, RadiusRule
 
+STEP_MM = 0.5
+"""Step of the radius slider, about a percent of a room's largest ball. A typed radius may have tenths."""
 ADVANCED = (
     Number(
         "Points",
@@ -40,6 +42,11 @@ def with_rule(rule: RadiusRule, radius_mm: float) -> Callable[[PipelineConfig], 
     """Return the edit that chooses a radius rule; the manual one rolls a single ball."""
     radii_m = (round(float(radius_mm), 3) / 1000.0,) if rule == "manual" else ()
     return lambda config: replace(config, surface=replace(config.surface, radius_rule=rule, radii_m=radii_m))
+
+
+def on_slider_mm(radius_m: float) -> float:
+    """Return the radius of the slider's step nearest to this one."""
+    return STEP_MM * round(1000.0 * radius_m / STEP_MM)
 
 
 def slider_range_mm(spacing: SpacingView, radii_m: Sequence[float]) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 import viser
@@ -12,7 +13,7 @@ from app.drawing.cameras import Stage
 from app.drawing.colors import SOURCE
 from app.screens.surface.draw import SurfaceDrawing
 from app.screens.surface.labels import AFTER, BASELINES, BEFORE, BOTH
-from app.screens.surface.view import PaintedMesh, PaintedView, Ray, UnusedView, Which
+from app.screens.surface.view import PaintedMesh, PaintRequest, Ray, UnusedView, Which
 from app.window.panel import PanelSession
 from pipeline.types import FloatArray
 
@@ -126,6 +127,7 @@ class ChosenBall:
     def __init__(self, session: PanelSession, stage: SurfaceStage) -> None:
         self._session, self._stage = session, stage
         self._clicked: tuple[FloatArray, FloatArray] | None = None
+        self._request: PaintRequest | None = None
 
     def clicked(self, origin_m: FloatArray, direction: FloatArray) -> None:
         """Put the ball where this ray meets the cloud; world frame."""
@@ -135,7 +137,7 @@ class ChosenBall:
         """Forget the clicked place, which belongs to another scene."""
         self._clicked = None
 
-    def ray(self) -> Ray | None:
+    def _ray(self) -> Ray | None:
         """Return the ray to its place, in the frame of the first surface shown; None without a browser."""
         seen = self._clicked or self._middle()
         if seen is None:
@@ -144,13 +146,21 @@ class ChosenBall:
         origin_m = origin_m - self._stage.offset_m(self._stage.which[0])
         return Ray(tuple(origin_m.tolist()), tuple(direction.tolist()))
 
-    def show(self, view: PaintedView) -> None:
-        """Draw the ball of a quick look."""
-        self._stage.draw_ball(view.ball_m, view.request.radius_m or 0.0)
+    def show(self, request: PaintRequest) -> None:
+        """Draw the ball of a quick look once its place is computed, unless it is hidden by then."""
+        self._request, ray = request, self._ray()
+        if ray is not None:
+            drawn = partial(self._draw, request)
+            self._session.quick_job("surface.paint_job:ball_job", request, ray, on_end=drawn)
 
     def hide(self) -> None:
         """Hide the ball."""
+        self._request = None
         self._stage.draw_ball(None, 0.0)
+
+    def _draw(self, request: PaintRequest, ball_m: FloatArray | None) -> None:
+        if request is self._request:
+            self._stage.draw_ball(ball_m, request.radius_m or 0.0)
 
     def _middle(self) -> tuple[FloatArray, FloatArray] | None:
         client = next(iter(self._session.clients()), None)

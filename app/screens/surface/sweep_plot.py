@@ -37,7 +37,7 @@ def sweep_figure(view: SweepView | None, below: str = WORK) -> go.Figure:
     figure = styled_figure(
         margin={"l": 48, "r": 48, "t": 20, "b": 36},
         xaxis=_radius_axis(view),
-        yaxis={"title": _colored_title(("no hit", NO_HIT), ("≤ 1 cm, %", ACCURATE)), "range": [0, 104]},
+        yaxis={"title": _colored_title(("rays without", NO_HIT), ("≤ 1 cm, %", ACCURATE)), "range": [0, 104]},
         yaxis2={"title": _colored_title((left, LEFT)), "rangemode": "tozero"},
         yaxis3={"title": _colored_title((right, RIGHT)), "rangemode": "tozero", "showgrid": False},
         showlegend=False,
@@ -58,7 +58,7 @@ def _fill(figure: go.Figure, view: SweepView, below: str) -> None:
     rows = view.points
     accuracies = [100 * row.accuracy_1cm for row in rows]
     curves: list[tuple[Sequence[float], str, str, str]] = [
-        ([100 * row.no_hit_ray_share for row in rows], "y", NO_HIT, "%{y:.1f} % of rays miss"),
+        ([100 * row.no_hit_ray_share for row in rows], "y", NO_HIT, "%{y:.1f} % of rays without a surface"),
     ]
     if not np.isnan(accuracies).all():
         curves.append((accuracies, "y", ACCURATE, "%{y:.1f} % of the surface within 1 cm of the truth"))
@@ -98,10 +98,10 @@ def sweep_sentence(view: SweepView) -> Markdown:
     start, last = rows[level], rows[-1]
     parts = [
         f"From {_mm(start)} on, larger balls close less than {LEVEL_SHARE:.0%} more of the rays "
-        f"({start.no_hit_ray_share:.1%} miss)"
+        f"({start.no_hit_ray_share:.1%} are without a surface)"
     ]
     if missed[-1] >= missed[best] + LEVEL_SHARE:
-        parts.append(f"the widest, {_mm(last)}, misses {missed[-1]:.1%} again")
+        parts.append(f"with the widest, {_mm(last)}, {missed[-1]:.1%} are again")
     if level < len(rows) - 1 and math.isfinite(start.accuracy_1cm):
         change = _change_text(start.accuracy_1cm, last.accuracy_1cm)
         parts.append(f"accuracy within 1 cm {change} up to {_mm(last)}")

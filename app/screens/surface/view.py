@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
 
 from app.compute.records import MeshView
+from pipeline.spec import Spec, key
 from pipeline.surface.findings import Explanation, RayParts, Suggestion, SweepPoint
 from pipeline.types import FloatArray, IntArray
 
@@ -45,14 +46,18 @@ class Ray:
 class PaintRequest:
     """Surfaces to draw in these colours; with a radius, a quick look while the radius is dragged."""
 
+    job: ClassVar[str] = "surface.paint_job:paint_job"
+    """Address of the job that answers it."""
     which: tuple[Which, ...]
     coloring: Coloring
     radius_m: float | None = None
     """Radius of a quick look's ball; None takes the surfaces of the settings."""
     most_points: int = QUICK_POINTS
     """Most points in a quick look; a larger cloud is thinned to about this number."""
-    ray: Ray | None = None
-    """Ray on which a quick look's ball is placed, where it meets the cloud."""
+
+    def key(self, spec: Spec) -> tuple[Hashable, ...]:
+        """Return everything that the answer depends on: a quick look has the spec's points, not its ball."""
+        return ("paint", self, key(spec, "after" if self.radius_m is None else "clouds"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +96,6 @@ class PaintedView:
     """Time of the ball alone."""
     unused: Mapping[Which, UnusedView] = field(default_factory=dict)
     """Left-out points of a quick look."""
-    ball_m: FloatArray | None = None
-    """(3,) centre of the ball of a quick look, at rest on a point."""
 
 
 @dataclass(frozen=True, slots=True)

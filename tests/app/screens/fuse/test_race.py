@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 
 from app.compute.state import Spec
+from app.drawing.cameras import stage_of
 from app.drawing.colors import MOST_DISTANCE_M
 from app.screens.fuse.capture_job import capture_job
+from app.screens.fuse.draw import RaceDrawing
 from app.screens.fuse.race_job import contest_of, race_job
 from app.screens.fuse.view import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, Race, Start
+from app.screens.scene.job import scene_job
 from packetmesh.errors import InputError
 from packetmesh.progress import drain as end
 from pipeline.io.rigs import save_rig
@@ -45,6 +48,14 @@ def test_all_lanes_start_from_the_same_pose(view):
     for lane in view.lanes:
         np.testing.assert_array_equal(lane.steps[0].T_target_source, first.T_target_source)
         assert lane.steps[0].point_error_m == first.point_error_m
+
+
+def test_all_lanes_have_one_place_in_the_scene(view, store, server):
+    scene = end(scene_job(store, SPEC))
+    RaceDrawing(server.scene, "/race", view, stage_of(scene.nodes))
+    for index in range(4):
+        frame = server.scene.get_handle_by_name(f"/race/lane{index}")
+        np.testing.assert_allclose(frame.position, view.T_world_target[:3, 3])
 
 
 def test_the_annealed_plane_version_arrives_and_plain_icp_does_not(view):

@@ -113,7 +113,7 @@ def test_the_first_visit_sends_the_room(screen):
     assert view.moments[-1].delivered_bytes == view.total_bytes
     assert {"node_00", "node_01", "node_02", "sink", "cloud", "client", "routes"} <= set(screen.names())
     assert "3 cameras sent" in screen.gui.text()
-    assert "Rays without surface" in screen.gui.text()
+    assert "Rays without a surface" in screen.gui.text()
 
 
 def test_of_a_recording_it_is_said_that_the_nodes_are_keyframes(screen):

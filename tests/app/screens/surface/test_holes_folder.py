@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from app.compute.records import MeshView
-from app.screens.surface.draw_holes import picked_hole, tape
+from app.drawing.picking import picked_hole
+from app.screens.surface.draw_holes import tape
 from app.screens.surface.holes import FILL_OFF, NONE, HolesFolder, filled_sentence, hole_name, parts_sentence
 from app.screens.surface.view import ExplainView, FilledView, HoleView
 from pipeline.kernels.geometry import rotation_exp
@@ -167,7 +168,7 @@ def screen(server):
 def test_the_list_names_holes_then_rims_and_choosing_asks(screen):
     assert screen.list.options == (NONE, *(hole_name(index, hole) for index, hole in enumerate(HOLES)))
     assert screen.list.options[1] == "1: 120 cm around, 900.0 cm²"
-    assert screen.list.options[3] == "3: rim, 1,200 cm long"
+    assert screen.list.options[3] == "3: outer rim, 1,200 cm long"
     assert screen.asked == []
     screen.gui.set("Hole", screen.list.options[2])
     assert screen.asked == [("after", 1)]
@@ -175,7 +176,7 @@ def test_the_list_names_holes_then_rims_and_choosing_asks(screen):
     assert all(part in screen.why for part in ("Gap", FOUND.sentence, FOUND.remedy))
     assert all(share in screen.why for share in ("75 %", "15 %", "10 %"))
     screen.gui.set("Hole", NONE)
-    assert "2 holes and 1 rim after fusion" in screen.why
+    assert "2 holes and 1 outer rim after fusion" in screen.why
     assert "share of pixels" not in screen.why
 
 
@@ -277,7 +278,7 @@ def test_an_answer_that_comes_after_filling_was_turned_off_is_not_told(screen):
 
 def test_sentences_carry_the_numbers(screen):
     assert parts_sentence(RayParts(0.5, 0.3, 0.05, 0.1, 0.05)).count("%") == 6
-    assert " 20.0 % miss it: 5.0 % where" in parts_sentence(RayParts(0.5, 0.3, 0.05, 0.1, 0.05))
+    assert " 20.0 % are without a surface: 5.0 % where" in parts_sentence(RayParts(0.5, 0.3, 0.05, 0.1, 0.05))
     text = filled_sentence(FILLED)
     assert "**3 holes filled, 123.0 cm².**" in text
     assert "3.1 %" in text

@@ -9,7 +9,7 @@ from app.screens.surface import quick
 from app.screens.surface.quick import FEWEST_POINTS, LOOKS, SLOW_S, Detail, QuickLook
 from app.screens.surface.view import QUICK_POINTS, PaintedView, PaintRequest
 from app.window.debounce import Debounce
-from tests.app.fakes import page_calls, ui_of
+from tests.app.fakes import START, page_calls, ui_of
 
 
 class Browser:
@@ -17,10 +17,11 @@ class Browser:
 
     def __init__(self):
         self.ui, self.jobs = ui_of(), []
-        self.store = self.spec = None
+        self.spec = START
         self.results = SimpleNamespace(fresh=lambda step, spec: True)
 
-    def quick_job(self, job, request, on_end):
+    def quick_job(self, job, request, on_end, key):
+        assert key == request.key(self.spec)
         self.jobs.append((request, on_end))
 
     @property

@@ -28,6 +28,7 @@ from tests.app.fakes import ui_of
 
 SPEC = Spec(Demo("box-on-table"), config=PipelineConfig(surface=SurfaceConfig(max_points=4_000)))
 NAN = float("nan")
+RAYS = "% of rays without a surface"
 ROWS = (
     Suggestion("finest", 0.0246, 0.49, "Wide enough for 50% of the surface; rolled, it closes 49%."),
     Suggestion("even", 0.0312, 0.88, "Wide enough for 90% of the surface; rolled, it closes 88%."),
@@ -109,7 +110,7 @@ def test_the_radii_of_the_spec_do_not_matter_to_a_sweep(store, sweep):
 def test_the_sentence_finds_where_the_rays_level_off_and_what_accuracy_does():
     view = swept(row(5, 1.0, NAN, 0), row(10, 0.60, 0.97), row(28, 0.205, 0.93), row(60, 0.20, 0.88))
     assert sweep_sentence(view) == (
-        "From 28 mm on, larger balls close less than 1% more of the rays (20.5% miss); "
+        "From 28 mm on, larger balls close less than 1% more of the rays (20.5% are without a surface); "
         "accuracy within 1 cm falls from 93 to 88 % up to 60 mm."
     )
     assert "rises from 80 to 88 %" in sweep_sentence(swept(row(28, 0.2, 0.80), row(60, 0.2, 0.88)))
@@ -119,8 +120,8 @@ def test_the_sentence_finds_where_the_rays_level_off_and_what_accuracy_does():
 def test_the_sentence_says_when_the_widest_balls_miss_more_again():
     sentence = sweep_sentence(swept(row(10, 0.60), row(28, 0.20), row(60, 0.30)))
     assert sentence == (
-        "From 28 mm on, larger balls close less than 1% more of the rays (20.0% miss); "
-        "the widest, 60 mm, misses 30.0% again."
+        "From 28 mm on, larger balls close less than 1% more of the rays (20.0% are without a surface); "
+        "with the widest, 60 mm, 30.0% are again."
     )
 
 
@@ -133,12 +134,12 @@ def test_the_sweep_figure_shows_all_four_curves_in_the_units_it_names(sweep):
     traces = {trace.hovertemplate: trace for trace in sweep_figure(view).data}
     found = {
         unit: next(trace for hover, trace in traces.items() if unit in hover)
-        for unit in ("% of rays miss", "% of the surface within 1 cm", "triangles", "ms for the ball")
+        for unit in (RAYS, "% of the surface within 1 cm", "triangles", "ms for the ball")
     }
     for trace in found.values():
         np.testing.assert_allclose(trace.x, [1000 * one.radius_m for one in view.points])
     values = {unit: np.array(trace.y, float) for unit, trace in found.items()}
-    np.testing.assert_allclose(values["% of rays miss"], [100 * one.no_hit_ray_share for one in view.points])
+    np.testing.assert_allclose(values[RAYS], [100 * one.no_hit_ray_share for one in view.points])
     np.testing.assert_allclose(
         values["% of the surface within 1 cm"], [100 * one.accuracy_1cm for one in view.points]
     )

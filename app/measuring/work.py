@@ -1,0 +1,229 @@
+"""Answers to requests of the measuring tool; computed in another process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from app.compute.measures import (
+    Click,
+    Clicked,
+    End,
+    Face,
+    Made,
+    MeasureAnswer,
+    MeasureRequest,
+    Place,
+    Quantity,
+    Scale,
+    ScaleView,
+    Taken,
+)
+from app.drawing.picking import picked_hole
+from app.measuring.kinds import Step, steps_of
+from app.measuring.survey import Survey, survey_of
+from packetmesh.errors import InputError
+from pipeline.measuring.marks import Mark, mark_on_ray
+from pipeline.measuring.measures import (
+    Measure,
+    angle,
+    angle_of_planes,
+    box_of_part,
+    box_of_planes,
+    distance,
+    hole_area,
+    plane_to_plane,
+    point_to_plane,
+)
+from pipeline.measuring.planes import Plane
+from pipeline.measuring.surface import MeasuredSurface
+from pipeline.surface.holes import find_holes
+from pipeline.types import FloatArray
+
+NO_HOLE = "There is no hole at the click; click a red rim, or into a hole"
+EXTENT = (2.0, 98.0)
+"""Percentiles of a plane's vertices between which it is drawn."""
+NO_PART = "The node that was clicked is not in this scene"
+
+
+@dataclass(frozen=True, slots=True)
+class _Loop:
+    """A hole's loop for ``picked_hole``."""
+
+    loop_m: FloatArray
+    rim: bool = False
+
+
+def answer(surfaces: Sequence[MeasuredSurface], request: MeasureRequest) -> MeasureAnswer:
+    """Turn clicks into points, and compute the wanted and the completed measures.
+
+    Args:
+        surfaces: the surfaces that can be clicked; a measure has all its points on one of them.
+        request: measures and clicks. What cannot be measured has its reason in the answer.
+    """
+    surveys = [survey_of(surface) for surface in surfaces]
+    pending, completed, missed = request.pending, list[Taken](), ""
+    for click in request.clicks:
+        try:
+            pending, missed = _with_click(surveys, pending, click), ""
+        except InputError as error:
+            missed = str(error)
+        if len(pending.points_m) == len(steps_of(pending.kind, pending.snap)):
+            completed.append(Taken(pending.kind, pending.snap, pending.points_m, pending.part))
+            pending = Clicked(pending.kind, pending.snap)
+    scaled, scale = (surveys, None) if request.scale is None else _scaled(surveys, request.scale)
+    checked = None if request.check is None else _scaled(scaled, request.check)[1]
+    wanted = dict.fromkeys((*request.wanted, *completed))
+    return MeasureAnswer(
+        request,
+        tuple((taken, _made(scaled, taken)) for taken in wanted),
+        tuple(completed),
+        pending,
+        _pending_ends(surveys, pending),
+        missed,
+        scale,
+        checked,
+        scaled[0].surface.scale_source if scaled else "",
+    )
+
+
+def _with_click(surveys: Sequence[Survey], pending: Clicked, click: Click) -> Clicked:
+    """Return the pending points with one more.
+
+    Raises:
+        InputError: nothing is there that can be marked.
+    """
+    step = steps_of(pending.kind, pending.snap)[len(pending.points_m)]
+    part, place = _hit(surveys, pending, step, click)
+    if step.marks == "plane":
+        surveys[part].plane(place)
+    elif step.marks == "point":
+        surveys[part].mark(place, pending.snap)
+    return replace(pending, points_m=(*pending.points_m, place), part=part)
+
+
+def _hit(surveys: Sequence[Survey], pending: Clicked, step: Step, click: Click) -> tuple[int, Place]:
+    """Return the nearest surface that a click meets and the point there; later clicks stay on the surface."""
+    origin_m, direction = np.array(click.origin_m), np.array(click.direction)
+    found: Callable[..., FloatArray] = _rim_on_ray if step.marks == "rim" else _point_on_ray
+    parts = [pending.part] if pending.points_m else range(len(surveys))
+    hits, trouble = list[tuple[float, int, FloatArray]](), InputError("There is nothing to measure")
+    for part in parts:
+        try:
+            point_m = found(surveys[part].surface, origin_m, direction)
+            hits.append((float(np.linalg.norm(point_m - origin_m)), part, point_m))
+        except InputError as error:
+            trouble = error
+    if not hits:
+        raise trouble
+    _, part, point_m = min(hits, key=lambda hit: hit[:2])
+    x_m, y_m, z_m = np.round(point_m, 3).tolist()
+    return part, (x_m, y_m, z_m)
+
+
+def _point_on_ray(surface: MeasuredSurface, origin_m: FloatArray, direction: FloatArray) -> FloatArray:
+    return mark_on_ray(surface, origin_m, direction, "surface").point_m
+
+
+def _rim_on_ray(surface: MeasuredSurface, origin_m: FloatArray, direction: FloatArray) -> FloatArray:
+    """Return the vertex of the rim that a ray means, the one that it passes at the smallest angle."""
+    holes = find_holes(surface.vertices_m, surface.triangles)
+    loops = [_Loop(surface.vertices_m[hole.loop]) for hole in holes if hole.open]
+    picked = picked_hole(loops, origin_m, direction)
+    if picked is None:
+        raise InputError(NO_HOLE)
+    towards = loops[picked].loop_m - origin_m
+    cosine = towards @ direction / np.linalg.norm(towards, axis=1)
+    rim_m: FloatArray = loops[picked].loop_m[int(cosine.argmax())]
+    return rim_m
+
+
+def _scaled(surveys: Sequence[Survey], scale: Scale) -> tuple[Sequence[Survey], ScaleView]:
+    """Return the surfaces at the scale of a true length; as they are if that length sets none."""
+    try:
+        measured = _measured(surveys[scale.by.part], scale.by)[0]
+        found = [survey.scaled(scale.true_m, measured) for survey in surveys]
+    except IndexError:
+        return surveys, ScaleView(trouble=NO_PART)
+    except InputError as error:
+        return surveys, ScaleView(trouble=str(error))
+    check = found[scale.by.part][1]
+    return [survey for survey, _ in found], ScaleView(check.factor, check.agrees)
+
+
+def _made(surveys: Sequence[Survey], taken: Taken) -> Made:
+    """Return a measure with its drawing, at the size of the drawn surface."""
+    try:
+        survey = surveys[taken.part]
+        measure, marks, planes = _measured(survey, taken)
+    except IndexError:
+        return Made(trouble=NO_PART)
+    except InputError as error:
+        return Made(trouble=str(error))
+    quantities = tuple(
+        Quantity(one.name, one.value, one.unit, *one.ci95, one.guessed) for one in measure.values
+    )
+    ends = tuple(_end(one, survey.factor) for one in marks)
+    faces = tuple(_face(survey, one) for one in planes)
+    return Made(quantities, measure.ends_m / survey.factor, ends, faces)
+
+
+def _measured(survey: Survey, taken: Taken) -> tuple[Measure, list[Mark], list[Plane]]:
+    """Return a measure with its marks and planes.
+
+    Raises:
+        InputError: the surface has nothing at the points, or they give no measure.
+    """
+    marks, planes = list[Mark](), list[Plane]()
+    for step, place in zip(steps_of(taken.kind, taken.snap), taken.points_m, strict=True):
+        if step.marks == "point":
+            marks.append(survey.mark(place, taken.snap))
+        elif step.marks == "plane":
+            planes.append(survey.plane(place))
+    point_m = survey.factor * np.array(taken.points_m[0])
+    return _combined(survey.surface, taken, marks, planes, point_m), marks, planes
+
+
+def _combined(
+    surface: MeasuredSurface, taken: Taken, marks: list[Mark], planes: list[Plane], point_m: FloatArray
+) -> Measure:
+    if taken.kind == "distance":
+        return distance(surface, *marks)
+    if taken.kind == "point-plane":
+        return point_to_plane(surface, marks[0], planes[0])
+    if taken.kind == "plane-plane":
+        return plane_to_plane(surface, *planes)
+    if taken.kind == "angle":
+        return angle_of_planes(surface, *planes) if planes else angle(surface, *marks)
+    if taken.kind == "hole":
+        return hole_area(surface, point_m)
+    if planes:
+        first, second, third = planes
+        return box_of_planes(surface, (first, second, third))
+    return box_of_part(surface, point_m)
+
+
+def _pending_ends(surveys: Sequence[Survey], pending: Clicked) -> tuple[End, ...]:
+    """Return the points clicked so far as they are drawn."""
+    ends = list[End]()
+    for step, place in zip(steps_of(pending.kind, pending.snap), pending.points_m, strict=False):
+        snap = pending.snap if step.marks == "point" else "surface"
+        ends.append(_end(surveys[pending.part].mark(place, snap), 1.0))
+    return tuple(ends)
+
+
+def _end(one: Mark, factor: float) -> End:
+    return End(one.point_m / factor, one.normal, one.guessed)
+
+
+def _face(survey: Survey, plane: Plane) -> Face:
+    """Return a rectangle around nearly all of the part of the surface to which a plane was fitted."""
+    from_middle = (survey.surface.vertices_m[plane.rows] - plane.point_m) @ plane.axes.T
+    turn_rad = np.radians(cv2.minAreaRect(from_middle.astype(np.float32))[2])
+    turned = np.array([[np.cos(turn_rad), np.sin(turn_rad)], [-np.sin(turn_rad), np.cos(turn_rad)]])
+    (left, low), (right, high) = np.percentile(from_middle @ turned.T, EXTENT, axis=0)
+    corners = np.array([[left, low], [right, low], [right, high], [left, high]]) @ turned
+    return Face((plane.point_m + corners @ plane.axes) / survey.factor, plane.normal, plane.guessed)
