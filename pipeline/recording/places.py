@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Generator, Iterable, Sequence
 from dataclasses import replace
 
-import cv2
-import numpy as np
-
 from packetmesh.errors import InputError, PacketMeshError
 from packetmesh.progress import Progress
 from pipeline.acquisition import back_project
 from pipeline.config import RegistrationConfig
-from pipeline.kernels.geometry import inverse, scaled
+from pipeline.kernels.geometry import inverse
+from pipeline.recording.brightness import shrunk
 from pipeline.recording.recording import Recording, spread
 from pipeline.recording.tracking import Track, loop_link
 from pipeline.registration.colour import LiftedFeatures, colour_start, lifted_features, match_score
@@ -31,8 +29,6 @@ MOST_PARTS = 12
 """Most parts, the largest first, that are looked for in the largest one."""
 FOUND_GATE_M = 0.1
 """Gate of the registration from a pose that was found."""
-WIDTH_PX = 320
-"""Approximate width of the images in which keyframes are recognised."""
 
 
 def parts_of(keyframes: Sequence[int], links: Iterable[Link]) -> list[list[int]]:
@@ -120,21 +116,6 @@ class Places:
         """Return the depth camera's motion for one of the colour camera."""
         T: FloatArray = inverse(self._T_color_depth) @ T_target_source @ self._T_color_depth
         return T
-
-
-def shrunk(frame: RgbdFrame) -> RgbdFrame:
-    """Return a frame with every n-th row and column of its depth, about ``WIDTH_PX`` wide."""
-    step = max(1, round(frame.intrinsics.width_px / WIDTH_PX))
-    if step == 1 or frame.depth.z_m.shape != frame.rgb.shape[:2]:
-        return frame
-    height_px, width_px = (size // step for size in frame.rgb.shape[:2])
-    rgb = np.ascontiguousarray(frame.rgb[: height_px * step, : width_px * step])
-    small = cv2.resize(rgb, (width_px, height_px), interpolation=cv2.INTER_AREA)
-    middle = slice(step // 2, None, step)
-    z_m = np.ascontiguousarray(frame.depth.z_m[middle, middle][:height_px, :width_px])
-    camera = replace(scaled(frame.intrinsics, 1.0 / step), width_px=width_px, height_px=height_px)
-    depth = replace(frame.depth, z_m=z_m)
-    return replace(frame, rgb=np.asarray(small, np.uint8), depth=depth, intrinsics=camera)
 
 
 def _join(

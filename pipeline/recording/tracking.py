@@ -19,6 +19,7 @@ from pipeline.config import RegistrationConfig
 from pipeline.importing.recorded import DepthView
 from pipeline.kernels.geometry import inverse, orthonormal, rigid, rotation_angle_rad, rotation_exp
 from pipeline.kernels.threads import threads
+from pipeline.recording.brightness import Brightness
 from pipeline.recording.checkpoint import EVERY_S, Checkpoint, State
 from pipeline.recording.clouds import KeyframeClouds
 from pipeline.recording.recording import Recording
@@ -29,6 +30,7 @@ from pipeline.registration.organised import (
     register_organised,
     shared_shares,
 )
+from pipeline.registration.photometric import open_motions
 from pipeline.types import FloatArray, Link
 
 GATE_M = 0.15
@@ -127,7 +129,7 @@ def iterate_tracking(
     if T_world_camera is not None:
         T_color_depth = recording.view(0).T_color_depth
         given = [None if T is None else T @ T_color_depth for T in T_world_camera]
-    tracker, first = _Tracker(given), 0
+    tracker, first = _Tracker(given, Brightness(recording)), 0
     if checkpoint is not None and (state := checkpoint.read()) is not None:
         yield from tracker.iterate_restoring(recording, state)
         first = len(tracker.track().frames)
@@ -162,9 +164,9 @@ def read_ahead(
 class _Tracker:
     """State of tracking: the keyframe, the pose in it, and the last motion."""
 
-    def __init__(self, given: Sequence[FloatArray | None]) -> None:
+    def __init__(self, given: Sequence[FloatArray | None], brightness: Brightness) -> None:
         """Begin; ``given`` are poses of the depth camera that came with the recording, if any did."""
-        self._given = given
+        self._given, self._brightness = given, brightness
         self._clouds = KeyframeClouds()
         self._frames: list[Tracked | None] = []
         self._links: list[Link] = []
@@ -189,12 +191,25 @@ class _Tracker:
         if found is None or not (found.holds_near(start) if follows else found.holds):
             self._search(k, cloud)
             return
+        if follows:
+            found = self._held(k, cloud, found)
         self._motion = inverse(self._pose) @ found.T_target_source if follows else np.eye(4)
         self._pose, self._last = found.T_target_source, k
         if found.overlap_share < NEW_BELOW:
             self._renew(k, cloud, self._keyframe, found)
         else:
             self._frames.append(Tracked(self._keyframe, found.T_target_source))
+
+    def _held(self, k: int, cloud: OrganisedCloud, found: Registered) -> Registered:
+        """Return a registration to the keyframe whose open motions are those that photographs show."""
+        motions = open_motions(found.information)
+        if not motions.size:
+            return found
+        held = self._brightness.held(k, self._keyframe, found.T_target_source, motions)
+        if held is None:
+            return found
+        T, information = held
+        return checked(cloud, self._clouds[self._keyframe], T, found.information + information)
 
     def track(self) -> Track:
         """Return the result."""
@@ -313,9 +328,16 @@ def registered(
     information = registration_information(result, source.points_m, source.normals, target.normals)
     if T_predicted is not None:
         T = steadied(T, information, T_predicted)
-    overlap, agreeing = shared_shares(source, target, T, WITHIN)
-    _, back = shared_shares(target, source, inverse(T), WITHIN)
-    return Registered(T, information, overlap, min(agreeing, back))
+    return checked(source, target, T, information)
+
+
+def checked(
+    source: OrganisedCloud, target: OrganisedCloud, T_target_source: FloatArray, information: FloatArray
+) -> Registered:
+    """Return a registration with its checks."""
+    overlap, agreeing = shared_shares(source, target, T_target_source, WITHIN)
+    _, back = shared_shares(target, source, inverse(T_target_source), WITHIN)
+    return Registered(T_target_source, information, overlap, min(agreeing, back))
 
 
 def steadied(T_target_source: FloatArray, information: FloatArray, T_predicted: FloatArray) -> FloatArray:

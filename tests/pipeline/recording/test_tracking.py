@@ -10,7 +10,7 @@ import pytest
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.importing.recorded import DepthView
-from pipeline.kernels.geometry import inverse, look_at
+from pipeline.kernels.geometry import inverse, look_at, rigid
 from pipeline.recording.tracking import (
     LEAST_AGREEMENT,
     LEAST_OVERLAP,
@@ -30,16 +30,18 @@ from pipeline.recording.tracking import (
     steadied,
 )
 from pipeline.registration.organised import OrganisedCloud, organised, shared_shares
-from pipeline.types import FloatArray, Link
+from pipeline.types import DepthMap, FloatArray, Link
 from tests.pipeline.recording.rendered import (
     CAMERA,
     MIDDLE_M,
+    NOISE,
     Rendered,
     around,
     errors,
     in_the_living_room,
     moved,
 )
+from tests.pipeline.registration.test_photometric import painted, seen
 
 EYE_M = (1.0, 1.5, 1.5)
 TURNED = moved([0, 1, 0], 180.0, [0, 0, 0])
@@ -393,3 +395,41 @@ def test_noise_and_bare_walls_do_not_make_the_camera_slip(radius_m, turn_m):
     for one in tracked(walk).links:
         true = inverse(walk.T_true[one.target]) @ walk.T_true[one.source]
         assert np.linalg.norm((inverse(true) @ one.T_target_source)[:3, 3]) < 0.06
+
+
+class WallFrames:
+    """A camera that slides along a painted wall, and turns back; has what ``recording.Recording`` has."""
+
+    name, T_world_camera, notes = "wall", None, ()
+
+    def __init__(self, paint):
+        self._paint = paint
+        self.places_m = 0.05 * np.sin(0.35 * np.arange(24))
+        self.times_s = np.arange(24) / 30.0
+
+    def pose(self, index):
+        return rigid(np.eye(3), np.array([self.places_m[index], -0.4 * self.places_m[index], 0.0]))
+
+    def view(self, index):
+        frame = self.frame(index)
+        noise_m = 0.002 * np.random.default_rng(index).standard_normal(frame.depth.z_m.shape)
+        z_m = (frame.depth.z_m + noise_m).astype(np.float32)
+        return DepthView(DepthMap(z_m), frame.intrinsics, np.eye(4), NOISE)
+
+    def frame(self, index):
+        return seen(self.pose(index), self._paint, seed=index)
+
+
+def test_a_painted_wall_holds_the_camera_and_a_bare_one_does_not():
+    """Depth shows no slide along a wall, and the motion so far is wrong where the camera turns back."""
+
+    def worst_m(paint):
+        recording = WallFrames(paint)
+        track = tracked(recording)
+        assert all(one is not None for one in track.frames)
+        return max(
+            np.linalg.norm((inverse(recording.pose(k)) @ T)[:3, 3]) for k, T in enumerate(chained(track))
+        )
+
+    assert worst_m(painted) < 0.003
+    assert worst_m(lambda x_m, y_m: np.full_like(x_m, 120.0)) > 0.03
