@@ -73,6 +73,7 @@ $(VENV)/.core: $(VENV)/.uv requirements.lock pyproject.toml
 	$(BIN)/uv pip install -q --python $(BIN)/python --require-hashes -r requirements.lock
 	$(BIN)/uv pip install -q --python $(BIN)/python --no-deps --no-build-isolation -e .
 	$(BIN)/python -m app.compute.warm  # compiles; not at the first use
+	$(BIN)/python -m app.compute.prepared  # what a new server shows first
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.core requirements-dev.lock

@@ -14,10 +14,12 @@ from typing import Any
 
 import viser
 
-from app.compute.ahead import compute_ahead
+from app.compute.ahead import WorkAhead, compute_ahead
 from app.compute.jobs import start_pool
 from app.compute.pool import ComputePool
-from app.compute.state import SharedViews, Spec
+from app.compute.prepared import take_prepared
+from app.compute.shared import SharedViews
+from app.compute.state import Spec
 from app.compute.store import Store
 from app.drawing.colors import BRAND
 from app.landing import app_page
@@ -27,6 +29,7 @@ from app.screens.export.panel import ExportPanel
 from app.screens.fuse.panel import FusePanel
 from app.screens.network.panel import NetworkPanel
 from app.screens.scene.panel import ScenePanel
+from app.screens.surface.likely import is_likely, likely
 from app.screens.surface.panel import SurfacePanel
 from app.session.lecture import Lecture
 from app.session.session import Session
@@ -72,6 +75,7 @@ class AppServer:
     sessions: dict[int, Session] = field(default_factory=dict)
     entrance: Entrance = field(default_factory=Entrance)
     crowd: Crowd = field(default_factory=Crowd)
+    ahead: WorkAhead | None = None
 
     @property
     def url(self) -> str:
@@ -104,6 +108,8 @@ class AppServer:
 
     def stop(self) -> None:
         """Stop all sessions and processes and delete the server's folder."""
+        if self.ahead is not None:
+            self.ahead.close()
         self.crowd.close()
         for session in list(self.sessions.values()):
             session.close()
@@ -122,6 +128,7 @@ def build_server(
     with_token: bool = True,
     pool: ComputePool | None = None,
     allow_hosts: Iterable[str] = (),
+    ahead: bool = False,
 ) -> AppServer:
     """Start a server and return at once.
 
@@ -134,6 +141,8 @@ def build_server(
         with_token: admit only browsers that open ``class_link``, if other machines can reach the host.
         pool: a pool that is already started; None starts one. It stops with the server.
         allow_hosts: further names of this server, which a proxy in front of it has.
+        ahead: begin with the results of the set-up, and compute the surfaces of the shown scene at all radii
+            while nobody asks for anything.
 
     Raises:
         InputError: the port is taken, the address is not this machine's, a name is no host name, or the
@@ -159,8 +168,13 @@ def build_server(
         app.stop()
         raise InputError(_taken_sentence(port))
     private.queue_from_any_thread(server)
+    private.remember_hints()
     _dress(server)
-    store, uploads, shared = Store(str(folder.path)), Uploads(folder.path), SharedViews()
+    store, uploads = Store(str(folder.path)), Uploads(folder.path)
+    shared = SharedViews(store)
+    if ahead:
+        take_prepared(folder.path)
+        app.ahead = _working_ahead(pool, store, shared)
     compute_ahead(pool, store, shared, spec, app)
 
     def begin(target: Target, number: int, lecture: Lecture | None = None) -> Session:
@@ -175,6 +189,18 @@ def build_server(
         _let_in(app, gate, begin)
     door.is_open = True
     return app
+
+
+def _working_ahead(pool: ComputePool, store: Store, shared: SharedViews) -> WorkAhead:
+    """Return the work that begins with the first surface that somebody sees of a demo scene."""
+    work = WorkAhead(pool, store)
+
+    def plan(spec: Spec, view: Any) -> None:
+        if is_likely(spec):
+            work.plan(spec.key("surface"), lambda: likely(store, spec, view))
+
+    shared.on_surface = plan
+    return work
 
 
 def _listening(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import functools
 import math
 import types
 import typing
@@ -91,9 +92,12 @@ def differences(config: Config, base: Config) -> list[str]:
     return [f"{key}={value}" for key, value in settings(config).items() if before[key] != value]
 
 
+_hints_of = functools.cache(typing.get_type_hints)
+
+
 def _replaced(config: Any, values: dict[str, str], known: list[str], prefix: str = "") -> Any:
     """Return ``config`` with ``values``, whose keys lack ``prefix``; ``known`` are all keys of the config."""
-    hints = typing.get_type_hints(type(config))
+    hints = _hints_of(type(config))  # type: ignore[arg-type]
     changes: dict[str, Any] = {}
     for key in {key.partition(".")[0] for key in values}:
         inner = {k.partition(".")[2]: v for k, v in values.items() if k.partition(".")[0] == key}

@@ -58,9 +58,7 @@ def serve(
         from app.server import build_server
         from app.web.entrance import is_loopback
 
-        app = build_server(
-            scene, config, host, port, lecture, not no_token, pool=pool, allow_hosts=allow_host
-        )
+        app = build_server(scene, config, host, port, lecture, not no_token, pool, allow_host, ahead=True)
     except BaseException:
         pool.close()
         raise

@@ -7,13 +7,16 @@ A job is a function in a module of a screen whose name ends in ``job``. Its addr
 from __future__ import annotations
 
 import importlib
+import inspect
 import os
 import pkgutil
-from collections.abc import Iterator
+from collections.abc import Generator, Hashable, Iterator
 from typing import Any
 
 from app.compute.pool import ComputePool
-from app.compute.state import CHAIN
+from app.compute.shared import kept
+from app.compute.state import CHAIN, Spec, Step
+from app.compute.store import Store
 
 SCREENS = "app.screens"
 
@@ -24,9 +27,23 @@ def run(job: str, *arguments: Any) -> Any:
     return getattr(importlib.import_module(f"{SCREENS}.{module}"), function)(*arguments)
 
 
-def run_step(step: str, *arguments: Any) -> Any:
-    """Run the job of a step."""
-    return run(f"{step}.job:{step}_job", *arguments)
+def run_kept(job: str, key: Hashable, store: Store, spec: Spec, *arguments: Any) -> Generator[Any, None, Any]:
+    """Return what the job with this address returns; from the store if it has the answer with this key."""
+    answer = store.get(kept(key))
+    if answer is None:
+        answer = run(job, store, spec, *arguments)
+        if inspect.isgenerator(answer):
+            answer = yield from answer
+        store.put(kept(key), answer)
+    return answer
+
+
+def run_step(step: Step, store: Store, spec: Spec) -> Generator[Any, None, Any]:
+    """Run the job of a step; the answers of the chain's steps are kept."""
+    job = f"{step}.job:{step}_job"
+    if step in CHAIN:
+        return (yield from run_kept(job, spec.key(step), store, spec))
+    return (yield from run(job, store, spec))
 
 
 def start_pool() -> ComputePool:

@@ -7,13 +7,11 @@ progress report, and the job can be stopped between two yields.
 
 from __future__ import annotations
 
-import inspect
 import logging
 import multiprocessing
 import os
-import signal
 import threading
-import traceback
+import time
 from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
@@ -22,16 +20,12 @@ from typing import Any, Literal
 
 import psutil
 
-from packetmesh.batch import THREAD_LIMITS
-from packetmesh.errors import PacketMeshError
-from packetmesh.files import file_trouble
+from app.compute.child import attend
 
 logger = logging.getLogger(__name__)
 
 PATIENCE_S = 3.0
 """Time that a superseded job gets to stop before its process is killed, seconds."""
-NICENESS = 5
-"""Niceness of the computing processes: the server process gets the processor first."""
 RESPAWN_PAUSE_S = 1.0
 """Pause before a process that died during start-up is started again, seconds."""
 MEMORY_LIMIT_BYTES = 2 << 30
@@ -62,6 +56,9 @@ class Ticket:
     """What the result depends on: jobs with equal keys are computed once. None: the job is never shared."""
     urgent: bool = False
     """Whether the job starts before waiting jobs that are not urgent."""
+    ahead: bool = False
+    """Whether nobody waits for the job: it starts only while no other runs or waits and a further process is
+    free, and is asked to stop when another is submitted, unless both have the same key."""
     stopping: bool = False
 
 
@@ -104,6 +101,7 @@ class ComputePool:
         self._threads_each = max(1, (os.cpu_count() or 1) // size)
         self._lock = threading.Lock()
         self._waiting: list[Ticket] = []
+        self._asked_s = time.monotonic()
         self._closed = False
         self._closing = threading.Event()
         self._slots = [_Slot() for _ in range(size)]
@@ -123,15 +121,23 @@ class ComputePool:
         on_end: Callable[[Outcome], None],
         key: Hashable = None,
         urgent: bool = False,
+        ahead: bool = False,
     ) -> Ticket:
         """Queue a job. The callbacks run on a thread of the pool and must return quickly."""
-        ticket = Ticket(owner, function, arguments, on_progress, on_end, key, urgent)
+        ticket = Ticket(owner, function, arguments, on_progress, on_end, key, urgent, ahead)
         with self._lock:
             if self._closed:
                 raise RuntimeError("the pool is closed")
             self._waiting.append(ticket)
+            if not ahead:
+                self._make_way()
             self._dispatch()
         return ticket
+
+    def idle_s(self) -> float:
+        """Return for how long no job has run or waited, seconds, apart from work ahead."""
+        with self._lock:
+            return 0.0 if self._asked() else time.monotonic() - self._asked_s
 
     def stop(self, ticket: Ticket, patience_s: float | None = None) -> None:
         """Ask a job to stop at its next progress report; kill its process after ``patience_s``."""
@@ -210,7 +216,22 @@ class ComputePool:
         keys = {one.key for one in running} - {None}
         served = [one for one in self._waiting if one.key in keys]
         owners = {id(one.owner) for one in (*running, *served)}
-        return [one for one in self._waiting if id(one.owner) not in owners and one not in served]
+        free = [one for one in self._waiting if id(one.owner) not in owners and one not in served]
+        idle = sum(slot.ready and slot.ticket is None for slot in self._slots)
+        return [one for one in free if not one.ahead or (idle > 1 and not self._asked())]
+
+    def _asked(self) -> bool:
+        """Return whether a job that is not work ahead runs or waits. The caller holds the lock."""
+        running = [slot.ticket for slot in self._slots if slot.ticket is not None]
+        return not all(one.ahead for one in (*running, *self._waiting))
+
+    def _make_way(self) -> None:
+        """Ask the work ahead to stop that no waiting job needs. The caller holds the lock."""
+        needed = {one.key for one in self._waiting if not one.ahead} - {None}
+        for slot in self._slots:
+            if slot.ticket is not None and slot.ticket.ahead and slot.ticket.key not in needed:
+                slot.ticket.stopping = True
+                _send(slot, ("stop", None))
 
     def _attend(self, slot: _Slot, before: _Slot | None) -> None:
         """Keep one process alive and handle its messages until the pool closes; wait for the slot before."""
@@ -242,7 +263,7 @@ class ComputePool:
             try:
                 here, there = self._context.Pipe()
                 slot.process = self._context.Process(
-                    target=_child, args=(there, self._warm_up, self._threads_each), daemon=True
+                    target=attend, args=(there, self._warm_up, self._threads_each), daemon=True
                 )
                 slot.process.start()
             except OSError:
@@ -266,6 +287,8 @@ class ComputePool:
             return
         with self._lock:
             slot.ready, slot.ticket = True, None
+            if ticket is not None and not ticket.ahead:
+                self._asked_s = time.monotonic()
             others = self._served(ticket, kind)
             if kind != "ready" and _memory_bytes(slot.process) > MEMORY_LIMIT_BYTES:
                 slot.ready = False
@@ -323,78 +346,3 @@ def _memory_bytes(process: BaseProcess | None) -> int:
         return psutil.Process(process.pid).memory_info().rss if process is not None else 0
     except psutil.Error:
         return 0
-
-
-def _child(connection: Connection, warm_up: Callable[[], Iterator[None]], threads: int) -> None:
-    """Run as the main function of a computing process: take jobs and report, until the server is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_server, daemon=True).start()
-    if hasattr(os, "nice"):
-        os.nice(NICENESS)
-    for name in THREAD_LIMITS:
-        os.environ.setdefault(name, str(threads))
-    try:
-        warming = warm_up()
-        more, warm_sent = _goes_on(warming), False
-        connection.send(("ready", None))
-        while True:
-            while more and not connection.poll():
-                more = _goes_on(warming)
-            if not (more or warm_sent):
-                connection.send(("warm", None))
-                warm_sent = True
-            kind, job = connection.recv()
-            if kind == "job":
-                connection.send(_answer(connection, *job))
-    except (EOFError, OSError):
-        return
-
-
-def _goes_on(warming: Iterator[None]) -> bool:
-    """Run one part of the warm-up. Returns whether there is more."""
-    try:
-        next(warming)
-    except StopIteration:
-        return False
-    except Exception:  # the first job fails in the same way and reports it
-        traceback.print_exc()
-        return False
-    return True
-
-
-def _end_with_server() -> None:
-    """End this process when the server ends: a job that never reports would not notice it."""
-    server = multiprocessing.parent_process()
-    assert server is not None
-    server.join()
-    os._exit(1)
-
-
-def _answer(
-    connection: Connection, function: Callable[..., Any], arguments: tuple[Any, ...]
-) -> tuple[str, Any]:
-    """Run one job. Returns its outcome as a message for the attending thread."""
-    try:
-        value = function(*arguments)
-        while inspect.isgenerator(value):
-            try:
-                connection.send(("progress", next(value)))
-            except StopIteration as stop:
-                value = stop.value
-                break
-            if connection.poll():
-                connection.recv()
-                value.close()
-                return "stopped", None
-        return "result", value
-    except PacketMeshError as error:
-        return "error", str(error)
-    except MemoryError:
-        return "error", "There is not enough memory for this: try fewer points or a smaller ball."
-    except OSError as error:
-        if isinstance(error, (BrokenPipeError, ConnectionError)):
-            raise
-        return "error", file_trouble(error)
-    except Exception as error:
-        traceback.print_exc()
-        return "error", f"This step failed unexpectedly ({type(error).__name__}: {error})."

@@ -45,8 +45,7 @@ class Store:
             key: the name of the stage, and all that its result depends on.
             compute: yields progress reports and returns the result.
         """
-        stage = str(key[0])
-        path = Path(self.folder, f"{stage}-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}")
+        stage, path = str(key[0]), self._path(key)
         newest, value = _newest.get((self.folder, stage), (None, None))
         if newest == path:
             return value
@@ -56,6 +55,18 @@ class Store:
             self._write(path, value)
         _newest[self.folder, stage] = (path, value)
         return value
+
+    def has(self, key: tuple[Hashable, ...]) -> bool:
+        """Return whether there is a result for ``key``, which may be damaged."""
+        return self._path(key).exists()
+
+    def get(self, key: tuple[Hashable, ...]) -> Any:
+        """Return the result for ``key``, or None."""
+        return _read(self._path(key))
+
+    def put(self, key: tuple[Hashable, ...], value: Any) -> None:
+        """Keep a result that this process does not need again."""
+        self._write(self._path(key), value)
 
     def stage(self, spec: Spec, stage: StageName) -> Generator[Any, None, Any]:
         """Return the result of a stage of the chain; compute the stages before it if necessary."""
@@ -68,6 +79,9 @@ class Store:
 
         done = yield from run(spec, self, stages)
         return tuple(one.value for one in done.values())
+
+    def _path(self, key: tuple[Hashable, ...]) -> Path:
+        return Path(self.folder, f"{key[0]}-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}")
 
     def _write(self, path: Path, value: Any) -> None:
         """Write a result after its checksum. If the disk is full, the result is only lost to later calls."""

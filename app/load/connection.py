@@ -17,10 +17,12 @@ from websockets.sync.client import connect
 from app.window.stepper import MARKS
 
 PATIENCE_S = 30.0
-DRAWN_QUERY = "packetmesh.ask("
-"""Start of the script by which the server asks whether everything is drawn."""
+DRAWN_QUERY = 'data-packetmesh-call="ask"'
+"""Part of the HTML by which the server asks whether everything is drawn."""
 DRAWN = "Say that all is drawn"
 """Label of the command that answers it."""
+OLD = "packetmesh-old"
+"""Part of the HTML that dims the numbers or the picture."""
 _CURRENT = re.compile(r"nth-of-type\((\d+)\) {[^}]*color: white;")
 _MARK = re.compile(r"nth-of-type\((\d+)\) .mantine-Button-label::after {[^}]*00a0(.)'")
 
@@ -62,6 +64,8 @@ class Connection:
         """The step that is shown."""
         self.shown_s: dict[str, float] = {}
         """Time when each step was last shown, and when ``surface`` was last up to date."""
+        self._dimmed: set[str] = set()
+        """Texts that dim what belongs to other settings than the current ones, by their uuids."""
         self.lost = False
         """Whether the server closed the connection."""
         self._drawn: set[str] = set()
@@ -138,22 +142,30 @@ class Connection:
         if "_markdown" in properties:
             self.texts[uuid] = properties["_markdown"]
         if "content" in properties:
-            self._take_html(properties["content"])
+            self._take_html(uuid, properties["content"])
         if "options" in properties and uuid in self.uuids.get("Steps", ()):
             self.steps = tuple(properties["options"])
         value = message.get("value", properties.get("value"))
         if value is not None:
             self.values[uuid] = value
 
-    def _take_html(self, content: str) -> None:
-        """Read which step is shown; answer the question whether everything is drawn."""
+    def _take_html(self, uuid: str, content: str) -> None:
+        """Read which step is shown and what is dimmed; answer the question whether everything is drawn."""
         if DRAWN_QUERY in content:
-            for uuid in self._drawn:
-                self.send(messages.CommandTriggerMessage(uuid))
+            for command in self._drawn:
+                self.send(messages.CommandTriggerMessage(command))
         current = _CURRENT.search(content)
         if current is not None and self.steps:
             self.current = self.steps[int(current[1]) - 1]
             self.shown_s[self.current] = time.monotonic()
             self._marks = {self.steps[int(number) - 1]: mark for number, mark in _MARK.findall(content)}
-            if self.mark("Surface") == MARKS["fresh"]:
-                self.shown_s["surface"] = time.monotonic()
+            self._note_surface()
+        if OLD in content:
+            self._dimmed.add(uuid)
+        elif uuid in self._dimmed:
+            self._dimmed.remove(uuid)
+            self._note_surface()
+
+    def _note_surface(self) -> None:
+        if self.mark("Surface") == MARKS["fresh"] and not self._dimmed:
+            self.shown_s["surface"] = time.monotonic()

@@ -22,6 +22,8 @@ STAY_S = 90.0
 LOOK_S = 0.5
 LATE_S = 2.0
 """Limit for an answer that needs no computation, seconds."""
+PREPARED_S = 900.0
+"""Limit of the wait until the server has computed ahead what it does before a class comes, seconds."""
 SETTLE_S = 2.0 * PATIENCE_S
 """Wait after the last browser has left, seconds."""
 
@@ -37,6 +39,8 @@ class Load:
     """State before the first browser."""
     after: Look
     """State some time after the last browser."""
+    prepared_s: float = 0.0
+    """Time for which the server was left to compute ahead before the first browser came."""
 
     def record(self) -> dict[str, Any]:
         """Return the figures; times in seconds."""
@@ -44,6 +48,7 @@ class Load:
         end_s = self.looks[-1][0]
         return {
             "browsers": len(self.diaries),
+            "prepared_s": self.prepared_s,
             "clicks": sum(len(diary.answers_s) for diary in self.diaries),
             "answers_s": _spread([s for diary in self.diaries for s in diary.answers_s]),
             "late": sum(s > LATE_S for diary in self.diaries for s in diary.answers_s),
@@ -72,6 +77,7 @@ class Load:
         spreads = [(name, record[key]) for key, name in names.items() if record[key]["count"]]
         quarters = [quarter for quarter in record["quarters"] if quarter]
         return (
+            f"browsers came after {self.prepared_s:.0f} s of computing ahead",
             *(
                 f"{name}: median {one['median']:.2f}, 95 % {one['p95']:.2f}, most {one['max']:.2f} s "
                 f"({one['count']})"
@@ -118,8 +124,9 @@ class Load:
 
 
 def put_load(seconds: float) -> Load:
-    """Keep thirty browsers this long after all have the room's surface; five of them leave in the middle."""
+    """Keep thirty browsers on a prepared server for this long; five of them leave in the middle."""
     with serving(SCENE) as server:
+        prepared_s = _prepare(server)
         before = server.look()
         started_s = time.monotonic()
         visitors = [Visitor(server.url, seed) for seed in range(BROWSERS)]
@@ -130,7 +137,16 @@ def put_load(seconds: float) -> Load:
         for visitor in visitors[LEAVING:]:
             visitor.leave()
         looks += _looks(server, started_s, seconds + SETTLE_S)
-        return Load(tuple(visitor.diary for visitor in visitors), tuple(looks), before, server.look())
+        diaries = tuple(visitor.diary for visitor in visitors)
+        return Load(diaries, tuple(looks), before, server.look(), prepared_s)
+
+
+def _prepare(server: Serving) -> float:
+    """Wait until the server has computed ahead, as before a lesson. Returns the time that it took."""
+    started_s = time.monotonic()
+    while not server.look().prepared and time.monotonic() - started_s < PREPARED_S:
+        time.sleep(LOOK_S)
+    return time.monotonic() - started_s
 
 
 def soak(seconds: float) -> Load:

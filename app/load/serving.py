@@ -29,6 +29,8 @@ class Look:
     bytes: int
     strays: tuple[int, ...]
     """Running jobs of browsers that have left, each with its own number."""
+    prepared: bool
+    """Whether all that is computed ahead is there."""
     server_bytes: int = 0
     """Memory of the server process."""
     workers_bytes: int = 0
@@ -45,7 +47,7 @@ class Serving:
     def look(self) -> Look:
         """Return the present state."""
         self._pipe.send("look")
-        inside: tuple[int, int, int, int, tuple[int, ...]] = self._pipe.recv()
+        inside: tuple[int, int, int, int, tuple[int, ...], bool] = self._pipe.recv()
         return Look(*inside, _memory_bytes(self._process), sum(map(_memory_bytes, self._workers())))
 
     def _workers(self) -> list[psutil.Process]:
@@ -86,7 +88,7 @@ def _serve(pipe: Connection, scene: str) -> None:
     from app.server import build_server
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    app = build_server(scene, port=0)
+    app = build_server(scene, port=0, ahead=True)
     unused, numbers = itertools.count(), dict[object, int]()  # running jobs only: it keeps owners alive
     try:
         pipe.send(app.url)
@@ -96,7 +98,9 @@ def _serve(pipe: Connection, scene: str) -> None:
             sizes = list(_sizes(app.folder.path))
             numbers = {owner: numbers[owner] if owner in numbers else next(unused) for owner in gone}
             strays = tuple(numbers.values())
-            pipe.send((len(app.sessions), threading.active_count(), len(sizes), sum(sizes), strays))
+            prepared = app.ahead is not None and app.ahead.done
+            inside = len(app.sessions), threading.active_count(), len(sizes), sum(sizes), strays, prepared
+            pipe.send(inside)
     except EOFError:
         pass
     finally:

@@ -11,6 +11,8 @@ import numpy as np
 from websockets.exceptions import WebSocketException
 
 from app.load.connection import Connection, wait_for
+from app.screens.surface.quick import QUIET_S
+from app.screens.surface.settings import STEP_MM
 from app.window.stepper import MARKS
 
 STEPS = ("Scene", "Depth", "Fuse", "Surface", "Export")
@@ -95,10 +97,12 @@ class Visitor:
         self.diary.answers_s.append(page.shown_s[step] - clicked_s)
 
     def _drag(self, page: Connection) -> None:
-        for radius_mm in np.sort(self._rng.uniform(*RADIUS_MM, MOVES)):
+        steps = np.round(self._rng.uniform(*RADIUS_MM, MOVES) / STEP_MM)
+        for radius_mm in np.sort(STEP_MM * steps):
             page.set("Radius (mm)", float(radius_mm))
+            self._dragged_s = time.monotonic()
             time.sleep(MOVE_S)
-        self._dragged_s = time.monotonic()
+        time.sleep(QUIET_S)  # a hand that has just let go clicks nothing yet
 
     def _look_for_mesh(self, page: Connection) -> None:
         """Record the time of the last drag's surface if it has come."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +15,8 @@ import viser
 from app.compute import jobs
 from app.compute.lane import LatestWins, Submission, Track
 from app.compute.pool import ComputePool, Outcome
-from app.compute.state import CHAIN, STEPS, Results, SharedViews, Spec, Step
+from app.compute.shared import SharedViews
+from app.compute.state import CHAIN, STEPS, Results, Spec, Step
 from app.compute.store import Store
 from app.session.framing import Framing
 from app.session.places import Places
@@ -163,9 +164,15 @@ class Session:
         """
         self.post(self._run_beside, self._side, job, arguments, on_end, on_partial)
 
-    def quick_job(self, job: str, *arguments: Any, on_end: Callable[[Any], None]) -> None:
-        """Run a job of a fraction of a second in parallel with the chain; of several, only the last."""
-        self._run_beside(self._quick, job, arguments, on_end, lambda _: None)
+    def quick_job(
+        self, job: str, *arguments: Any, on_end: Callable[[Any], None], key: Hashable = None
+    ) -> None:
+        """Run a job in parallel with the chain; of several, only the last. Answers with a key are shared."""
+        view = None if key is None else self._shared.get(key)
+        if view is None:
+            self._run_beside(self._quick, job, arguments, on_end, lambda _: None, key)
+        else:
+            self.post(on_end, view)
 
     def _run_beside(
         self,
@@ -174,6 +181,7 @@ class Session:
         arguments: tuple[Any, ...],
         on_end: Callable[[Any], None],
         on_partial: Callable[[Any], None],
+        key: Hashable = None,
     ) -> None:
         def progressed(value: Any) -> None:
             if not isinstance(value, Progress):
@@ -184,19 +192,20 @@ class Session:
         def ended(outcome: Outcome) -> None:
             if outcome.kind == "error":
                 self.notify("That did not work", outcome.value)
+            elif outcome.kind == "result" and key is not None:
+                self._shared.put(key, outcome.value)
             on_end(outcome.value if outcome.kind == "result" else None)
             self._show_status()
 
         post = self.post if lane.urgent else self._post_in_turn
         lane.submit(
-            jobs.run,
-            job,
+            *((jobs.run, job) if key is None else (jobs.run_kept, job, key)),
             self.store,
             self.spec,
             *arguments,
             on_progress=lambda value: post(progressed, value),
             on_end=lambda outcome: post(ended, outcome),
-            key=(job, self.spec, arguments),
+            key=(job, self.spec, arguments) if key is None else key,
         )
         if not lane.urgent:
             self._show_status()
@@ -267,6 +276,8 @@ class Session:
         self.results.put(step, key, view)
         for panel in self.panels:
             panel.on_view(step, view)
+        if step == "surface" and key == self.spec.key(step):
+            self._shared.on_surface(self.spec, view)
 
     def _progressed(self, step: Step | None, value: Any, key: tuple[Any, ...] = ()) -> None:
         if isinstance(value, Progress):

@@ -251,7 +251,7 @@ class Bench:
                 self.results.put(step, key, view)
                 self.panel.on_view(step, view)
 
-    def side_job(self, job, *arguments, on_end, on_partial=None):
+    def side_job(self, job, *arguments, on_end, on_partial=None, key=None):
         view = None
         try:
             if not self.refuse:

@@ -6,13 +6,17 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from app.compute.turns import Turns
+from app.load.connection import DRAWN_QUERY, OLD, Connection
 from app.load.load import Load
 from app.load.serving import Look
-from app.load.visitor import Diary
+from app.load.visitor import RADIUS_MM, Diary
+from app.screens.surface.settings import STEP_MM
+from app.window.page import page_call, stale_html
+from app.window.stepper import _style
 
 
 def look(strays=(), server=100, files=3):
-    return Look(2, 10, files, 1000, strays, server, 200)
+    return Look(2, 10, files, 1000, strays, True, server, 200)
 
 
 def test_the_figures_of_a_load():
@@ -21,7 +25,7 @@ def test_the_figures_of_a_load():
         Diary(answers_s=[0.2], lost="ConnectionError: the server ended the connection"),
     )
     looks = ((0.0, look()), (1.0, look((7,))), (2.0, look((7, 8), server=150)), (9.0, look((7,), files=4)))
-    load = Load(diaries, looks, look(), look())
+    load = Load(diaries, looks, look(), look(), prepared_s=100.0)
     record = load.record()
     assert record["clicks"] == 3
     assert record["answers_s"] == pytest.approx({"count": 3, "median": 0.2, "p95": 0.29, "max": 0.3})
@@ -34,6 +38,7 @@ def test_the_figures_of_a_load():
     assert [quarter["files"] for quarter in record["quarters"] if quarter] == [3, 4]
     first = record["quarters"][0]
     assert (first["server_least_bytes"], first["server_bytes"]) == (100, 150)
+    assert "100 s of computing ahead" in load.notes()[0]
     assert any("lost: 1 of 2" in note for note in load.notes())
 
 
@@ -51,3 +56,25 @@ def test_one_draws_after_the_other_and_who_waits_goes_on_with_other_things():
         turns.give(lambda: quick.submit(done.set))
         assert done.wait(10.0)
     assert order == ["clicked", "drawn", "drawn second"]
+
+
+def test_a_simulated_page_knows_the_html_that_a_page_knows():
+    assert DRAWN_QUERY in page_call("ask", [3], True)
+    assert OLD in stale_html(numbers=True, picture=False)
+    assert OLD in stale_html(numbers=False, picture=True)
+    assert OLD not in stale_html(numbers=False, picture=False)
+
+
+def test_a_surface_counts_once_nothing_shown_is_dimmed():
+    page = object.__new__(Connection)  # no server
+    page.steps, page.shown_s, page._marks, page._dimmed = ("Scene", "Surface"), {}, {}, set()
+    page._take_html("dimming", stale_html(numbers=True, picture=False))
+    page._take_html("stepper", _style(1, ["fresh", "fresh"]))
+    assert page.current == "Surface"
+    assert "surface" not in page.shown_s
+    page._take_html("dimming", stale_html(numbers=False, picture=False))
+    assert "surface" in page.shown_s
+
+
+def test_simulated_hands_drag_between_steps_of_the_slider():
+    assert all(radius_mm % STEP_MM == 0.0 for radius_mm in RADIUS_MM)

@@ -22,6 +22,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from playwright.sync_api import Page, sync_playwright
+from websockets.exceptions import InvalidStatus
 
 from app.load.connection import Connection, wait_for
 from app.window.stepper import MARKS
@@ -31,7 +32,7 @@ PATIENCE_MS = 300_000
 MOMENTS = {
     "panels": "button:has-text('Surface')",
     "scene": "role=button[name='Scene ✓']",
-    "surface": "text=No-hit rays",
+    "surface": "text=Rays without a surface",
     "all numbers": "role=button[name='Surface ✓']",
     "up to date": "text=Up to date",
 }
@@ -121,7 +122,7 @@ def _connected(url: str) -> Connection:
     while True:
         try:
             return Connection(url)
-        except OSError:
+        except (OSError, InvalidStatus):  # it does not listen, or lets nobody in yet
             time.sleep(0.05)
 
 

@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from app.compute.pool import Outcome
-from app.compute.state import SharedViews
+from app.compute.shared import SharedViews
+from app.compute.store import Store
 from app.screens.scene.panel import ScenePanel
 from app.session.session import CANCELLED, Session
 from app.web.uploads import Uploads
@@ -44,7 +45,8 @@ def pool():
 
 @pytest.fixture
 def session(server, store, pool, tmp_path):
-    session = Session(server, pool, store, Uploads(tmp_path), SharedViews(), START, [ScenePanel])
+    shared = SharedViews(Store(str(tmp_path)))
+    session = Session(server, pool, store, Uploads(tmp_path), shared, START, [ScenePanel])
     with contextlib.closing(session):
         settle(session)
         yield session
@@ -77,7 +79,8 @@ class Curious(ScenePanel):
 
 
 def test_a_job_beside_the_chain_waits_for_the_step_that_follows(server, store, pool, tmp_path):
-    session = Session(server, pool, store, Uploads(tmp_path), SharedViews(), START, [Curious])
+    shared = SharedViews(Store(str(tmp_path)))
+    session = Session(server, pool, store, Uploads(tmp_path), shared, START, [Curious])
     with contextlib.closing(session):
         settle(session)
         pool.begun[0](Outcome("result", "a view"))

@@ -1,0 +1,74 @@
+"""Answers that all sessions share: each is computed once, the newest are in memory, all are in the store."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from app.compute.state import Spec
+from app.compute.store import Store
+from app.compute.turns import Turns
+
+LIMIT_BYTES = 128 << 20
+"""Limit of the answers in memory; those of one demo scene take 27 MB, those of a further radius 4 MB."""
+
+
+class SharedViews:
+    """The views and quick looks of all sessions by what they depend on."""
+
+    def __init__(self, store: Store, limit_bytes: int = LIMIT_BYTES) -> None:
+        self.turns = Turns()
+        self.on_surface: Callable[[Spec, Any], None] = lambda spec, view: None
+        """Called when a session, or the first one to come, has the complete surface of a spec."""
+        self._store, self._limit_bytes = store, limit_bytes
+        self._views: OrderedDict[Hashable, tuple[int, Any]] = OrderedDict()
+        self._bytes = 0
+        self._lock = threading.Lock()
+
+    def get(self, key: Hashable) -> Any:
+        """Return the answer with this key, or None. Of sessions that ask at once, one reads the file."""
+        with self._lock:
+            if key in self._views:
+                self._views.move_to_end(key)
+                return self._views[key][1]
+            view = self._store.get(kept(key))
+            if view is not None:
+                self._keep(key, view)
+            return view
+
+    def put(self, key: Hashable, view: Any) -> None:
+        """Keep an answer in memory, and the least recently used ones only in the store if it has them."""
+        with self._lock:
+            self._keep(key, view)
+
+    def _keep(self, key: Hashable, view: Any) -> None:
+        size = size_bytes(view)
+        self._bytes += size - self._views.pop(key, (0, None))[0]
+        self._views[key] = (size, view)
+        while self._bytes > self._limit_bytes and len(self._views) > 1:
+            self._bytes -= self._views.popitem(last=False)[1][0]
+
+
+def kept(key: Hashable) -> tuple[Hashable, ...]:
+    """Return the key of an answer in the store, where the stages of the chain have theirs."""
+    return ("view", key)
+
+
+def size_bytes(value: Any) -> int:
+    """Return about how much memory a view takes: that of its arrays, files and texts."""
+    if isinstance(value, np.ndarray):
+        return int(value.nbytes)
+    if isinstance(value, bytes | str):
+        return len(value)
+    if isinstance(value, Mapping):
+        return sum(map(size_bytes, value.values()))
+    if isinstance(value, Iterable):
+        return sum(map(size_bytes, value))
+    if is_dataclass(value):
+        return sum(size_bytes(getattr(value, part.name)) for part in fields(value))
+    return 8
