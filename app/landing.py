@@ -35,9 +35,10 @@ _HERE = Path(__file__).parent
 SCRIPTS = tuple(
     _HERE / f"{name}.js"
     for name in (
-        *("window/page", "window/plotly", "window/hint", "window/dock_row"),
+        *("window/page", "window/plotly", "window/hint", "window/notice", "window/dock_row"),
         *("dock/dock_view", "dock/dock", "dock/dock_plots"),
-        *("session/address", "lesson/lesson", "session/lecture", "screens/fuse/board"),
+        *("session/address", "window/actions", "lesson/lesson", "session/lecture"),
+        *("screens/fuse/lanes", "screens/fuse/board"),
         *("landing", "web/refused"),
     )
 )
@@ -45,7 +46,7 @@ SCRIPTS = tuple(
 STYLES = tuple(
     _HERE / f"{name}.css"
     for name in (
-        *("window/page", "window/hint", "lesson/lesson", "dock/dock", "session/lecture"),
+        *("window/page", "window/hint", "window/notice", "lesson/lesson", "dock/dock", "session/lecture"),
         *("screens/fuse/board", "landing", "web/refused"),
     )
 )

@@ -66,9 +66,9 @@ def mesh_lines(report: dict[str, Any]) -> str:
         "radii": f"{sizes} mm",
         "mesh": f"{report['triangles']} triangles of {report['vertices']} points{closed}",
         "unused": f"{report['unused_points']} of {report['points']} points",
-        "boundary": (
-            f"{report['boundary_loops']} loops, {report['boundary_length_m']:.4g} m in all; the holes (loops "
-            f"under {LONGEST_HOLE_M:g} m) cover {report['hole_area_m2']:.4g} m2, longer loops are rims"
+        "rims": (
+            f"{report['boundary_loops']}, {report['boundary_length_m']:.4g} m in all; the holes (rims under "
+            f"{LONGEST_HOLE_M:g} m) cover {report['hole_area_m2']:.4g} m2, longer ones are outer rims"
         ),
         "connection": f"{report['components']} components, Euler number {report['euler']}, "
         f"{report['non_manifold_edges']} non-manifold edges",

@@ -121,6 +121,8 @@
         " ": () => this.say("toggle"),
         ArrowLeft: () => this.say("step", -1),
         ArrowRight: () => this.say("step", 1),
+        ArrowUp: () => {}, // would turn the view
+        ArrowDown: () => {},
         Home: () => this.say("seek", this.start),
         End: () => this.say("seek", this.end),
         "+": () => this.zoomClock(),

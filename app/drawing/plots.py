@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import plotly.graph_objects as go
+import plotly.io as pio
 
 from app.drawing.colors import BRAND, css
 
+_STYLE = pio.templates["plotly_white"].to_plotly_json()
 BAND95 = 1.96
 """Standard deviations to each side that hold 95 % of a normal distribution."""
 
@@ -22,9 +26,21 @@ def titled_figure(title: str, x_title: str, y_title: str) -> go.Figure:
     )
 
 
+class _Styled(go.Figure):
+    """A plot that gets the common style when it is written: plotly would check the style anew for each plot,
+    which takes 10 ms.
+    """
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the plot as plotly writes it."""
+        plot: dict[str, Any] = super().to_dict()
+        plot["layout"]["template"] = _STYLE
+        return plot
+
+
 def styled_figure(**layout: object) -> go.Figure:
-    """Return an empty plot in the common style; a style that is set later takes twice the time (17 ms)."""
-    return go.Figure(layout={"template": "plotly_white", **layout})
+    """Return an empty plot in the common style."""
+    return _Styled(layout={"template": "none", **layout})
 
 
 def image_figure(title: str, size_px: tuple[int, int]) -> go.Figure:

@@ -3,6 +3,7 @@
 window.packetmeshAddress = (() => {
   let name = null; // name of the session's hidden field
   let keys = []; // the app's keys in the query
+  let start = new URLSearchParams(); // the query of the session's start
   let said = 0;
   let unsaid = null; // query that the server has not received yet
   let again = 0; // timer of the next attempt to send it
@@ -31,10 +32,17 @@ window.packetmeshAddress = (() => {
   window.addEventListener("popstate", say); // the browser's Back and Forward buttons
 
   return {
+    // The keys whose values differ from those at the start.
+    get changed() {
+      const now = new URLSearchParams(location.search);
+      return keys.filter(key => `${now.getAll(key)}` !== `${start.getAll(key)}`);
+    },
+
     // Start a session: after the page loads or reloads, or when the server is back.
-    begin(session, own) {
+    begin(session, own, from) {
       name = session;
       keys = own;
+      start = new URLSearchParams(from);
       say();
     },
 
@@ -50,9 +58,11 @@ window.packetmeshAddress = (() => {
       if (unsaid !== null) return;
       const [own, others] = split();
       const query = others ? `${others}&${text}` : text;
-      if (own !== text) history[place ? "pushState" : "replaceState"](null, "", `${location.pathname}?${query}`);
+      if (own === text) return;
+      history[place ? "pushState" : "replaceState"](null, "", `${location.pathname}?${query}`);
+      window.dispatchEvent(new Event("packetmesh-address"));
     },
   };
 })();
-packetmesh.calls.beginAddress = (_, session, own) => packetmeshAddress.begin(session, own);
+packetmesh.calls.beginAddress = (_, ...given) => packetmeshAddress.begin(...given);
 packetmesh.calls.showAddress = (_, text, place) => packetmeshAddress.show(text, place);

@@ -28,7 +28,7 @@ from pipeline.sources import Source, demo_of
 
 WAIT_S = 0.3
 """Delay between a change and the update of the address, seconds."""
-FILES = {"depth.model"}
+FILES = {"depth.model", "depth.completion"}
 """Settings that name a file of the server: an address must not set them."""
 
 
@@ -140,7 +140,7 @@ class Address:
         self._count = 0
         name = uuid.uuid4().hex
         own = ["scene", "preset", "set", "screen", *keys]
-        with add_hidden(ui, name, page_call("beginAddress", name, own)):
+        with add_hidden(ui, name, page_call("beginAddress", name, own, start.text())):
             self._field = ui.when_changed(ui.gui.add_text("Address", ""), self._on_message)
             self._message = ui.gui.add_html(Markup(""))
         self._timer = ui.debounce(WAIT_S, self._send)

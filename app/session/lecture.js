@@ -52,7 +52,7 @@ window.packetmeshLecture = (() => {
   }
 
   // Dragging or scrolling the picture gives the student an own view.
-  const roam = event => event.target.matches?.("canvas[data-engine]") && follow(false);
+  const roam = event => name !== null && event.target.matches?.("canvas[data-engine]") && follow(false);
   window.addEventListener("wheel", roam, {capture: true, passive: true});
   window.addEventListener("pointermove", event => event.buttons && roam(event), true);
 

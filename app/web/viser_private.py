@@ -5,6 +5,8 @@ this.
 lets the event loop set it again. asyncio's events are not thread-safe: if the loop begins to wait at that
 moment, ``set`` fails with "deque mutated during iteration", once in some thousand visits, and leaves a page
 half built.
+- ``remember_hints``: viser evaluates the type hints of a control's properties anew for every control, which
+is a seventh of the time in which a session's panels are built.
 - ``listen``: viser gives every message of a browser to its handlers and has no hook before them.
 - ``find_control``, ``find_command``, ``is_live``: the target of a message, and whether a user could reach it.
 - ``address_of``, ``close``, ``cookies``: parts of a browser's connection.
@@ -13,11 +15,13 @@ half built.
 from __future__ import annotations
 
 import asyncio
+import functools
 from collections.abc import Awaitable, Callable
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, get_type_hints
 
 import viser
 from viser import _messages as messages
+from viser._assignable_props_api import AssignablePropsBase
 
 Listener: TypeAlias = Callable[[int, Any, Callable[[], Awaitable[None]]], Awaitable[None]]
 """Takes the browser's number, its message, and a function that lets viser handle the message."""
@@ -43,6 +47,13 @@ def queue_from_any_thread(server: viser.ViserServer) -> None:
 
     queue_to(server._websock_server)
     server._websock_server.on_client_connect(queue_to)
+
+
+def remember_hints() -> None:
+    """Evaluate the type hints of a kind of control or scene node once, not for each of them."""
+    hints_of = functools.cache(get_type_hints)
+    hints = property(lambda handle: hints_of(type(handle._impl.props)))  # type: ignore[arg-type]
+    setattr(AssignablePropsBase, "_prop_hints", hints)  # noqa: B010
 
 
 def _on_loop() -> bool:

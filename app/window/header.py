@@ -1,4 +1,7 @@
-"""The top of the control panel: the stepper, the status line, the progress bar, and buttons for all steps."""
+"""The top of the control panel: the stepper, the status line, the progress bar, and buttons for all steps.
+
+``actions.js`` disables the buttons that have nothing to do; ``Reset`` by what was used in the page.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from app.compute.state import Step, StepStatus
 from app.drawing.colors import BRAND, DELIVERED
 from app.web.markup import Markdown, Markup
 from app.window.gui import Gui
-from app.window.page import stale_html
+from app.window.page import page_call, stale_html
 from app.window.stepper import Stepper
 from packetmesh.progress import Progress
 
@@ -30,6 +33,7 @@ class Header:
         self._status = gui.add_markdown(STARTING)
         self._bar = gui.add_progress_bar(0.0)
         self._stale = gui.add_html(Markup(""))
+        self._idle = gui.add_html(page_call("idle", ("Cancel", "Retry")))
         actions = gui.add_button_group(
             "All steps",
             ("Cancel", "Retry", "Reset", "Copy as command"),
@@ -66,6 +70,9 @@ class Header:
             busy: whether a side job runs.
         """
         self._stepper.show(current, statuses)
+        computing = bool(running) or busy
+        alive = {"Cancel": computing, "Retry": failure is not None}
+        self._idle.content = page_call("idle", [name for name in alive if not alive[name]])
         if running:
             self._status.content = Markdown("**Computing** · {}").format(running[0])
         elif failure is not None:
@@ -78,4 +85,4 @@ class Header:
             self._bar.value = 100.0
         elif self._status.content == STARTING:
             self._status.content = Markdown("**Computing** …")
-        self._bar.color = BRAND if running or busy else DELIVERED
+        self._bar.color = BRAND if computing else DELIVERED

@@ -1,6 +1,7 @@
 // Explanations that open on a click: for names in tables and texts, and for labels of controls.
 (() => {
   const GAP_PX = 6;
+  const HINT_PX = 280; // width of viser's hints, and a margin
   const FARTHEST = 40; // most page elements between a label and its control
   const note = Object.assign(document.createElement("div"), {className: "packetmesh-hint"});
   note.setAttribute("role", "note");
@@ -32,16 +33,37 @@
     about = null;
   }
 
+  const panelOf = one => one.closest?.(".mantine-ScrollArea-viewport")?.getBoundingClientRect();
+
+  // Return the left and top edge of the note: over the picture beside or above the control panel, so that it covers
+  // none of the panel's rows; below or above the element if that is elsewhere or there is no room.
+  function place(one) {
+    const at = one.getBoundingClientRect(), {width, height} = note.getBoundingClientRect();
+    const panel = panelOf(one);
+    if (panel && panel.left >= width + 2 * GAP_PX)
+      return [panel.left - width - GAP_PX, Math.min(at.top, innerHeight - height - GAP_PX)];
+    const left = Math.max(8, Math.min(at.left, innerWidth - width - 8));
+    if (panel && panel.top >= height + 2 * GAP_PX) return [left, panel.top - height - GAP_PX];
+    const below = at.bottom + GAP_PX + height < innerHeight;
+    return [left, below ? at.bottom + GAP_PX : Math.max(8, at.top - GAP_PX - height)];
+  }
+
   function show(one) {
     about = one;
     note.textContent = one.dataset.hint;
     document.body.append(note);
-    const at = one.getBoundingClientRect(), {width, height} = note.getBoundingClientRect();
-    stood = at.top;
-    const below = at.bottom + GAP_PX + height < innerHeight;
-    note.style.left = `${Math.max(8, Math.min(at.left, innerWidth - width - 8))}px`;
-    note.style.top = `${below ? at.bottom + GAP_PX : Math.max(8, at.top - GAP_PX - height)}px`;
+    stood = one.getBoundingClientRect().top;
+    [note.style.left, note.style.top] = place(one).map(px => `${px}px`);
   }
+
+  // viser's own hints, which open while a mouse rests on a control, go beside the panel too.
+  window.addEventListener("pointerover", ({target}) => {
+    const panel = panelOf(target);
+    if (!panel) return;
+    const root = document.documentElement;
+    root.classList.toggle("packetmesh-beside", panel.left >= HINT_PX);
+    root.style.setProperty("--packetmesh-beside", `${innerWidth - panel.left + GAP_PX}px`);
+  });
 
   window.addEventListener("click", event => {
     const one = event.target.closest?.("[data-hint]");

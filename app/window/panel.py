@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
@@ -97,8 +97,10 @@ class PanelSession(Protocol):
         """Run a job next to the chain, in place of the one before."""
         ...
 
-    def quick_job(self, job: str, *arguments: Any, on_end: Callable[[Any], None]) -> None:
-        """Run a job of a fraction of a second; of several submitted, only the last."""
+    def quick_job(
+        self, job: str, *arguments: Any, on_end: Callable[[Any], None], key: Hashable = None
+    ) -> None:
+        """Run a job of a fraction of a second; of several, only the last. Answers with a key are shared."""
         ...
 
     def cancel_side_job(self) -> None:

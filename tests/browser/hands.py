@@ -36,7 +36,7 @@ CELL_PX, LEVELS = 16, 15
 resolution of its canvas as it goes, which no eye would call another picture."""
 ALIKE = 0.02
 """Share of cells that may differ, by so many levels, between two pictures of the same thing."""
-UNCOVERED = ".mantine-Notifications-root, [role=tooltip] { display: none !important }"
+UNCOVERED = ".mantine-Notifications-root, .packetmesh-notice, [role=tooltip] { display: none !important }"
 
 
 DRAW = """() => {
@@ -158,7 +158,7 @@ def afresh(page, query="fixedDpr=1"):
 
 
 def dismiss_notifications(page):
-    """Close viser's notice about software rendering and anything else in the corner."""
+    """Close whatever is in the corner."""
     close = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(one => one.click())"
     page.evaluate(close)  # one that goes by itself meanwhile is no longer there to be clicked
     page.wait_for_timeout(400)

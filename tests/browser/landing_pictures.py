@@ -13,9 +13,11 @@ import numpy as np
 from PIL import Image, ImageFile
 
 from app.landing import PICTURES
+from packetmesh.progress import drain
 from pipeline.io.demos import DEMO_SCENES, DEMO_WALKS, SCENES
 from pipeline.kernels.geometry import apply, inverse, look_at, project
 from pipeline.sources import demo_of
+from pipeline.stages import open_rig
 from pipeline.types import CameraIntrinsics
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -64,7 +66,7 @@ def cut_short(scene: str) -> Image.Image:
 
 def walked(name: str) -> Image.Image:
     """The map of a walk, obliquely from above without the surfaces that face away, and the camera's path."""
-    walk = demo_of(name).load().walk
+    walk = drain(open_rig(demo_of(name))).walk
     camera = CameraIntrinsics.pinhole(800.0, 800.0, 479.5, 299.5, 960, 600)
     points_m, path_m = walk.map.points_m, np.array([T[:3, 3] for T in walk.T_world_camera if T is not None])
     middle_m = 0.5 * (points_m.min(axis=0) + points_m.max(axis=0))

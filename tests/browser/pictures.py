@@ -107,7 +107,7 @@ def _row(folder: Path) -> np.ndarray:
     before, after = (f"{share:.1%}" for share in misses)
     panels = (
         ("colour image", frame.rgb),
-        (f"before fusion: {before} of rays miss", mesh_picture(result.before, camera)),
+        (f"before fusion: {before} of rays without a surface", mesh_picture(result.before, camera)),
         (f"after fusion: {after}", mesh_picture(result.after, camera)),
         ("blue: measured, violet: inferred", mesh_picture(origin, camera)),
     )

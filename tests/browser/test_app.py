@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.hands import ALIKE, PATIENCE_MS, STEPS, canvas, changed_from, differing, go, slider
+from tests.browser.conftest import SIZE_PX
+from tests.browser.hands import ALIKE, PATIENCE_MS, STEPS, canvas, changed_from, differing, go, pick, slider
 
 
 def test_all_of_a_file_run_on_one_worker(request):
@@ -94,6 +95,32 @@ def test_the_command_is_shown(page):
     text = page.locator("pre").first.inner_text()
     page.get_by_role("button", name="Close").click()
     assert text.startswith("packetmesh reconstruct --scene box-on-table --preset packetmesh")
+
+
+def test_buttons_with_nothing_to_do_are_dead(page):
+    cancel, retry, reset = (
+        page.get_by_role("button", name=name, exact=True) for name in ("Cancel", "Retry", "Reset")
+    )
+    for button in (cancel, retry, reset):
+        expect(button).to_be_disabled()
+    go(page, "Depth")
+    pick(page, "Colours", "photo")
+    expect(reset).to_be_enabled()
+    reset.click()
+    for button in (cancel, retry, reset):
+        expect(button).to_be_disabled()
+
+
+def test_that_the_picture_is_drawn_in_software_is_one_line_which_goes(browser, app):
+    context = browser.new_context(viewport=SIZE_PX)
+    other = context.new_page()
+    other.goto(f"{app.url}?fixedDpr=1")
+    line = other.locator(".packetmesh-notice")
+    line.wait_for()
+    assert line.bounding_box()["height"] < 30
+    expect(other.get_by_text("Software WebGL rendering detected").locator("visible=true")).to_have_count(0)
+    line.wait_for(state="detached")
+    context.close()
 
 
 def test_a_wrong_upload_is_a_sentence_and_the_session_goes_on(page):

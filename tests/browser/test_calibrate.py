@@ -48,6 +48,8 @@ def calibrated(browser, app, few_trials):
     page.goto(f"{app.url}?fixedDpr=1")
     go(page, "Calibrate")
     page.get_by_text("without photographs of a board").wait_for()
+    folders = page.locator("svg[class*=tabler-icon-chevron-]").locator("visible=true").locator("xpath=..")
+    expect(folders).to_have_text(["Use your own photographs"])  # the only one that can be used
     press(page, "Uncalibrated nodes")
     page.get_by_text("PASS").wait_for()
     page.get_by_text("Up to date").wait_for()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 
 import cv2
@@ -152,6 +153,62 @@ def test_a_third_method_gets_a_lane_a_column_and_room(fuse):
     assert len(board(fuse)) == 3
     fuse.get_by_text("③ FICP plane").first.wait_for()
     assert changed_from(fuse, picture)
+
+
+def windows(page, count):
+    """The lanes of a race as drawn, (count, 12, 8, 3): small, because they may be half a pixel off."""
+    picture = cv2.imdecode(np.frombuffer(canvas(page, still=3), np.uint8), cv2.IMREAD_COLOR)
+    height, width = picture.shape[:2]
+    edges = [round(index * width / count) for index in range(count + 1)]
+    rows = slice(round(0.3 * height), round(0.55 * height))  # between the names and the magnified corner
+    lanes = [picture[rows, left + 2 : right - 2] for left, right in itertools.pairwise(edges)]
+    return np.array([cv2.resize(lane, (8, 12), interpolation=cv2.INTER_AREA) for lane in lanes], float)
+
+
+def test_each_lane_stays_in_its_window_however_the_view_is_turned(fuse):
+    press_button(fuse, "All four")
+    expect(fuse.locator(".packetmesh-board .lane")).to_have_count(4)
+    fuse.get_by_text("Up to date").wait_for()
+    press(fuse, "Home")
+    seen, box = [windows(fuse, 4)], fuse.locator("canvas").first.bounding_box()
+    for right, up in ((90, 10), (160, -60)):
+        x, y = box["x"] + 0.3 * box["width"], box["y"] + 0.4 * box["height"]
+        fuse.mouse.move(x, y)
+        fuse.mouse.down()
+        fuse.mouse.move(x + right, y - up, steps=4)
+        fuse.mouse.up()
+        seen.append(windows(fuse, 4))
+    fuse.mouse.wheel(0, -600)
+    seen.append(windows(fuse, 4))
+    for lanes in seen:  # all lanes start alike
+        assert lanes[0].std(axis=(0, 1)).max() > 10.0
+        assert np.abs(lanes - lanes[0]).mean() < 4.0
+    for before, after in itertools.pairwise(seen):
+        assert np.abs(after - before).mean() > 4.0
+
+
+def test_a_drag_is_no_look_of_ones_own_without_a_class(fuse):
+    fuse.mouse.move(200, 300)
+    fuse.mouse.down()
+    fuse.mouse.move(260, 310, steps=3)
+    fuse.mouse.up()
+    expect(fuse.get_by_text("You look around on your own")).to_have_count(0)
+
+
+VIEW = "() => __viserMutable.camera.matrixWorld.elements.map(one => +one.toFixed(4))"
+
+
+def test_keys_of_the_dock_never_turn_the_view(fuse):
+    fuse.get_by_text("Up to date").wait_for()
+    fuse.wait_for_timeout(2000)  # until the view fits the picture above the dock
+    before = fuse.evaluate(VIEW)
+    fuse.locator(".packetmesh-dock-row").focus()
+    for key in ("ArrowRight", "ArrowLeft", "ArrowUp", "ArrowDown", "Home", "End"):
+        fuse.keyboard.down(key)
+        fuse.wait_for_timeout(200)
+        fuse.keyboard.up(key)
+    fuse.wait_for_timeout(500)
+    assert fuse.evaluate(VIEW) == before
 
 
 def test_far_off_starts_farther_away_and_aligned_at_the_truth(fuse):

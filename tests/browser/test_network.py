@@ -103,7 +103,8 @@ def test_clouds_appear_in_the_order_in_which_their_images_were_delivered(network
     """The sink's own account of the same sending says which nodes have depth at each moment."""
     (session,) = (one for one in app.sessions.values() if one.spec.sent and one.spec.sent.coding == "jpeg")
     sent = session.spec.sent
-    sending = send(DeliverySpec(Spec(Demo("box-on-table")), sent.network, sent.coding, sent.moments))
+    source = Demo("box-on-table")
+    sending = send(DeliverySpec(Spec(source), sent.network, sent.coding, sent.moments), source.load())
     network.get_by_text("Up to date").wait_for()
     pictures, orders = [], []
     for t_ns in sending.times_ns.tolist():

@@ -36,7 +36,7 @@ def surface(tab):
     """The Surface step with everything computed, as a fresh session has it."""
     afresh(tab)
     go(tab, "Surface")
-    tab.get_by_role("row", name="No-hit rays").wait_for(timeout=180_000)
+    tab.get_by_role("row", name="Rays without a surface").wait_for(timeout=180_000)
     tab.get_by_text("Up to date").wait_for()
     return tab
 
@@ -99,7 +99,9 @@ def measured_px(png):
 
 def test_where_the_ball_falls_through_the_points_stay_and_old_numbers_are_dimmed(surface):
     meshed = measured_px(canvas(surface))
-    table = surface.locator(".packetmesh-numbers", has=surface.get_by_role("row", name="No-hit rays"))
+    table = surface.locator(
+        ".packetmesh-numbers", has=surface.get_by_role("row", name="Rays without a surface")
+    )
     old = surface.locator(".packetmesh-old-numbers")
     expect(table).to_have_css("opacity", "1")
     handle = slider(surface, "Radius (mm)")
@@ -110,7 +112,7 @@ def test_where_the_ball_falls_through_the_points_stay_and_old_numbers_are_dimmed
     expect(old).to_have_count(0)
     surface.get_by_text("Up to date").wait_for()
     expect(table).to_have_css("opacity", "1")
-    assert min(numbers(surface, "No-hit rays")) > 90.0
+    assert min(numbers(surface, "Rays without a surface")) > 90.0
     assert measured_px(canvas(surface)) > 10 * (meshed + 100)
 
 
@@ -126,10 +128,10 @@ def test_side_by_side_and_colours_by_source_tell_what_was_guessed(surface):
 
 def test_poisson_is_a_baseline_in_the_same_table(surface):
     ball = canvas(surface)
-    assert len(numbers(surface, "No-hit rays")) == 2
+    assert len(numbers(surface, "Rays without a surface")) == 2
     pick(surface, "Show", POISSON)
     surface.get_by_text("Screened Poisson reconstruction").wait_for()
-    before, after, poisson = numbers(surface, "No-hit rays")
+    before, after, poisson = numbers(surface, "Rays without a surface")
     assert poisson < after < before
     assert differing(canvas(surface), ball) > ALIKE
 

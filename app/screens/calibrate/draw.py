@@ -10,7 +10,7 @@ import viser
 
 from app.compute.records import SceneView
 from app.drawing.cameras import Stage, add_camera, turn
-from app.drawing.clouds import add_cloud, clear
+from app.drawing.clouds import add_sensor_cloud, clear
 from app.drawing.colors import BRAND, NEUTRAL, SOURCE, TARGET
 from app.drawing.poses import place
 from app.screens.calibrate.labels import Around
@@ -44,7 +44,7 @@ class BoardsDrawing:
         clear(self._scene, BELOW)
         self._handles = {}
         for node in () if scene is None else scene.nodes:
-            add_cloud(self._scene, f"{BELOW}/{node.name}/cloud", node.sensor, node.T_world_camera)
+            add_sensor_cloud(self._scene, f"{BELOW}/{node.name}/cloud", node.sensor, node.T_world_camera)
             add_camera(self._scene, f"{BELOW}/{node.name}/camera", node, node.T_world_camera)
 
     def draw_camera(self, camera: CameraView, board: Board, around: Around, chosen: str) -> None:
@@ -87,7 +87,7 @@ class BoardsDrawing:
         )
         T_world_first = believed.get(first, LEVEL_POSE)
         for node in () if scene is None else scene.nodes:
-            add_cloud(self._scene, f"{BELOW}/{node.name}/cloud", node.sensor, node.T_world_camera)
+            add_sensor_cloud(self._scene, f"{BELOW}/{node.name}/cloud", node.sensor, node.T_world_camera)
         for one in rig.cameras:
             camera = view.camera(one.name)
             if camera is None or camera.calibration is None:

@@ -13,8 +13,9 @@ board in each view: click a bar or a board. What counts is not the error on thes
 lens predicts **other views**. Go on with **Depth**."""
 )
 NOTHING = Markdown(
-    """This scene comes **without photographs of a board**: the app uses the calibration that came with it.
-Open a scene whose cameras need calibration, or use your own photographs below."""
+    """Photographs of a board of known size give each camera's lens. This scene comes
+**without photographs of a board**: the app uses the calibration that came with it. Open a scene whose cameras
+need calibration, or use your own photographs."""
 )
 
 PictureName = Literal[

@@ -47,7 +47,7 @@ class CalibratePanel(Panel):
         """Add verdict, camera, bars, views, pictures and drawing; the other numbers are in folders."""
         gui, ui = self.gui, self.ui
         self._source = inner(self.session.spec.source)
-        self._here = self._had_views = False
+        self._here = self._had_views = self._undrawn = False
         self._view: CalibrationView | None = None
         self._whole: dict[str, CameraView] = {}
         """Every camera before a view of it was dropped."""
@@ -57,16 +57,15 @@ class CalibratePanel(Panel):
         self._look: CalibrateLook | None = None
         self._came: SceneView | None = None
         """The scene as it was loaded."""
-        gui.add_markdown(TEXT)
-        lesson = read_lesson(SHIPPED, SETTINGS, CalibrateLook(), NUMBERS)
-        self._lesson = LessonFolder(ui, lesson, self._take_look, self._lesson_numbers)
+        self._groups = list[Any]()
+        """Controls that need photographs."""
+        with self._group():
+            gui.add_markdown(TEXT)
+            lesson = read_lesson(SHIPPED, SETTINGS, CalibrateLook(), NUMBERS)
+            self._lesson = LessonFolder(ui, lesson, self._take_look, self._lesson_numbers)
         self._status = gui.add_markdown(Markdown(""))
-        self._open = ui.buttons(
-            "Open",
-            {DEMO_SCENES[name].title: partial(self._open_scene, name) for name in with_boards()},
-            "Scene with photographs of a board.",
-            visible=False,
-        )
+        scenes = {DEMO_SCENES[name].title: partial(self._open_scene, name) for name in with_boards()}
+        self._open = ui.buttons("Open", scenes, "Scene with photographs of a board.", visible=False)
         self._verdict = gui.add_html(Markup(""))
         self._use = UseRow(ui, self._use_it, self._as_before)
         self._cameras = gui.add_dropdown(
@@ -89,13 +88,20 @@ class CalibratePanel(Panel):
 
     def _build_folders(self) -> None:
         ui, session = self.ui, self.session
-        self._judge = TrustFolder(ui, self._request_answers)
-        self._parameters = ParameterFolder(ui)
-        self._depth = DepthFolder(ui)
-        self._rig = RigFolder(ui)
-        self._noise = NoiseFolder(ui, self._replay, session.cancel_side_job)
+        with self._group():
+            self._judge = TrustFolder(ui, self._request_answers)
+            self._parameters = ParameterFolder(ui)
+            self._depth = DepthFolder(ui)
+            self._rig = RigFolder(ui)
+            self._noise = NoiseFolder(ui, self._replay, session.cancel_side_job)
         self._uploads = UploadFolder(ui, session.folder, self._use_own)
-        self._lens = LensFolder(ui, self._picked_lens)
+        with self._group():
+            self._lens = LensFolder(ui, self._picked_lens)
+
+    def _group(self) -> Any:
+        """Return a container that is shown where there are photographs."""
+        self._groups.append(self.gui.add_folder(None, visible=False))
+        return self._groups[-1]
 
     # The photographs.
 
@@ -105,6 +111,8 @@ class CalibratePanel(Panel):
         self._noise.show(True)
         if self.session.spec.views is None:
             self._use_own(None)
+        if self._undrawn:
+            self._draw()
 
     def on_hide(self) -> None:
         """Hide the scatter in the dock."""
@@ -195,6 +203,8 @@ class CalibratePanel(Panel):
             self._use.show(camera is not None and camera.calibration is not None)
             nothing = camera is None and self.session.spec.views is None
             self._open.visible = nothing
+            for folder in self._groups:
+                folder.visible = not nothing
             reason = "" if camera is None else camera.reason
             self._status.content = NOTHING if nothing else Markdown.escape(reason)
             self._show_numbers(camera)
@@ -360,6 +370,9 @@ class CalibratePanel(Panel):
     # Drawing.
 
     def _draw(self) -> None:
+        self._undrawn = not self._here
+        if self._undrawn:
+            return
         camera, view, around = self._shown(), self._view, AROUND[self._around.value]
         scene = self.session.results.view("scene")
         with self.ui.atomic():
@@ -369,8 +382,7 @@ class CalibratePanel(Panel):
                 self._drawing.draw_rig(view, view.rig, scene, self._came, self._photographs.chosen)
             else:
                 self._drawing.draw_camera(camera, view.board, around, self._photographs.chosen)
-        if self._here:
-            self.session.frame_view()
+        self.session.frame_view()
 
     def look(self) -> bool:
         """Turn the view to new boards; the cameras of a rig are seen with the scene."""

@@ -70,8 +70,8 @@ def surface_table(columns: dict[str, Any]) -> Markup:
     meshes = list(columns.values())
     rows = [
         (
-            "No-hit rays",
-            "Share of the cameras' pixel rays that miss the surface.",
+            "Rays without a surface",
+            "Share of the cameras' pixel rays that meet no surface: the holes.",
             *(number(mesh and mesh.quality.no_hit_ray_share, 1, "%", 100.0) for mesh in meshes),
         )
     ]

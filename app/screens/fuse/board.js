@@ -32,10 +32,11 @@
       return document.querySelector("canvas[data-engine]")?.parentElement.parentElement;
     }
 
-    setup({visible, lens, bottom, lanes, scale}) {
+    setup({visible, lens, band, lanes, scale}) {
       this.wanted = visible;
+      this.band = band;
       this.row.replaceChildren();
-      this.row.style.setProperty("--lens", `${100 * (1 - bottom)}%`);
+      this.row.style.setProperty("--lens", `${100 * (1 - band[2])}%`);
       this.lens = lens && {...lens, target: bytes(lens.target)};
       this.colors = palette(scale.stops);
       this.lanes = lanes.map(lane => this.addLane(lane));
@@ -47,6 +48,15 @@
       for (const [sign, text] of [["b", scale.target], ["u", scale.pairs]])
         make("span", "", legend, {textContent: text}).prepend(make(sign, ""));
       this.state({lanes: this.scores});
+      if (this.visible) this.came();
+    }
+
+    came() {
+      window.packetmeshLanes.show(this.lanes.length, this.band);
+    }
+
+    left() {
+      window.packetmeshLanes.show(0, this.band);
     }
 
     addLane({name, color, about, source}) {

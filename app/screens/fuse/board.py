@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from app.drawing.colors import DISTANCE_STOPS, MOST_DISTANCE_M, css
-from app.screens.fuse.draw import FOOT
+from app.screens.fuse.draw import FOOT, HEAD, HEAD_PX, WHOLE_FOOT
 from app.screens.fuse.labels import MARKS, OFF_FROM
 from app.screens.fuse.methods import METHODS, METRICS, color_of
 from app.screens.fuse.view import OFF_DIGITS, SUCCESS_M, LensView, RaceLane, RaceStep, RaceView, Reference
@@ -57,12 +57,13 @@ class Board:
 
     def _send_setup(self) -> None:
         lanes = () if self._view is None else self._view.lanes
+        lens = None if self._view is None else self._view.lens
         self._send(
             self._setup,
             kind="setup",
             visible=self._visible and bool(lanes),
-            lens=None if self._view is None or self._view.lens is None else _lens(self._view.lens),
-            bottom=FOOT,
+            lens=None if lens is None else _lens(lens),
+            band=(HEAD, HEAD_PX, WHOLE_FOOT if lens is None else FOOT),
             lanes=[_head(mark, lane) for mark, lane in zip(MARKS, lanes, strict=False)],
             scale=scale("truth" if self._view is None else self._view.reference),
         )

@@ -1,4 +1,7 @@
-"""Drawings of registrations side by side: the clouds are sent once, then only poses and pairs change."""
+"""Drawings of registrations side by side: the clouds are sent once, then only poses and pairs change.
+
+The lanes of a race have one place in the scene; the page draws each in its window (``lanes.js``).
+"""
 
 from __future__ import annotations
 
@@ -25,15 +28,13 @@ POINT_M, ROOM_POINT_M = 0.011, 0.022
 PALETTE = ramp(np.arange(256.0), 255.0, DISTANCE_STOPS)
 """RGB of every shade of a distance."""
 FOV_RAD = np.radians(25.0)
-"""Field of view of a race: small, so that all lanes are seen from the same side."""
+"""Field of view of a race."""
 HEAD, HEAD_PX = 0.225, 88.0
 """Space for names and numbers: share of the picture's height, and at least so many px (``board.css``)."""
 FOOT, WHOLE_FOOT = 0.58, 0.95
 """Lower edge of the clouds over the picture's height, from the top: with and without magnified corner."""
 RING, RING_PARTS = (20, 20, 20), 48
 """Colour of the ring around the magnified corner, and its number of segments."""
-ASPECT, HEIGHT_PX = 1.5, 600.0
-"""Aspect and height of the picture while no browser is connected."""
 MARGIN = 0.04
 """Free margin on each side, over a lane's width and the picture's height."""
 ROOM_STAGE = Stage(
@@ -53,12 +54,11 @@ class RaceDrawing:
         self._extent = _extent_of(view, stage)
         point_m = ROOM_POINT_M if stage is ROOM_STAGE else POINT_M
         self._foot = WHOLE_FOOT if view.lens is None else FOOT
-        self._lanes: list[viser.FrameHandle] = []
         self._sources: list[viser.PointCloudHandle] = []
         self._pairs: list[viser.LineSegmentsHandle] = []
         for index, lane in enumerate(view.lanes):
             name, first = f"{below}/lane{index}", lane.steps[0]
-            self._lanes.append(scene.add_frame(name, show_axes=False))
+            place(scene.add_frame(name, show_axes=False), view.T_world_target)
             add_cloud(scene, f"{name}/target", view.target, np.eye(4), NEUTRAL, point_m)
             moving = replace(view.source, colors=PALETTE[first.shades])
             self._sources.append(
@@ -72,7 +72,6 @@ class RaceDrawing:
                     f"{name}/pairs", points, colors, thickness=2.0, thickness_units="screen"
                 )
             )
-        self._spread(ASPECT, HEIGHT_PX)
 
     def _add_ring(self, name: str, lens: LensView) -> None:
         """Draw a circle around the magnified corner, facing the viewer."""
@@ -83,27 +82,15 @@ class RaceDrawing:
         self._scene.add_line_segments(name, parts_m, np.array(RING), thickness=4.0, thickness_units="screen")
 
     def look(self, clients: Iterable[viser.ClientHandle]) -> None:
-        """Turn the view so that all lanes are side by side, each in the middle of its share of the width."""
+        """Turn the view to the middle of a lane, from where each lane fits into its window."""
         extent = self._extent
         for client in clients:
-            aspect, height_px = client.camera.aspect, client.camera.image_height
-            height_m = len(self._lanes) * self._spread(aspect, height_px) / aspect
-            at_m = extent.middle_m - _lift(self._band(height_px)) * height_m * extent.up
+            band = (max(HEAD, HEAD_PX / max(client.camera.image_height, 1.0)), self._foot)
+            picture_m = height_m(extent.points_m, len(self._sources), client.camera.aspect, band)
+            back_m = 0.5 * picture_m / np.tan(0.5 * FOV_RAD) * extent.forward
             with client.atomic():
                 client.camera.fov = FOV_RAD
-                turn(client, at_m, at_m - 0.5 * height_m / np.tan(0.5 * FOV_RAD) * extent.forward)
-
-    def _band(self, height_px: float) -> tuple[float, float]:
-        """Return the upper and lower edge of the clouds over the picture's height."""
-        return max(HEAD, HEAD_PX / max(height_px, 1.0)), self._foot
-
-    def _spread(self, aspect: float, height_px: float) -> float:
-        """Place the lanes for a picture with this aspect. Returns their distance in metres."""
-        extent, count = self._extent, len(self._lanes)
-        apart_m = apart(extent.points_m, count, aspect, self._band(height_px))
-        for frame, away in zip(self._lanes, _places(count), strict=True):
-            place(frame, rigid(np.eye(3), away * apart_m * extent.right) @ self._view.T_world_target)
-        return apart_m
+                turn(client, extent.middle_m, extent.middle_m - back_m)
 
     def show(self, rows: Sequence[int]) -> None:
         """Move every lane to one of its steps."""
@@ -182,58 +169,44 @@ def _extent_of(view: RaceView, stage: Stage) -> _Extent:
     return _Extent(axes[0], axes[1], axes[2], middle_m @ axes, seen_m - middle_m)
 
 
-def apart(points_m: FloatArray, count: int, aspect: float, band: tuple[float, float]) -> float:
-    """Return the least distance between lanes, metres, at which each fits into its share of the width.
-
-    Perspective enlarges points before the middle and moves them outward in the outer lanes.
+def height_m(points_m: FloatArray, count: int, aspect: float, band: tuple[float, float]) -> float:
+    """Return the height of the picture, metres at the middle of a lane, at which a lane fits into its window.
 
     Args:
         points_m: (N, 3) from the middle of a lane: to the right, up and away from the viewer.
-        count: number of lanes.
-        aspect: width over height of the picture; all lanes at the depth of their middle fill the width.
+        count: number of windows next to each other.
+        aspect: width over height of the picture.
         band: upper and lower edge of the lanes over the picture's height, from the top.
     """
-    low_m, high_m = 1e-3, 20.0 * max(1.0, float(np.abs(points_m).max()))
-    for _ in range(30):
+    low_m, high_m = 1e-3, 100.0 * max(1.0, float(np.abs(points_m).max()))
+    for _ in range(40):
         tried_m = 0.5 * (low_m + high_m)
-        across, down = in_picture(points_m, count, aspect, band, tried_m)
-        first, last = across.min(), across.max()
-        fits = min(first, 1.0 - last) >= MARGIN and down.min() >= band[0] and down.max() <= band[1]
+        across, down = in_window(points_m, count, aspect, band, tried_m)
+        fits = across.min() >= MARGIN and across.max() <= 1.0 - MARGIN
+        fits = fits and down.min() >= band[0] and down.max() <= band[1]
         low_m, high_m = (low_m, tried_m) if fits else (tried_m, high_m)
     return high_m
 
 
-def in_picture(
-    points_m: FloatArray, count: int, aspect: float, band: tuple[float, float], apart_m: float
+def in_window(
+    points_m: FloatArray, count: int, aspect: float, band: tuple[float, float], picture_m: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Project points of the outer lanes into the picture.
+    """Project points of a lane into its window, as ``lanes.js`` does.
 
     Args:
-        points_m, count, aspect, band: as for ``apart``.
-        apart_m: distance between lanes.
+        points_m, count, aspect, band: as for ``height_m``.
+        picture_m: height of the picture at the middle of a lane, metres.
 
     Returns:
-        (2, N) positions in the first and the last lane over its width from the left, and (N,) over the
-        picture's height from the top; far outside if a point is behind the viewer.
+        (N,) positions over the window's width from the left, and (N,) over its height from the top; far
+        outside if a point is behind the viewer.
     """
     right_m, up_m, away_m = points_m.T
-    half_m = 0.5 * count * apart_m / aspect
-    nearer = 1.0 + away_m * np.tan(0.5 * FOV_RAD) / half_m
+    nearer = 1.0 + 2.0 * away_m * np.tan(0.5 * FOV_RAD) / picture_m
     nearer = np.where(nearer > 0.1, nearer, np.nan)
-    outer_m = np.array([[-0.5], [0.5]]) * (count - 1) * apart_m
-    across = count * (0.5 + 0.5 * (right_m + outer_m) / (nearer * half_m * aspect)) - [[0.0], [count - 1.0]]
-    down = 0.5 - 0.5 * (up_m + 2.0 * _lift(band) * half_m) / (nearer * half_m)
+    across = 0.5 + count * right_m / (nearer * picture_m * aspect)
+    down = 0.5 * sum(band) - up_m / (nearer * picture_m)
     return np.nan_to_num(across, nan=1e9), np.nan_to_num(down, nan=1e9)
-
-
-def _lift(band: tuple[float, float]) -> float:
-    """Return the height of the band's middle above the picture's middle, over the picture's height."""
-    return 0.5 - 0.5 * sum(band)
-
-
-def _places(count: int) -> FloatArray:
-    """Return (count,) positions of lanes about the middle, in units of their distance."""
-    return np.arange(count) - 0.5 * (count - 1)
 
 
 def pair_lines(step: RaceStep) -> tuple[FloatArray, ByteArray]:

@@ -81,6 +81,7 @@ def test_back_goes_from_place_to_place_and_not_from_moment_to_moment():
         ("set=depth.reach%3Dfar", "depth.reach"),
         ("set=depth.model%3D/etc/passwd", "names a file"),
         ("set=+depth.model+%3D/etc/passwd", "names a file"),
+        ("set=depth.completion%3D/etc/passwd", "names a file"),
         ("set=nonsense", "nonsense"),
     ],
 )

@@ -1,12 +1,16 @@
 import asyncio
 import threading
+import typing
 from collections import deque
 
 import pytest
 import viser
+from viser._assignable_props_api import AssignablePropsBase
+from viser._messages import GuiSliderProps
 from websockets.sync.client import connect
 
 from app.server import build_server
+from app.web import viser_private
 from app.web.viser_private import AnyThreadEvent
 
 
@@ -44,6 +48,29 @@ def test_the_loops_own_call_wakes_who_waits_after_another_thread_has_set():
         return woken
 
     assert asyncio.run(wait())
+
+
+def test_the_hints_of_a_kind_of_control_are_evaluated_once(monkeypatch):
+    evaluated = []
+
+    def evaluate(kind):
+        evaluated.append(kind)
+        return typing.get_type_hints(kind)
+
+    monkeypatch.setattr(AssignablePropsBase, "_prop_hints", AssignablePropsBase._prop_hints)
+    monkeypatch.setattr(viser_private, "get_type_hints", evaluate)
+    viser_private.remember_hints()
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        one, two = (server.gui.add_slider(name, 0.0, 1.0, 0.5, 0.0) for name in ("one", "two"))
+        two.max = 2.0
+        assert one._prop_hints == typing.get_type_hints(GuiSliderProps)
+        assert (one.max, two.max) == (1.0, 2.0)
+        with pytest.raises(AttributeError):
+            two.no_such_property  # noqa: B018
+    finally:
+        server.stop()
+    assert evaluated.count(GuiSliderProps) == 1
 
 
 @pytest.mark.parametrize("lecture", [False, True], ids=["a session each", "lecture"])
