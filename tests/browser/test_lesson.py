@@ -49,7 +49,7 @@ def begin(page, lesson, stops):
     """Open the lesson at its first stop; what moves under the hand may miss a click, and gets another."""
     unfold(page, f"Lesson: {lesson}")
     for _ in range(10):
-        press(page, "Next")
+        page.get_by_role("button", name="Next", exact=True).first.click()  # the pictures may have one, too
         with contextlib.suppress(TimeoutError):
             return seen(page, f"(1 of {stops})").wait_for(timeout=10_000)
         if not page.get_by_text("Choose a stop, or press").locator("visible=true").count():
@@ -74,7 +74,6 @@ def test_five_stops_are_led_through_by_keys_alone(page, lesson):
         press_until(page, "ArrowRight" if stop % 2 else "Space", f"({stop + 1} of {stops})", NEXT_MS)
     press_until(page, "ArrowLeft", f"(5 of {stops})", NEXT_MS)
     assert page.get_by_text(WAITS).locator("visible=true").count() == 0
-    unfold(page, f"Lesson: {lesson}")
 
 
 def test_the_dock_has_the_keys_after_a_click_on_it_until_escape(page):

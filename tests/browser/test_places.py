@@ -13,7 +13,7 @@ from tests.browser.hands import PATIENCE_MS, TEXTS, go, press, unfold
 
 ADDED = {
     "scene": {"set": "depth.reach=0.125"},
-    "calibrate": {"stop": "2", "pictures": "photo,coverage,30"},
+    "calibrate": {"scene": "uncalibrated", "stop": "2", "pictures": "photo,coverage,30"},
     "depth": {"stop": "2", "color": "confidence", "pictures": "inferred,difference,25"},
     "fuse": {"stop": "2", "race": "seed=3", "t": "4"},
     "surface": {"surface": "before", "color": "normal", "cam": "0.500,2.000,2.500,2.600,2.600,0.800"},

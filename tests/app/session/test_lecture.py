@@ -159,6 +159,8 @@ def test_thirty_browsers_see_the_room_and_each_vote_is_counted_once(lecture, tea
         wait_for(lambda: all(one.positions for one in students))
         teacher.go("Calibrate")  # the first of the screens that have a lesson
         wait_for(lambda: teacher.current == "Calibrate")
+        teacher.set("Open", "Uncalibrated nodes")  # its lesson needs photographs of a board
+        wait_for(lambda: lecture.sessions[-1].spec.views is not None)
         teacher.set("Go", "Next")
         wait_for(lambda: all(one.reads("The class votes") for one in students))
         for number, one in enumerate(students):

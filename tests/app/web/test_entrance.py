@@ -180,8 +180,9 @@ def test_only_loopback_needs_no_token(host, alone):
 def test_the_command_passes_on_who_may_come_in(monkeypatch, words, with_token, names):
     asked, pools = [], []
 
-    def refuse(*arguments, pool, allow_hosts):
-        asked.append((arguments[-1], allow_hosts))
+    def refuse(*arguments, ahead):
+        *_, token, pool, allow_hosts = arguments
+        asked.append((token, allow_hosts))
         pools.append(pool)
         raise InputError("not now")
 
