@@ -1,4 +1,4 @@
-"""Compute what will probably be asked for: the chain of the start settings, then likely answers at rest."""
+"""Compute results before a session needs them: the chain of the start settings, then likely ones at rest."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from app.compute.store import Store
 REST_S = 3.0
 """Time without any job after which work ahead begins, seconds: a page that just got its surface draws it."""
 LOOK_S = 0.5
-"""Time between two looks at whether it may begin."""
+"""Time between two checks of whether it may begin, seconds."""
 
 
 def compute_ahead(pool: ComputePool, store: Store, shared: SharedViews, spec: Spec, owner: object) -> None:
@@ -64,8 +64,8 @@ def compute_ahead(pool: ComputePool, store: Store, shared: SharedViews, spec: Sp
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
-    """A job whose answer somebody may ask for."""
+class LikelyJob:
+    """A job whose answer a session will probably need."""
 
     key: Hashable
     """What the answer depends on, as sessions ask for it."""
@@ -75,12 +75,12 @@ class Wish:
 
 
 class WorkAhead:
-    """Has wishes computed one after the other while nobody asks for anything; ends with the last of them."""
+    """Computes likely jobs one after the other while no session needs the pool; stops after the last."""
 
     def __init__(self, pool: ComputePool, store: Store) -> None:
         self._pool, self._store = pool, store
         self._plan: Hashable = None
-        self._wishes: deque[Wish] = deque()
+        self._likely: deque[LikelyJob] = deque()
         self._lock, self._ended = threading.Lock(), threading.Event()
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
@@ -90,13 +90,13 @@ class WorkAhead:
         """Whether there was a plan and nothing of it is left to compute."""
         return self._plan is not None and self._thread is None
 
-    def plan(self, name: Hashable, wishes: Callable[[], Iterable[Wish]]) -> None:
-        """Compute these wishes in place of those before, unless they are the ones of this name already."""
+    def plan(self, name: Hashable, likely: Callable[[], Iterable[LikelyJob]]) -> None:
+        """Compute these jobs in place of those before; nothing changes if the present plan has this name."""
         with self._lock:
             if name == self._plan or self._closing.is_set():
                 return
             self._plan = name
-            self._wishes = deque(wishes())
+            self._likely = deque(likely())
             if self._thread is None:
                 self._thread = threading.Thread(target=self._work, name="ahead", daemon=True)
                 self._thread.start()
@@ -109,18 +109,18 @@ class WorkAhead:
     def _work(self) -> None:
         while not self._closing.is_set():
             with self._lock:
-                if not self._wishes:
+                if not self._likely:
                     self._thread = None
                     return
-                wish = self._wishes[0]
-            if self._store.has(kept(wish.key)):
-                self._drop(wish)
+                likely = self._likely[0]
+            if self._store.has(kept(likely.key)):
+                self._drop(likely)
             elif self._pool.idle_s() < REST_S or _on_battery():
                 self._closing.wait(LOOK_S)
-            elif self._compute(wish):
-                self._drop(wish)
+            elif self._compute(likely):
+                self._drop(likely)
 
-    def _compute(self, wish: Wish) -> bool:
+    def _compute(self, likely: LikelyJob) -> bool:
         """Return whether the job ended by itself, with or without an answer; a stopped one is begun again."""
         ends: list[str] = []
 
@@ -132,11 +132,11 @@ class WorkAhead:
         try:
             self._pool.submit(
                 self,
-                wish.function,
-                *wish.arguments,
+                likely.function,
+                *likely.arguments,
                 on_progress=lambda _: None,
                 on_end=ended,
-                key=wish.key,
+                key=likely.key,
                 ahead=True,
             )
         except RuntimeError:  # the pool is closed
@@ -145,11 +145,11 @@ class WorkAhead:
         self._ended.wait()
         return ends != ["stopped"]
 
-    def _drop(self, wish: Wish) -> None:
-        """Remove a wish that is still the first: there may be another plan by now."""
+    def _drop(self, likely: LikelyJob) -> None:
+        """Remove a job that is still the first: there may be another plan by now."""
         with self._lock:
-            if self._wishes and self._wishes[0] is wish:
-                self._wishes.popleft()
+            if self._likely and self._likely[0] is likely:
+                self._likely.popleft()
 
 
 def _on_battery() -> bool:

@@ -101,7 +101,7 @@ class ComputePool:
         self._threads_each = max(1, (os.cpu_count() or 1) // size)
         self._lock = threading.Lock()
         self._waiting: list[Ticket] = []
-        self._asked_s = time.monotonic()
+        self._last_used_s = time.monotonic()
         self._closed = False
         self._closing = threading.Event()
         self._slots = [_Slot() for _ in range(size)]
@@ -137,7 +137,7 @@ class ComputePool:
     def idle_s(self) -> float:
         """Return for how long no job has run or waited, seconds, apart from work ahead."""
         with self._lock:
-            return 0.0 if self._asked() else time.monotonic() - self._asked_s
+            return 0.0 if self._in_use() else time.monotonic() - self._last_used_s
 
     def stop(self, ticket: Ticket, patience_s: float | None = None) -> None:
         """Ask a job to stop at its next progress report; kill its process after ``patience_s``."""
@@ -218,9 +218,9 @@ class ComputePool:
         owners = {id(one.owner) for one in (*running, *served)}
         free = [one for one in self._waiting if id(one.owner) not in owners and one not in served]
         idle = sum(slot.ready and slot.ticket is None for slot in self._slots)
-        return [one for one in free if not one.ahead or (idle > 1 and not self._asked())]
+        return [one for one in free if not one.ahead or (idle > 1 and not self._in_use())]
 
-    def _asked(self) -> bool:
+    def _in_use(self) -> bool:
         """Return whether a job that is not work ahead runs or waits. The caller holds the lock."""
         running = [slot.ticket for slot in self._slots if slot.ticket is not None]
         return not all(one.ahead for one in (*running, *self._waiting))
@@ -288,7 +288,7 @@ class ComputePool:
         with self._lock:
             slot.ready, slot.ticket = True, None
             if ticket is not None and not ticket.ahead:
-                self._asked_s = time.monotonic()
+                self._last_used_s = time.monotonic()
             others = self._served(ticket, kind)
             if kind != "ready" and _memory_bytes(slot.process) > MEMORY_LIMIT_BYTES:
                 slot.ready = False

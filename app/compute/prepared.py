@@ -1,7 +1,9 @@
 """``python -m app.compute.prepared``: compute what a new server shows first, once, for all later servers.
 
-The results lie beside the installed packages, below the hash of everything that they depend on. After any
-change of code, assets or packages no server finds them, and each computes as ever.
+The results are in the environment of the installed packages, below the hash of everything that they depend
+on. After any change of code, assets or packages no server finds them, and each computes as ever. They are
+pickles: whoever can write there can also change the packages. A damaged file has a wrong checksum and counts
+as missing.
 """
 
 from __future__ import annotations

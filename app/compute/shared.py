@@ -24,7 +24,7 @@ class SharedViews:
     def __init__(self, store: Store, limit_bytes: int = LIMIT_BYTES) -> None:
         self.turns = Turns()
         self.on_surface: Callable[[Spec, Any], None] = lambda spec, view: None
-        """Called when a session, or the first one to come, has the complete surface of a spec."""
+        """Called each time that the complete surface of a spec is known."""
         self._store, self._limit_bytes = store, limit_bytes
         self._views: OrderedDict[Hashable, tuple[int, Any]] = OrderedDict()
         self._bytes = 0
@@ -42,7 +42,7 @@ class SharedViews:
             return view
 
     def put(self, key: Hashable, view: Any) -> None:
-        """Keep an answer in memory, and the least recently used ones only in the store if it has them."""
+        """Keep an answer in memory; over the limit, the least recently used answers leave the memory."""
         with self._lock:
             self._keep(key, view)
 

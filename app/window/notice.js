@@ -21,7 +21,7 @@
     if (!notice) return;
     seen.disconnect();
     notice.style.display = "none"; // while it fades
-    notice.querySelector("button").click();
+    notice.querySelector("button")?.click();
     say();
   });
   seen.observe(document.body, {childList: true, subtree: true});

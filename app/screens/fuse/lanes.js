@@ -9,6 +9,7 @@ window.packetmeshLanes = (() => {
   let band = [0, 0, 1];
   const hooked = new WeakSet(); // objects of lanes that already move to their window
   let held = null; // the lane in which a drag began
+  let waiting = 0; // timer that looks for viser's scene
 
   const canvas = () => document.querySelector("canvas[data-engine]");
 
@@ -60,7 +61,7 @@ window.packetmeshLanes = (() => {
 
   function hookAll() {
     for (let lane = 0; lane < count; lane += 1)
-      window.__viserMutable.nodeRefFromName[NODE + lane]?.traverse(object => {
+      window.__viserMutable?.nodeRefFromName?.[NODE + lane]?.traverse(object => {
         if (!(object.isMesh || object.isLine || object.isPoints) || hooked.has(object)) return;
         hooked.add(object);
         hook(object, lane);
@@ -68,21 +69,25 @@ window.packetmeshLanes = (() => {
   }
 
   function watch() {
-    const scene = window.__viserMutable?.scene;
-    if (!scene) return void setTimeout(watch, POLL_MS);
-    scene.onBeforeRender = hookAll;
-    window.__viserMutable.requestRender();
+    clearTimeout(waiting);
+    const viewer = window.__viserMutable;
+    if (!viewer?.scene) return void (waiting = setTimeout(watch, POLL_MS));
+    viewer.scene.onBeforeRender = hookAll;
+    viewer.requestRender?.();
   }
 
   // What is pointed at in a window is where that window's lane has it in the scene.
-  function point(event) {
-    if (count === 0 || event.target !== canvas()) return;
+  function shiftPointer(event) {
     const {offsetX: x, offsetY: y, target: {clientWidth: width, clientHeight: height}} = event;
-    const lane = held ?? Math.max(0, Math.min(count - 1, Math.floor(count * x / width)));
-    if (event.type === "pointerdown") held = lane;
-    if (["pointerup", "pointercancel"].includes(event.type)) held = null;
-    const [right, up] = shift(lane);
+    const under = Math.max(0, Math.min(count - 1, Math.floor(count * x / width)));
+    if (event.type === "pointerdown") held = under;
+    const [right, up] = shift(held ?? under);
     Object.defineProperties(event, {offsetX: {value: x - 0.5 * right * width}, offsetY: {value: y + 0.5 * up * height}});
+  }
+
+  function point(event) {
+    if (count > 0 && window.__viserMutable && event.target === canvas()) shiftPointer(event);
+    if (["pointerup", "pointercancel"].includes(event.type)) held = null; // also where a drag ends outside the picture
   }
   for (const kind of POINTED) window.addEventListener(kind, point, true);
 

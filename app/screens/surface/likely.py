@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from app.compute import jobs
-from app.compute.ahead import Wish
+from app.compute.ahead import LikelyJob
 from app.compute.state import CHAIN, Spec
 from app.compute.store import Store
 from app.screens.surface.settings import STEP_MM, on_slider_mm, slider_range_mm, with_rule
@@ -16,20 +16,20 @@ from pipeline.config import PRESETS
 from pipeline.sources import Demo
 
 
-def likely(store: Store, spec: Spec, view: SurfaceView) -> Iterator[Wish]:
+def likely(store: Store, spec: Spec, view: SurfaceView) -> Iterator[LikelyJob]:
     """Yield the quick looks of the slider's radii, their complete surfaces, and the other presets' chains."""
     radii_mm = likely_radii_mm(view)
     for radius_mm in radii_mm:
         request = PaintRequest(("after",), "photo", radius_mm / 1000.0)
         key = request.key(spec)
-        yield Wish(key, jobs.run_kept, (request.job, key, store, spec, request))
+        yield LikelyJob(key, jobs.run_kept, (request.job, key, store, spec, request))
     for radius_mm in radii_mm:
         rolled = replace(spec, config=with_rule("manual", radius_mm)(spec.config))
-        yield Wish(rolled.key("surface"), jobs.run_step, ("surface", store, rolled))
+        yield LikelyJob(rolled.key("surface"), jobs.run_step, ("surface", store, rolled))
     for name in PRESETS:
         preset = spec.with_preset(name)
         for step in CHAIN:
-            yield Wish(preset.key(step), jobs.run_step, (step, store, preset))
+            yield LikelyJob(preset.key(step), jobs.run_step, (step, store, preset))
 
 
 def likely_radii_mm(view: SurfaceView) -> list[float]:

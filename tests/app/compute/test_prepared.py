@@ -115,3 +115,10 @@ def test_a_set_up_that_is_interrupted_leaves_nothing_to_find(program, tmp_path, 
 
 def test_without_a_set_up_a_server_finds_nothing(program, tmp_path):
     assert taken(tmp_path / "one") == [None] * len(CHAIN)
+
+
+def test_a_damaged_result_counts_as_missing(program, tmp_path):
+    prepare()
+    for path in (prepared.FOLDER / fingerprint()).iterdir():
+        path.write_bytes(path.read_bytes()[:-1])
+    assert taken(tmp_path / "one") == [None] * len(CHAIN)

@@ -12,7 +12,7 @@ import pool_jobs as jobs
 from test_pool import Inbox, wait_for
 
 from app.compute import ahead
-from app.compute.ahead import Wish, WorkAhead
+from app.compute.ahead import LikelyJob, WorkAhead
 from app.compute.pool import ComputePool, Outcome
 from app.compute.shared import kept
 from app.compute.store import Store
@@ -109,7 +109,7 @@ def test_work_ahead_leaves_a_process_free_and_waits_while_anything_is_asked_for(
 
 
 class Pool:
-    """Runs work ahead as it is told to: by the wish, or stops it."""
+    """Runs work ahead as it is told to: by running the job, or by stopping it."""
 
     def __init__(self, store, idle_s=10.0):
         self.store, self.idle, self.stops, self.asked = store, idle_s, 0, []
@@ -135,21 +135,21 @@ def own(tmp_path, monkeypatch):
     return Store(str(tmp_path))
 
 
-def wishes(store, names):
-    return lambda: [Wish(name, store.put, (kept(name), name)) for name in names]
+def likely_jobs(store, names):
+    return lambda: [LikelyJob(name, store.put, (kept(name), name)) for name in names]
 
 
-def test_wishes_are_computed_in_order_what_is_there_is_not_and_then_it_ends(own):
+def test_likely_jobs_are_computed_in_order_what_is_there_is_not_and_then_it_ends(own):
     pool = Pool(own)
     work = WorkAhead(pool, own)
     assert not work.done
     own.put(kept("b"), "there")
-    work.plan("scene", wishes(own, "abc"))
+    work.plan("scene", likely_jobs(own, "abc"))
     assert happens(lambda: work.done)
     assert pool.asked == ["a", "c"]
-    work.plan("scene", wishes(own, "xyz"))  # every session that shows the scene says so
+    work.plan("scene", likely_jobs(own, "xyz"))  # every session that shows the scene says so
     assert work.done
-    work.plan("another scene", wishes(own, "d"))
+    work.plan("another scene", likely_jobs(own, "d"))
     assert happens(lambda: work.done)
     assert pool.asked == ["a", "c", "d"]
 
@@ -158,7 +158,7 @@ def test_what_is_stopped_is_begun_again(own):
     pool = Pool(own)
     pool.stops = 2
     work = WorkAhead(pool, own)
-    work.plan("scene", wishes(own, "abc"))
+    work.plan("scene", likely_jobs(own, "abc"))
     assert happens(lambda: work.done)
     assert pool.asked == ["a", "a", "a", "b", "c"]
 
@@ -172,13 +172,13 @@ def test_nothing_begins_while_people_ask_or_on_a_battery(own, monkeypatch, why):
         battery = SimpleNamespace(power_plugged=False)
         monkeypatch.setattr(ahead.psutil, "sensors_battery", lambda: battery, raising=False)
     work = WorkAhead(pool, own)
-    work.plan("scene", wishes(own, "a"))
+    work.plan("scene", likely_jobs(own, "a"))
     threading.Event().wait(0.2)
     assert pool.asked == []
     assert not work.done
     work.close()
     assert happens(lambda: not work._thread.is_alive())
-    work.plan("later", wishes(own, "b"))
+    work.plan("later", likely_jobs(own, "b"))
     assert pool.asked == []
 
 
@@ -188,5 +188,5 @@ def test_a_pool_that_is_closed_ends_it(own):
             raise RuntimeError("the pool is closed")
 
     work = WorkAhead(Closed(own), own)
-    work.plan("scene", wishes(own, "ab"))
+    work.plan("scene", likely_jobs(own, "ab"))
     assert happens(lambda: not work._thread.is_alive())

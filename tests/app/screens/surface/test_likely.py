@@ -41,7 +41,7 @@ def test_a_radius_comes_back_from_the_address_exactly(radius_mm):
     assert with_settings(PipelineConfig(), differences(config, PipelineConfig())) == config
 
 
-def test_what_a_dragged_slider_asks_for_is_among_the_wishes(server, store):
+def test_what_a_dragged_slider_asks_for_is_likely(server, store):
     asked = []
 
     class Noting(Bench):
@@ -56,21 +56,21 @@ def test_what_a_dragged_slider_asks_for_is_among_the_wishes(server, store):
     bench = Noting(SurfacePanel, ui, store)
     bench.advance()
     view = bench.results.view("surface")
-    wishes = {wish.key: wish for wish in likely(store, bench.spec, view)}
+    jobs_by_key = {job.key: job for job in likely(store, bench.spec, view)}
     radius_mm = likely_radii_mm(view)[3]
     bench.gui.set("Radius (mm)", radius_mm)
     key = asked[0]
-    assert wishes[key].function is jobs.run_kept
-    assert wishes[key].arguments[1] == key
+    assert jobs_by_key[key].function is jobs.run_kept
+    assert jobs_by_key[key].arguments[1] == key
     assert bench.spec.config.surface.radii_m == (radius_mm / 1000.0,)
-    wish = wishes[bench.spec.key("surface")]
-    assert wish.function is jobs.run_step
-    assert wish.arguments[2].key("surface") == bench.spec.key("surface")
+    job = jobs_by_key[bench.spec.key("surface")]
+    assert job.function is jobs.run_step
+    assert job.arguments[2].key("surface") == bench.spec.key("surface")
 
 
 def test_the_other_presets_come_last(store):
     rest = list(likely(store, START, VIEW))[2 * len(likely_radii_mm(VIEW)) :]
-    assert [wish.key for wish in rest] == [
+    assert [job.key for job in rest] == [
         START.with_preset(name).key(step) for name in PRESETS for step in CHAIN
     ]
 
