@@ -17,7 +17,7 @@ from app.drawing.meshes import surface_glb
 from app.drawing.poses import move, place
 from packetmesh.errors import InputError
 from pipeline.acquisition import back_project
-from pipeline.notebook.pictures import photograph
+from pipeline.notebook.pictures import small_photograph
 from pipeline.notebook.views import View, in_its_camera, view_of
 from pipeline.reconstruct import Reconstruction
 from pipeline.surface.radii import spacing
@@ -150,7 +150,7 @@ def _add_cameras(scene: viser.SceneApi, rig: Rig, poses: Sequence[FloatArray]) -
             aspect=camera.width_px / camera.height_px,
             scale=0.15,
             color=NEUTRAL,
-            image=photograph(frame),
+            image=small_photograph(frame),
         )
         place(frustum, pose)
 

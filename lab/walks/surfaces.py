@@ -85,7 +85,7 @@ def _seen_m(room: Mesh, frames: Sequence[Camera]) -> FloatArray:
 
 
 def _without_surface(mesh: Mesh, room: Mesh, frames: Sequence[Camera]) -> float:
-    """Return the share of rays to the room, from places beside the cameras, that meet nothing of the mesh."""
+    """Return the share of rays to the room that meet nothing of the mesh, from places next to the cameras."""
     beside = [
         Camera(
             one.intrinsics, one.T_world_camera @ rigid(np.eye(3), np.array([(-1) ** k * BESIDE_M, 0.0, 0.0]))

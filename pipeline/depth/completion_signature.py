@@ -1,4 +1,4 @@
-"""Inputs and output of an ONNX graph that completes measured depth, told by their shapes and names."""
+"""Inputs and output of an ONNX graph that completes measured depth, found by their shapes and names."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class CompletionSignature:
 
 
 def takes_depth(session: Any) -> bool:
-    """Return whether the graph takes an image and, beside it or as its fourth channel, a map."""
+    """Return whether the graph takes an image and a map, as two inputs or as one with four channels."""
     inputs = session.get_inputs()
     if any(_channels(entry.shape) == 4 for entry in inputs):
         return True

@@ -65,8 +65,8 @@ class OwnCompletion:
         self._signature = completion_signature_of(self._session, name)
         metadata = self._session.get_modelmeta().custom_metadata_map
         values = {"width_px": SHORTEST_PX, "height_px": None, "multiple_px": MULTIPLE_PX, "kind": "metric"}
-        said = from_metadata(metadata, name)
-        values |= {"normalised_inside": not said.keys() & {"mean", "deviation"}} | said
+        stated = from_metadata(metadata, name)
+        values |= {"normalised_inside": not stated.keys() & {"mean", "deviation"}} | stated
         if values["kind"] == "inverse" or values.get("depth_range_m") is not None:
             raise InputError(f"{name} gives disparity by its metadata; try a network that gives depth")
         values |= flagged(Overrides(normalisation=normalisation))

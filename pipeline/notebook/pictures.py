@@ -55,8 +55,8 @@ def seen_picture(surface: Surface, frame: RgbdFrame, T_world_camera: np.ndarray)
     return mesh_picture(surface, Camera(intrinsics, T_world_camera))
 
 
-def photograph(frame: RgbdFrame) -> ByteArray:
-    """Return (H, W, 3) RGB of a node's colour image."""
+def small_photograph(frame: RgbdFrame) -> ByteArray:
+    """Return (H, W, 3) RGB of a node's colour image, ``WIDTH_PX`` wide."""
     rows, columns = frame.rgb.shape[:2]
     size = (WIDTH_PX, max(1, round(rows * WIDTH_PX / columns)))
     return np.asarray(cv2.resize(frame.rgb, size, interpolation=cv2.INTER_AREA), np.uint8)

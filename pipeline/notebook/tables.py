@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from pipeline.kernels.geometry import rotation_angle_rad
-from pipeline.notebook.pictures import cloud_picture, photograph, png_of, seen_picture, surface_picture
+from pipeline.notebook.pictures import cloud_picture, png_of, seen_picture, small_photograph, surface_picture
 from pipeline.reconstruct import Reconstruction
 from pipeline.surface.radii import spacing
 from pipeline.types import (
@@ -105,7 +105,7 @@ def _rig(rig: Rig) -> str:
         ("True surface", "known" if rig.truth is not None else "unknown"),
     ]
     rows += [("Note", note) for note in rig.notes]
-    figures = [(frame.name, photograph(frame)) for frame in rig.frames[:SHOWN_NODES]]
+    figures = [(frame.name, small_photograph(frame)) for frame in rig.frames[:SHOWN_NODES]]
     return _page(f"Rig {rig.name}", rows, figures)
 
 

@@ -21,7 +21,7 @@ from pipeline.importing.recorded_bag import BagRecording
 from pipeline.recording.recording import Recording
 from pipeline.types import FloatArray
 
-VERSION = 1
+VERSION = 2
 """Raised when tracking changes, so that older states are not read."""
 EVERY_S = 10.0
 """Time from one writing to the next."""

@@ -1,6 +1,7 @@
-"""Tracking: where the camera was at each frame, from depth alone (SPEC 10.1).
+"""Tracking: where the camera was at each frame (SPEC 10.1).
 
-Each frame is registered to the last keyframe; once it shows little of that, it becomes the next keyframe.
+Each frame's depth is registered to the last keyframe's; photographs hold the motions that depth leaves open.
+Once a frame shows little of the keyframe, it becomes the next one.
 """
 
 from __future__ import annotations
@@ -95,6 +96,11 @@ class Registered:
     """Share of the judged points whose depths agree; the smaller of source to target and back."""
 
     @property
+    def may_hold(self) -> bool:
+        """Whether the check is enough for a pose that has other evidence."""
+        return self.overlap_share >= LEAST_OVERLAP and self.agreeing_share >= LESS_AGREEMENT
+
+    @property
     def holds(self) -> bool:
         """Whether source and target show the same place at this pose."""
         return self.overlap_share >= LEAST_OVERLAP and self.agreeing_share >= LEAST_AGREEMENT
@@ -104,8 +110,7 @@ class Registered:
         T = inverse(T_predicted) @ self.T_target_source
         near = np.linalg.norm(T[:3, 3]) <= STEP_M
         near &= np.degrees(rotation_angle_rad(T[:3, :3])) <= STEP_DEG
-        some = self.overlap_share >= LEAST_OVERLAP and self.agreeing_share >= LESS_AGREEMENT
-        return self.holds or (bool(near) and some)
+        return self.holds or (bool(near) and self.may_hold)
 
 
 def iterate_tracking(
@@ -201,7 +206,7 @@ class _Tracker:
             self._frames.append(Tracked(self._keyframe, found.T_target_source))
 
     def _held(self, k: int, cloud: OrganisedCloud, found: Registered) -> Registered:
-        """Return a registration to the keyframe whose open motions are those that photographs show."""
+        """Return a registration with open motions as photographs show them, unless depth denies it."""
         motions = open_motions(found.information)
         if not motions.size:
             return found
@@ -209,7 +214,8 @@ class _Tracker:
         if held is None:
             return found
         T, information = held
-        return checked(cloud, self._clouds[self._keyframe], T, found.information + information)
+        moved = checked(cloud, self._clouds[self._keyframe], T, found.information + information)
+        return moved if moved.may_hold else found
 
     def track(self) -> Track:
         """Return the result."""

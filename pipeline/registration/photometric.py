@@ -24,14 +24,17 @@ MOST_STEPS, STILL_PX = 12, 0.02
 MOST_PIXELS, LEAST_PIXELS = 3000, 150
 """Pixels that are compared: those with the steepest brightness; with fewer there is no answer."""
 LEAST_SLOPE = 2.0
-"""Least change of brightness from one pixel to the next, grey levels."""
+"""Least change of brightness, grey levels a pixel."""
 SAME_SURFACE = 0.03
 """Largest difference, as a share, of the depths that a pixel has in both images."""
 AROUND_PX = 3
 """Distance within which depth must not jump: behind an edge the background slides."""
 ALIKE = 0.7
 """Least correlation of brightness at the pose that is found."""
+FARTHEST_PX = 30.0
+"""Largest median motion of the pixels from the start: beyond five of the widest blurs a fit is chance."""
 HUBER = 1.345
+"""Difference of brightness, in standard deviations, beyond which a pixel weighs less."""
 CORRELATED = 50.0
 """Number of pixels that count as one in the information: neighbours share their errors."""
 LARGEST_CONDITION = 1e12
@@ -96,7 +99,10 @@ def held_by_color(
             T = T @ _motion(motions @ found.along)
             if found.moved_px <= STILL_PX:
                 break
-    if found is None or found.correlation < ALIKE:
+    if found is None or not found.correlation >= ALIKE:
+        return None
+    before_px, after_px = (_seen(source, apply(inverse(pose), points_m))[0] for pose in (T_target_source, T))
+    if not np.nanmedian(np.linalg.norm(after_px - before_px, axis=1)) <= FARTHEST_PX:
         return None
     return T, motions @ found.information @ motions.T
 
@@ -106,11 +112,11 @@ class _Step:
     """A step of least squares."""
 
     along: FloatArray
-    """(M,) along the open motions."""
+    """(M,) lengths along the open motions, rad and m."""
     moved_px: float
     """Median motion of the pixels."""
     correlation: float
-    """Of brightness in both photographs, before the step."""
+    """Correlation of brightness in both photographs, before the step."""
     information: FloatArray
     """(M, M) inverse covariance of the step."""
 
@@ -177,7 +183,7 @@ def _step(
     now, across, down = (_sampled(image, at_px) for image in (grey, *_slopes(grey)))
     moves = [_seen(source, apply(inverse(_motion(_TINY * one)), own_m))[0] - at_px for one in motions.T]
     slopes = [(across * move[:, 0] + down * move[:, 1]) / _TINY for move in moves]
-    J = np.stack([*slopes, -before, -np.ones(len(now))], axis=1)
+    J = np.nan_to_num(np.stack([*slopes, -before, -np.ones(len(now))], axis=1))  # beyond the lens: NaN
     weight = _huber(now - before * float(np.std(now)) / max(float(np.std(before)), 1e-6))
     normal = J.T @ (weight[:, None] * J)
     if np.linalg.cond(normal) > LARGEST_CONDITION:
@@ -188,7 +194,7 @@ def _step(
     information = np.linalg.inv(np.linalg.inv(normal)[:M, :M]) / (variance * CORRELATED)
     moved_px = np.linalg.norm(np.tensordot(solved[:M] / _TINY, np.array(moves), 1), axis=1)
     correlation = float(np.corrcoef(now, before)[0, 1])
-    return _Step(solved[:M], float(np.median(moved_px)), correlation, information)
+    return _Step(solved[:M], float(np.nanmedian(moved_px)), correlation, information)
 
 
 def _huber(residual: FloatArray) -> FloatArray:

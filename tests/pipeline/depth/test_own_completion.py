@@ -67,7 +67,7 @@ def test_a_network_that_knows_the_truth_fills_it_and_is_certain(tmp_path):
     np.testing.assert_array_equal(completed.log_scale, np.float32(LOG_SCALES[0]))
 
 
-def test_a_network_that_is_10_percent_off_in_holes_knows_it(tmp_path):
+def test_a_network_that_is_20_percent_off_in_holes_knows_it(tmp_path):
     completed = OwnCompletion(constant(tmp_path / "n.onnx", 1.2 * WALL_M)).complete(with_hole(), RGB)
     np.testing.assert_allclose(completed.log_scale, np.log(np.log(1.2)), atol=1e-3)
     np.testing.assert_allclose(completed.depth.z_m[HOLE], 1.2 * WALL_M[HOLE], rtol=1e-3)

@@ -10,11 +10,11 @@ from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.kernels.geometry import inverse, look_at, pixel_rays
 from pipeline.recording.loops import Trajectory, iterate_loops
-from pipeline.recording.places import Places, iterate_joins, shrunk
+from pipeline.recording.places import Places, iterate_joins
 from pipeline.recording.revisits import iterate_revisits
 from pipeline.recording.tracking import Track, Tracked
 from pipeline.registration.organised import organised
-from pipeline.types import CameraIntrinsics, DepthMap, FloatArray, Link, RgbdFrame
+from pipeline.types import FloatArray, Link, RgbdFrame
 from tests.pipeline.recording.rendered import CAMERA, Rendered, errors, living_room, moved
 
 STEP = 3
@@ -190,21 +190,3 @@ def test_parts_of_two_places_are_not_joined(plain):
     poses = turning(8)
     recording = recorded([*poses[:3], *poses[6:]], plain=plain)
     assert joined(recording, [3])[1] == ()
-
-
-def test_a_smaller_image_shows_the_same_points_in_the_same_colours():
-    """A plane seen at an angle, 642 x 482: every second pixel, and its place stays within half a pixel."""
-    camera = CameraIntrinsics.pinhole(525.0, 525.0, 320.0, 240.0, 642, 482)
-    v, u = np.mgrid[0:482, 0:642]
-    z_m = (2.0 / (1.0 + 0.2 * (u - 320.0) / 525.0)).astype(np.float32)
-    rgb = np.stack([u // 4, v // 4, 0 * u], axis=-1).astype(np.uint8)
-    small = shrunk(RgbdFrame("frame", rgb, DepthMap(z_m), camera, np.eye(4)))
-    assert small.rgb.shape == (241, 321, 3)
-    assert small.depth.z_m.shape == (241, 321)
-    assert (small.intrinsics.height_px, small.intrinsics.width_px) == (241, 321)
-    rays = pixel_rays(small.intrinsics)
-    expected_m = 2.0 / (1.0 + 0.2 * rays[..., 0])
-    np.testing.assert_allclose(small.depth.z_m, expected_m, rtol=0.0005)
-    np.testing.assert_allclose(small.rgb[..., 0], (525.0 * rays[..., 0] + 320.0) / 4.0, atol=1.0)
-    np.testing.assert_allclose(small.rgb[..., 1], (525.0 * rays[..., 1] + 240.0) / 4.0, atol=1.0)
-    assert shrunk(small) is small

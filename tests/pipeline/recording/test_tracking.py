@@ -11,6 +11,7 @@ from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.importing.recorded import DepthView
 from pipeline.kernels.geometry import inverse, look_at, rigid
+from pipeline.recording.brightness import Brightness
 from pipeline.recording.tracking import (
     LEAST_AGREEMENT,
     LEAST_OVERLAP,
@@ -423,13 +424,18 @@ class WallFrames:
 def test_a_painted_wall_holds_the_camera_and_a_bare_one_does_not():
     """Depth shows no slide along a wall, and the motion so far is wrong where the camera turns back."""
 
-    def worst_m(paint):
-        recording = WallFrames(paint)
-        track = tracked(recording)
-        assert all(one is not None for one in track.frames)
-        return max(
-            np.linalg.norm((inverse(recording.pose(k)) @ T)[:3, 3]) for k, T in enumerate(chained(track))
-        )
+    assert worst_m(WallFrames(painted)) < 0.003
+    assert worst_m(WallFrames(lambda x_m, y_m: np.full_like(x_m, 120.0))) > 0.03
 
-    assert worst_m(painted) < 0.003
-    assert worst_m(lambda x_m, y_m: np.full_like(x_m, 120.0)) > 0.03
+
+def test_photographs_do_not_move_the_camera_to_where_depth_denies_it(monkeypatch):
+    """Two metres along the wall, where the images no longer overlap."""
+    far = rigid(np.eye(3), np.array([2.0, 0.0, 0.0]))
+    monkeypatch.setattr(Brightness, "held", lambda self, source, keyframe, T, motions: (T @ far, np.eye(6)))
+    assert worst_m(WallFrames(painted)) < 0.2
+
+
+def worst_m(recording):
+    track = tracked(recording)
+    assert all(one is not None for one in track.frames)
+    return max(np.linalg.norm((inverse(recording.pose(k)) @ T)[:3, 3]) for k, T in enumerate(chained(track)))

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.kernels.geometry import inverse, pixel_rays, rigid, rotation_angle_rad, rotation_exp
+from pipeline.kernels.geometry import inverse, pixel_rays, project, rigid, rotation_angle_rad, rotation_exp
+from pipeline.registration import photometric
 from pipeline.registration.photometric import held_by_color, open_motions, photograph
 from pipeline.types import CameraIntrinsics, DepthMap, RgbdFrame
 
@@ -102,3 +103,25 @@ def test_a_wall_without_texture_and_another_wall_decide_nothing():
     other = photograph(seen(T_color, lambda x_m, y_m: painted(y_m + 3.0, -1.7 * x_m)), DEPTH_IN_COLOR)
     _, target, _ = pair(T_color)
     assert held_by_color(other, target, np.eye(4), MOTIONS) is None
+
+
+def test_points_that_move_beyond_the_lens_are_left_out(monkeypatch):
+    """A lens without an image right of x/z = 0.3, where the steps of the derivative leave it."""
+
+    def of_a_lens(camera, points_m):
+        pixels = project(camera, points_m)
+        pixels[points_m[:, 0] > 0.3 * points_m[:, 2]] = np.nan
+        return pixels
+
+    monkeypatch.setattr(photometric, "project", of_a_lens)
+    monkeypatch.setattr(photometric, "_TINY", 0.02)
+    source, target, true = pair(rigid(np.eye(3), np.array([0.03, -0.02, 0.0])))
+    T, _ = held_by_color(source, target, np.eye(4), np.eye(6)[:, 3:5])
+    assert np.linalg.norm((inverse(true) @ T)[:2, 3]) < 0.002
+
+
+def test_a_pose_far_from_the_start_is_not_believed(monkeypatch):
+    source, target, _ = pair(rigid(np.eye(3), np.array([0.05, 0.0, 0.0])))
+    assert held_by_color(source, target, np.eye(4), np.eye(6)[:, 3:5]) is not None
+    monkeypatch.setattr(photometric, "FARTHEST_PX", 3.0)  # it is 3.3
+    assert held_by_color(source, target, np.eye(4), np.eye(6)[:, 3:5]) is None
