@@ -29,9 +29,10 @@ def measure(
     scale_by: float | None = None,
     json: bool = False,
 ) -> None:
-    """Measure on the surface that `reconstruct` wrote; every number with its 95 % interval.
+    """Measure on the surface that `reconstruct` wrote; every number with an interval computed for 95 %.
 
-    Places are in metres, in the world of the run, as a viewer shows them for surface_after.ply.
+    In rendered rooms 87 to 94 % of the intervals of measured ends held the true value. Places are in metres,
+    in the world of the run, as a viewer shows them for surface_after.ply.
 
     Args:
         run: Folder of the reconstruction.
@@ -48,6 +49,7 @@ def measure(
     """
     from pipeline.measuring.measures import with_scale
     from pipeline.measuring.surface import read_measured
+    from pipeline.measuring.values import HELD
 
     places = {"points": _places(points, "--points"), "planes": _places(planes, "--planes")}
     singles = {
@@ -68,6 +70,7 @@ def measure(
         return
     print(aligned([_row(one, value) for one in found for value in one.values]))
     say(surface.scale_source)
+    say(HELD)
 
 
 def _places(texts: tuple[str, ...], option: str) -> list[Place]:

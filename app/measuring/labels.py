@@ -10,12 +10,13 @@ from app.drawing.quantities import quantity_text
 from app.measuring.kinds import KIND_NAMES, SNAP_NAMES, Step, steps_of
 from app.web.markup import Markdown, Markup
 from app.window.tables import WAITING, table
+from pipeline.measuring.values import HELD, HELD_IN_SHORT
 
 TEXT = Markdown(
-    """Turn on **Clicks measure** and click in the picture. Every number has its 95 % interval: half of it
-after ±, or both ends. **Violet** is *guessed*: an end is on surface that the network inferred, and the
-interval has the odds of such guesses."""
-)
+    """Turn on **Clicks measure** and click in the picture. Every number has an interval, computed for 95 %:
+half of it after ±, or both ends. {}. **Violet** is *guessed*: an end is on surface that the network
+inferred, and the interval has the odds of such guesses."""
+).format(HELD_IN_SHORT)
 OFF = Markdown("Clicks do not measure now.")
 NOTHING_YET = Markdown("There is nothing to measure yet.")
 LOST = "No answer came, because another computation took its place; click again"
@@ -34,8 +35,8 @@ HINTS = {
 }
 INTERVAL = (
     "95 % interval",
-    "In 95 of 100 such measures the interval holds the true value: noise of the sensor, fit of planes, place "
-    "of the click, poses of the nodes and scale count.",
+    "Noise of the sensor, fit of planes, place of the click, scale and, but for boxes and holes, poses of "
+    f"the nodes count. {HELD}.",
 )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 
 from app.compute.measures import (
@@ -38,7 +37,7 @@ from pipeline.measuring.measures import (
     plane_to_plane,
     point_to_plane,
 )
-from pipeline.measuring.planes import Plane
+from pipeline.measuring.planes import Plane, rectangle
 from pipeline.measuring.surface import MeasuredSurface
 from pipeline.surface.holes import find_holes
 from pipeline.types import FloatArray
@@ -222,8 +221,6 @@ def _end(one: Mark, factor: float) -> End:
 def _face(survey: Survey, plane: Plane) -> Face:
     """Return a rectangle around nearly all of the part of the surface to which a plane was fitted."""
     from_middle = (survey.surface.vertices_m[plane.rows] - plane.point_m) @ plane.axes.T
-    turn_rad = np.radians(cv2.minAreaRect(from_middle.astype(np.float32))[2])
-    turned = np.array([[np.cos(turn_rad), np.sin(turn_rad)], [-np.sin(turn_rad), np.cos(turn_rad)]])
-    (left, low), (right, high) = np.percentile(from_middle @ turned.T, EXTENT, axis=0)
+    turned, (left, low), (right, high) = rectangle(from_middle, EXTENT)
     corners = np.array([[left, low], [right, low], [right, high], [left, high]]) @ turned
     return Face((plane.point_m + corners @ plane.axes) / survey.factor, plane.normal, plane.guessed)

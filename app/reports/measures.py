@@ -10,6 +10,7 @@ from app.drawing.colors import INFERRED, css
 from app.drawing.quantities import quantity_text, short_text
 from app.reports.html import table
 from app.web.markup import Markup
+from pipeline.measuring.values import HELD
 
 
 def measured_sections(measures: dict[str, Any]) -> Iterator[Markup]:
@@ -18,8 +19,8 @@ def measured_sections(measures: dict[str, Any]) -> Iterator[Markup]:
     yield table(("measure", "kind", "with 95 % interval"), (_row(one) for one in measures["measures"]))
     yield Markup(
         '<p class="note">The intervals contain the noise of the sensor, the fit of planes, the place of the '
-        "click, the poses of the nodes and the scale. {}</p>"
-    ).format(measures["scale"])
+        "click, the scale and, but for boxes and holes, the poses of the nodes. {}. {}.</p>"
+    ).format(measures["scale"].rstrip("."), HELD)
     if measures["scaled_by"] is not None:
         yield Markup("<p><b>All lengths are scaled by {}, by a true length that was typed.</b></p>").format(
             f"{measures['scaled_by']:.4f}"

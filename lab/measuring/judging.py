@@ -15,7 +15,8 @@ from lab.measuring.rooms import measured_room
 from packetmesh.errors import InputError
 from pipeline.measuring.marks import mark_on_ray
 from pipeline.measuring.measures import Measure, angle_of_planes, distance, point_to_plane
-from pipeline.measuring.planes import plane_at
+from pipeline.measuring.planes import Plane, plane_at
+from pipeline.measuring.surface import MeasuredSurface
 
 LENGTHS = 30
 """Lengths of each kind in a room: both ends measured, and at least one guessed."""
@@ -52,7 +53,7 @@ def judged_room(task: RoomTask) -> list[Row] | None:
     return rows
 
 
-def _lengths(surface: Any, firsts: Sequence[Click], seconds: Sequence[Click]) -> list[Row]:
+def _lengths(surface: MeasuredSurface, firsts: Sequence[Click], seconds: Sequence[Click]) -> list[Row]:
     """Return the rows of lengths from some clicks to others, every click at most once on either side."""
     rows: list[Row] = []
     for a, b in zip(firsts, reversed(seconds), strict=False):
@@ -69,15 +70,14 @@ def _lengths(surface: Any, firsts: Sequence[Click], seconds: Sequence[Click]) ->
             mark_on_ray(surface, one.mark.point_m + 0.01 * one.mark.normal, -one.mark.normal)
         measure = distance(surface, a.mark, b.mark)
         elapsed_s = time.perf_counter() - started
-        same = a.mark.node == b.mark.node
-        rows.append(_row(measure, true_m, elapsed_s) | {"raw_error": raw, "same_node": bool(same)})
+        rows.append(_row(measure, true_m, elapsed_s) | {"raw_error": raw})
     return rows
 
 
-def _with_planes(surface: Any, ends: Sequence[Click], flat: Sequence[Click]) -> list[Row]:
+def _with_planes(surface: MeasuredSurface, ends: Sequence[Click], flat: Sequence[Click]) -> list[Row]:
     """Return the rows of heights of clicks over planes, and of angles of two planes."""
     rows: list[Row] = []
-    previous: tuple[Click, Any] | None = None
+    previous: tuple[Click, Plane] | None = None
     for click, end in zip(flat, reversed(ends), strict=False):
         if len(rows) >= 2 * PLANES:
             break

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from itertools import product
 
-import cv2
 import numpy as np
 
 from packetmesh.errors import InputError
+from pipeline.measuring.guesses import UNKNOWN_RANGE_M, relative_half
 from pipeline.measuring.lookup import lookup_of
 from pipeline.measuring.near import spot_near
-from pipeline.measuring.planes import Plane, plane_at
+from pipeline.measuring.planes import Plane, guess_of, plane_at, rectangle
 from pipeline.measuring.propagation import Z95
 from pipeline.measuring.surface import MeasuredSurface
 from pipeline.measuring.values import Measure, Value
@@ -39,7 +39,8 @@ def box_of_planes(surface: MeasuredSurface, planes: tuple[Plane, Plane, Plane]) 
     """Return width, depth and height of the box of which three faces are given.
 
     Each length is from a face to where the vertices of the other two end. These stand up to half a spacing
-    before the true edge, which is added to the length; half a spacing is also its standard deviation.
+    before the true edge, which is added to the length; half a spacing is also its standard deviation. The
+    covariance of the nodes' poses is left out.
 
     Raises:
         InputError: the planes are not square to each other.
@@ -62,8 +63,8 @@ def box_of_planes(surface: MeasuredSurface, planes: tuple[Plane, Plane, Plane]) 
         deep_m = (corner_m - surface.vertices_m[others]) @ axes[k]
         lengths_m.append(float(np.percentile(deep_m, EXTENT[1])) + ragged_m)
         sds_m.append(np.hypot(np.sqrt(plane.covariance[0, 0]), ragged_m))
-    guessed = tuple(plane.guessed for plane in planes)
-    return _box(surface, corner_m, -axes, np.array(lengths_m), np.array(sds_m), guessed)
+    guesses_m = [_guess_half_m(plane.range_m, plane.confidence) * plane.guessed for plane in planes]
+    return _box(surface, corner_m, -axes, np.array(lengths_m), np.array(sds_m), np.array(guesses_m))
 
 
 def box_of_part(surface: MeasuredSurface, point_m: FloatArray) -> Measure:
@@ -85,9 +86,7 @@ def box_of_part(surface: MeasuredSurface, point_m: FloatArray) -> Measure:
         rows = _part(surface, seed, plane, where)
     points_m = surface.vertices_m[rows] - plane.point_m
     flat_m = points_m @ plane.axes.T
-    turn_rad = np.radians(cv2.minAreaRect(flat_m.astype(np.float32))[2])
-    turned = np.array([[np.cos(turn_rad), np.sin(turn_rad)], [-np.sin(turn_rad), np.cos(turn_rad)]])
-    low_m, high_m = np.percentile(flat_m @ turned.T, EXTENT, axis=0)
+    turned, low_m, high_m = rectangle(flat_m, EXTENT)
     ragged_m = 0.5 * lookup_of(surface).spacing_m
     height_m = float(np.percentile(points_m @ plane.normal, EXTENT[1]))
     axes = np.stack([*(turned @ plane.axes), plane.normal])
@@ -96,8 +95,15 @@ def box_of_part(surface: MeasuredSurface, point_m: FloatArray) -> Measure:
     foot_m = origin_m + 0.5 * lengths_m[:2] @ axes[:2]
     top_m = float(np.median(surface.sigma_m[rows]))
     sds_m = np.array([np.sqrt(2.0) * ragged_m] * 2 + [np.sqrt(plane.offset_variance_m2(foot_m) + top_m**2)])
-    guessed = bool(np.mean(surface.guessed[rows]) > 0.5)
-    return _box(surface, origin_m, axes, lengths_m, sds_m, (guessed, guessed, guessed or plane.guessed))
+    own_m = _guess_half_m(*guess_of(surface, rows)) * bool(np.mean(surface.guessed[rows]) > 0.5)
+    below_m = _guess_half_m(plane.range_m, plane.confidence) * plane.guessed
+    guesses_m = np.array([own_m, own_m, np.hypot(own_m, below_m)])
+    return _box(surface, origin_m, axes, lengths_m, sds_m, guesses_m)
+
+
+def _guess_half_m(range_m: float, confidence: float) -> float:
+    """Return half of the 95 % interval of a guessed side's place: as if it faced its camera."""
+    return relative_half(confidence) * (range_m if np.isfinite(range_m) else UNKNOWN_RANGE_M)
 
 
 def _support(surface: MeasuredSurface, seed: int, where: str) -> Plane:
@@ -167,10 +173,19 @@ def _box(
     axes: FloatArray,
     lengths_m: FloatArray,
     sds_m: FloatArray,
-    guessed: tuple[bool, ...],
+    guesses_m: FloatArray,
 ) -> Measure:
-    """Return the measure of a box from a corner along three (3, 3) axes; the steepest is its height."""
-    halves_m = Z95 * np.hypot(sds_m, lengths_m * surface.scale_sd)
+    """Return the measure of a box from a corner along three (3, 3) axes; the steepest is its height.
+
+    Args:
+        surface: the surface.
+        corner_m: (3,) corner.
+        axes: (3, 3) unit axes as rows.
+        lengths_m: (3,) lengths along them.
+        sds_m: (3,) their standard deviations, without the scale's.
+        guesses_m: (3,) half of the 95 % interval that a guess adds; 0 for a measured length.
+    """
+    halves_m = np.hypot(Z95 * np.hypot(sds_m, lengths_m * surface.scale_sd), guesses_m)
     upright = int(np.argmax(np.abs(axes[:, 2])))
     level = sorted((k for k in range(3) if k != upright), key=lambda k: -lengths_m[k])
     names = ("width", "depth", "height")
@@ -180,7 +195,7 @@ def _box(
             float(lengths_m[k]),
             "m",
             (max(0.0, float(lengths_m[k] - halves_m[k])), float(lengths_m[k] + halves_m[k])),
-            bool(guessed[k]),
+            bool(guesses_m[k] > 0.0),
         )
         for name, k in zip(names, (*level, upright), strict=True)
     )

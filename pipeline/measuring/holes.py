@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from packetmesh.errors import InputError
+from pipeline.measuring.guesses import relative_half
 from pipeline.measuring.lookup import lookup_of
 from pipeline.measuring.near import NEAR_M, NEAR_SPACINGS
+from pipeline.measuring.planes import guess_of
 from pipeline.measuring.propagation import Z95
 from pipeline.measuring.surface import MeasuredSurface
 from pipeline.measuring.values import Measure, Value
+from pipeline.surface.boundary import loop_areas_m2
 from pipeline.surface.holes import find_holes
 from pipeline.types import FloatArray
 
@@ -18,7 +21,8 @@ def hole_area(surface: MeasuredSurface, point_m: FloatArray) -> Measure:
     """Return the area of the hole whose rim is nearest to a point, or around it.
 
     A rim vertex stands up to half a spacing inside the surface, so that is the standard deviation of its
-    place in the surface, besides its noise along the ray.
+    place in the surface, besides its noise along the ray. The covariance of the nodes' poses is left out. The
+    area in a guessed rim is wrong by twice its range's error, as if the hole faced its camera.
 
     Raises:
         InputError: there is no hole near the point.
@@ -36,14 +40,15 @@ def hole_area(surface: MeasuredSurface, point_m: FloatArray) -> Measure:
     loop = holes[nearest].loop
     rim_m = surface.vertices_m[loop]
     chord_m = np.roll(rim_m, -1, axis=0) - np.roll(rim_m, 1, axis=0)
-    vector_m2 = 0.5 * np.sum(np.cross(rim_m - rim_m[0], np.roll(rim_m, -1, axis=0) - rim_m[0]), axis=0)
+    vector_m2 = loop_areas_m2(rim_m, np.roll(rim_m, -1, axis=0), np.array([0]))[0]
     area_m2 = float(np.linalg.norm(vector_m2))
     slopes_m = 0.5 * np.cross(chord_m, vector_m2 / max(area_m2, 1e-12))
     along_m2 = np.einsum("vi,vi->v", slopes_m, surface.rays[loop]) ** 2 * surface.sigma_m[loop] ** 2
     ragged_m2 = np.sum(slopes_m**2, axis=1) * (0.5 * spacing_m) ** 2
     variance = float(np.sum(along_m2 + ragged_m2)) + (2.0 * area_m2 * surface.scale_sd) ** 2
-    half_m2 = Z95 * float(np.sqrt(variance))
     guessed = bool(np.mean(surface.guessed[loop]) > 0.5)
+    guess_m2 = 2.0 * area_m2 * relative_half(guess_of(surface, loop)[1]) if guessed else 0.0
+    half_m2 = float(np.hypot(Z95 * np.sqrt(variance), guess_m2))
     value = Value("area", area_m2, "m2", (max(0.0, area_m2 - half_m2), area_m2 + half_m2), guessed)
     return Measure("hole", (value,), rim_m)
 

@@ -42,7 +42,8 @@ def distance(surface: MeasuredSurface, a: Mark, b: Mark) -> Measure:
 
 def point_to_plane(surface: MeasuredSurface, a: Mark, plane: Plane) -> Measure:
     """Return the distance of a mark from a plane."""
-    value, ci95 = interval(surface, (a, plane), _height)
+    side = -1.0 if float((a.point_m - plane.point_m) @ plane.normal) < 0.0 else 1.0
+    value, ci95 = interval(surface, (a, plane), lambda point, of: side * _height(point, of))
     foot_m = a.point_m - float((a.point_m - plane.point_m) @ plane.normal) * plane.normal
     one = Value("distance", value, "m", ci95, a.guessed or plane.guessed)
     return Measure("point-plane", (one,), np.stack([a.point_m, foot_m]))
@@ -127,7 +128,8 @@ def _length(a: Places, b: Places) -> FloatArray:
 
 
 def _height(point: Places, plane: Places) -> FloatArray:
-    return np.abs(np.einsum("mi,mi->m", point.points_m - plane.points_m, plane.normals))
+    """Return (M,) heights over a plane, negative below: a magnitude would have no derivative at 0."""
+    return np.einsum("mi,mi->m", point.points_m - plane.points_m, plane.normals)
 
 
 def _between(normals: FloatArray, others: FloatArray) -> FloatArray:

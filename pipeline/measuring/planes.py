@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -174,9 +175,7 @@ def fitted(surface: MeasuredSurface, rows: IntArray) -> Plane:
     if guessed:
         ray = surface.rays[rows].mean(axis=0)
         ray /= max(float(np.linalg.norm(ray)), 1e-12)
-        range_m = float("nan") if surface.ranges_m is None else float(np.mean(surface.ranges_m[rows]))
-        if surface.confidence is not None and np.isfinite(surface.confidence[rows]).any():
-            confidence = float(np.nanmean(surface.confidence[rows]))
+        range_m, confidence = guess_of(surface, rows)
     return Plane(
         center_m,
         normal,
@@ -190,6 +189,28 @@ def fitted(surface: MeasuredSurface, rows: IntArray) -> Plane:
         range_m,
         confidence,
     )
+
+
+def guess_of(surface: MeasuredSurface, rows: IntArray) -> tuple[float, float]:
+    """Return the mean range (m) and the mean confidence of guessed vertices; NaN where unknown."""
+    range_m = float("nan") if surface.ranges_m is None else float(np.mean(surface.ranges_m[rows]))
+    if surface.confidence is None or not np.isfinite(surface.confidence[rows]).any():
+        return range_m, float("nan")
+    return range_m, float(np.nanmean(surface.confidence[rows]))
+
+
+def rectangle(
+    flat_m: FloatArray, percentiles: tuple[float, float]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the smallest rectangle around (M, 2) points, without those outside two percentiles.
+
+    Returns:
+        (2, 2) unit axes of its sides as rows, and (2,) least and (2,) greatest coordinates along them.
+    """
+    turn_rad = np.radians(cv2.minAreaRect(flat_m.astype(np.float32))[2])
+    axes = np.array([[np.cos(turn_rad), np.sin(turn_rad)], [-np.sin(turn_rad), np.cos(turn_rad)]])
+    low_m, high_m = np.percentile(flat_m @ axes.T, percentiles, axis=0)
+    return axes, low_m, high_m
 
 
 def together(points_m: FloatArray, residuals_m: FloatArray, spacing_m: float) -> float:

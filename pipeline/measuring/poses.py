@@ -17,8 +17,9 @@ ASSUMED_SCALE_SD = 0.01
 3 % wrong (SPEC 1.5)."""
 SLACK_OF_SCALE = 0.35
 """Ratio of what cameras of wrong scale leave in a registration, as a turn in rad and as a shift over the
-distance of what they see, to the scale's own deviation: 16 rendered rooms, two nodes each, whose focal
-lengths were wrong by 0.3 % (standard deviation), ended 1.1 mrad and 1.05 mm per m off."""
+distance of what they see, to the scale's own deviation: rendered rooms of ``lab.measuring.rooms.TUNING`` on,
+two nodes each, whose focal lengths were wrong by 0.3 % (standard deviation), ended 1.1 mrad and 1.05 mm per m
+off (SPEC 11)."""
 UNHELD_RAD, UNHELD_M = 0.02, 0.03
 """Standard deviations of a placed node that no registration holds: it stands where its given pose says."""
 
@@ -45,7 +46,7 @@ def of_placement(placement: Placement, seen_m: Sequence[FloatArray], scale_sd: f
     """
     count = len(placement.T_world_camera)
     found = np.zeros((count, 6, 6))
-    given = placement.covariances or (np.zeros((6, 6)),) * count
+    given = placement.covariances or (np.zeros((6, 6)), *(np.full((6, 6), np.nan),) * (count - 1))
     for node, (covariance, points_m, pose) in enumerate(
         zip(given, seen_m, placement.T_world_camera, strict=True)
     ):
@@ -57,7 +58,7 @@ def of_placement(placement: Placement, seen_m: Sequence[FloatArray], scale_sd: f
             slack = SLACK_OF_SCALE * scale_sd * np.repeat([1.0, away_m], 3)
             found[node] = covariance + _about(center_m, slack)
         else:
-            found[node] = _about(center_m, np.repeat([UNHELD_RAD, UNHELD_M], 3))
+            found[node] = _unheld(center_m)
     return found
 
 
@@ -76,7 +77,18 @@ def of_walk(walk: Walk) -> FloatArray:
     ]
     to_world = adjoint(first)
     covariances = motion_covariances(T_first_node, edges, 0)
-    return np.array([to_world @ covariance @ to_world.T for covariance in covariances]).reshape(-1, 6, 6)
+    found = [
+        to_world @ covariance @ to_world.T
+        if np.isfinite(covariance).all()
+        else _unheld(np.zeros(3) if pose is None else pose[:3, 3])
+        for covariance, pose in zip(covariances, poses, strict=True)
+    ]
+    return np.array(found).reshape(-1, 6, 6)
+
+
+def _unheld(center_m: FloatArray) -> FloatArray:
+    """Return the (6, 6) covariance of a node around a (3,) point, if no registration holds it."""
+    return _about(center_m, np.repeat([UNHELD_RAD, UNHELD_M], 3))
 
 
 def _about(center_m: FloatArray, sds: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.measuring.guesses import relative_errors
+from pipeline.measuring.guesses import UNKNOWN_RANGE_M, relative_errors
 from pipeline.measuring.marks import Mark
 from pipeline.measuring.planes import Plane
 from pipeline.measuring.surface import MeasuredSurface
@@ -47,13 +47,13 @@ def interval(
     """Return a measure and its 95 % interval.
 
     Measured things: to first order, from the joint covariance. With a guessed one: percentiles of draws, in
-    which guesses err as guesses of the same confidence do, each by itself.
+    which guesses err as guesses of the same confidence do, independently of each other.
 
     Args:
         surface: the surface.
         things: marks and planes that the measure depends on.
         formula: the measure.
-        own_sd: standard deviation of the measure besides, in its unit.
+        own_sd: further standard deviation of the measure, in its unit.
     """
     still = np.zeros((1, 3 * len(things)))
     value = float(_at(things, still, formula)[0])
@@ -147,12 +147,12 @@ def _drawn(
 
 
 def _guess_errors(surface: MeasuredSurface, thing: Thing, rng: np.random.Generator) -> FloatArray:
-    """Return (DRAWS, 3) errors of a guessed thing's state; both sides of a plane err as if by themselves."""
+    """Return (DRAWS, 3) errors of a guessed thing's state; a plane's shift and tilts err independently."""
 
     def errors_m() -> FloatArray:
         return range_m * np.expm1(relative_errors(thing.confidence, rng.random(DRAWS)))
 
-    range_m = thing.range_m if np.isfinite(thing.range_m) else 1.0
+    range_m = thing.range_m if np.isfinite(thing.range_m) else UNKNOWN_RANGE_M
     ray = thing.normal if thing.ray is None else thing.ray
     if isinstance(thing, Mark):
         return errors_m()[:, None] * ray

@@ -12,6 +12,7 @@ from pipeline.measuring.surface import MeasuredSurface
 from pipeline.measuring.values import Measure
 
 LEAST_SCALE_SD = 1e-4
+"""Least relative standard deviation of a scale that was set."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,8 +21,6 @@ class ScaleCheck:
 
     factor: float
     """True over measured length."""
-    ci95: tuple[float, float]
-    """95 % interval of the factor."""
     agrees: bool
     """Whether the true length is inside the measure's interval."""
     sentence: str
@@ -41,7 +40,8 @@ def with_scale(
         measured: a measure whose only value is a length.
 
     Raises:
-        InputError: the measure is no single length, is guessed, or the true length is not positive.
+        InputError: the measure is no single length, is guessed or not surely above 0, or the true length is
+            not positive.
     """
     one = measured.values[0]
     if len(measured.values) != 1 or one.unit != "m":
@@ -50,10 +50,14 @@ def with_scale(
         raise InputError("An end of this length was guessed, so it sets no scale; mark measured points")
     if not (np.isfinite(true_m) and true_m > 0.0):
         raise InputError(f"A true length of {true_m:g} m is not possible; try a positive one, in metres")
+    if one.ci95[0] <= 0.0:
+        raise InputError(
+            f"The measured {one.value:.3g} m may be 0 m within its interval, so it sets no scale; "
+            "mark a longer length"
+        )
     (low_m, high_m), factor = one.ci95, true_m / one.value
     relative = (high_m - one.value) / Z95 / one.value
     own = max(LEAST_SCALE_SD, float(np.sqrt(max(relative**2 - surface.scale_sd**2, 0.0))))
-    half = Z95 * own * factor
     agrees = low_m <= true_m <= high_m
     verb = "agrees with" if agrees else "does not agree with"
     sentence = (
@@ -70,4 +74,4 @@ def with_scale(
         scale_sd=own,
         scale_source=f"A true length of {true_m:.4g} m sets the scale, within {100.0 * own:.2g} %",
     )
-    return scaled, ScaleCheck(factor, (factor - half, factor + half), agrees, sentence)
+    return scaled, ScaleCheck(factor, agrees, sentence)

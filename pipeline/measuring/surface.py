@@ -256,8 +256,10 @@ def read_measured(run: Path) -> MeasuredSurface:
         surface = MeasuredSurface(**values)
         count = len(surface.vertices_m)
         whole = all(
-            len(getattr(surface, name)) == count for name in ("normals", "sigma_m", "rays", "guessed")
+            len(getattr(surface, name)) == count
+            for name in ("normals", "sigma_m", "rays", "guessed", "nodes")
         )
+        whole &= surface.pose_covariances.shape[1:] == (6, 6)
     except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile):
         whole = False
     if not whole or not count or surface.triangles.max(initial=-1) >= count:

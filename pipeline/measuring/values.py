@@ -9,6 +9,14 @@ from pipeline.types import FloatArray
 
 Kind = Literal["distance", "point-plane", "plane-plane", "angle", "hole", "box"]
 Unit = Literal["m", "deg", "m2"]
+HELD_IN_SHORT = "In rendered rooms 87 to 94 % of the intervals of measured ends held the true value"
+HELD = (
+    "The intervals are computed for 95 %. In 4 rendered rooms that had no part in the constants, those of "
+    "91 % of 120 lengths (95 % interval of this share: 80 to 100 %), 87 % of 52 heights over a plane (75 to "
+    "100 %), 94 % of 33 angles of two planes (83 to 100 %) and 96 % of 120 lengths with a guessed end (90 to "
+    "100 %) held the true value; other measures were not tested"
+)
+"""Shares of intervals that held, by ``lab.benchmarks.measuring.benchmark(4)``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,9 +28,9 @@ class Value:
     value: float
     unit: Unit
     ci95: tuple[float, float]
-    """95 % interval, in the same unit."""
+    """Interval computed for 95 %, in the same unit; ``HELD`` says how many held."""
     guessed: bool
-    """Whether an end was guessed, so that the interval comes from the odds of such guesses."""
+    """Whether an end was guessed, so that the interval has the odds of such guesses."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,9 +20,11 @@ WIDTH_PX = 320
 WINDOW = 0.5
 """Standard deviation of the window over which the surface's misfit is averaged, in spacings."""
 MISFIT_FACTOR = 1.25
-"""Standard deviation over the root mean square of this misfit, whose tails are long: in 20 rendered rooms,
-94 % of 600 lengths were within intervals from the misfit itself, 90 % of those below 1 m."""
+"""Standard deviation over the root mean square of this misfit, whose tails are long: with the misfit itself,
+in 20 rendered rooms (seeds 7,900,048 to 7,900,067), the intervals of 94 % of 600 lengths held, and of 90 % of
+those below 1 m."""
 LEAST_WINDOW_PX = 1.5
+"""Least standard deviation of that window, pixels of the compared image."""
 GUESS_PX = 3
 """Distance of the pixels around a vertex in which its guess is looked for."""
 LEAST_Z_M = 0.05

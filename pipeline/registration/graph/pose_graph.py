@@ -18,8 +18,10 @@ from pipeline.types import FloatArray, IntArray
 MAX_STEPS = 50
 STILL = 1e-9
 """The optimisation stops when no node turns or moves more than this, rad and m."""
-FIRST_DAMPING, ROUNDING = 1e-6, 1e-9
-"""Damping after the first step that raises the sum; rise of the sum, of it and at all, that is rounding."""
+FIRST_DAMPING = 1e-6
+"""Damping after the first step that raises the sum."""
+ROUNDING = 1e-9
+"""Rise of the sum, as a share of it and absolute, that counts as rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +123,8 @@ def _around(edges: Sequence[PoseEdge], loops: Loops, place: int, row: int) -> Fl
 def optimised(start: FloatArray, edges: Sequence[PoseEdge]) -> tuple[FloatArray, FloatArray]:
     """Minimise the sum of the edges' squared Mahalanobis distances over the poses (Levenberg-Marquardt).
 
-    Without damping while the sum falls: along a bare wall, where edges hardly hold a motion, full steps may
-    run away.
+    There is no damping while the sum falls. Along a bare wall, where edges hardly hold a motion, full steps
+    would run away.
 
     The first node of each connected group keeps its pose. The distance of an edge X between poses A of its
     source and B of its target is that of X^-1 B^-1 A from the identity (Choi, Zhou, Koltun 2015, eq. 3).
@@ -195,18 +197,24 @@ def motion_covariances(
     """Compute the covariance of every node's pose, by the information of the edges that gave it.
 
     Args:
-        T_reference_node: (4, 4) solved pose of every node; NaN for nodes that no edge reaches.
+        T_reference_node: (4, 4) solved pose of every node; NaN for nodes without one.
         edges: the registrations that were used.
         reference: node whose pose is the identity.
 
     Returns:
         (6, 6) covariance of each node's small motion (turn in rad about the reference's origin, then shift in
-            m; both along the reference's axes): 0 for the reference, NaN for a node without a pose.
+            m; both along the reference's axes): 0 for the reference, NaN for a node without a pose and for
+            one that no edges join to the reference.
     """
-    reached = np.array([bool(np.isfinite(T).all()) for T in T_reference_node])
+    posed = [bool(np.isfinite(T).all()) for T in T_reference_node]
+    joined = [edge for edge in edges if posed[edge.source] and posed[edge.target]]
+    groups = Groups(len(posed), [(edge.source, edge.target) for edge in joined])
+    reached = np.array(
+        [there and groups.of(node) == groups.of(reference) for node, there in enumerate(posed)]
+    )
     T = np.array([T if there else np.eye(4) for T, there in zip(T_reference_node, reached, strict=True)])
     found = [np.zeros((6, 6)) if there else np.full((6, 6), np.nan) for there in reached]
-    held = [edge for edge in edges if reached[edge.source] and reached[edge.target]]
+    held = [edge for edge in joined if reached[edge.source]]
     free = np.array([node for node in np.flatnonzero(reached) if node != reference], int)
     if not held or not len(free):
         return tuple(found)

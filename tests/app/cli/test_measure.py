@@ -8,6 +8,7 @@ import pytest
 import packetmesh as pm
 from pipeline.folders.run import metrics_of, write_run_folder
 from pipeline.measuring.surface import MEASURING, measured_surface, read_measured, write_measured
+from pipeline.measuring.values import HELD
 from tests.app import commands
 from tests.pipeline.measuring.scenes import box_on_table, measured
 
@@ -64,7 +65,7 @@ def test_a_table_for_people_says_where_the_scale_is_from(capsys, folder):
     assert lines[0].split()[:4] == ["length", "(distance)", "0.1000", "m"]
     assert [line.split()[0] for line in lines[1:]] == ["width", "depth", "height"]
     assert "95 %: " in lines[0]
-    assert err == "known\n"
+    assert err == f"known\n{HELD}\n"
 
 
 def test_a_true_length_scales_everything(capsys, folder):

@@ -106,6 +106,9 @@ def test_heights_and_gaps_of_planes():
     (height,) = measures.point_to_plane(surface, mark(surface, np.array([0.1, 0.1, 0.15])), table).values
     assert height.value == pytest.approx(0.15)
     assert half(height) == pytest.approx(Z95 * 0.001, rel=0.01)
+    (nothing,) = measures.point_to_plane(surface, mark(surface, np.array([0.4, 0.4, 0.0])), table).values
+    assert (nothing.value, nothing.ci95[0]) == (pytest.approx(0.0, abs=1e-9), 0.0)
+    assert nothing.ci95[1] == pytest.approx(Z95 * 0.001, rel=0.02)
     gap = measures.plane_to_plane(surface, table, top)
     assert gap.values[0].value == pytest.approx(0.15)
     assert np.ptp(gap.ends_m, axis=0) == pytest.approx([0.0, 0.0, 0.15])
@@ -187,13 +190,16 @@ def test_a_true_length_checks_and_sets_the_scale():
     assert check.agrees
     own = np.sqrt(2.0) * SIGMA_M / 2.0
     assert scaled.scale_sd == pytest.approx(own, rel=0.01)
-    assert check.ci95 == pytest.approx((1.025 * (1 - Z95 * own), 1.025 * (1 + Z95 * own)), rel=1e-3)
     again = measures.distance(scaled, *(mark(scaled, 1.025 * end) for end in ends))
     assert again.values[0].value == pytest.approx(2.05)
     assert not measures.with_scale(surface, 2.5, found)[1].agrees
     assert "does not agree" in measures.with_scale(surface, 2.5, found)[1].sentence
     with pytest.raises(InputError, match="try a positive one"):
         measures.with_scale(surface, 0.0, found)
+    floor = plane_at(surface, np.array([0.0, 0.5, 0.5]))
+    nothing = measures.point_to_plane(surface, mark(surface, np.array([0.0, 0.2, 0.2])), floor)
+    with pytest.raises(InputError, match="mark a longer length"):
+        measures.with_scale(surface, 0.1, nothing)
 
 
 def test_two_equal_points_have_no_length():
@@ -222,3 +228,36 @@ def test_a_guessed_end_has_the_odds_of_its_confidence():
         widths.append(np.ptp(value.ci95))
         assert not length(surface, b=(0.0, 0.8, 0.5)).guessed
     assert widths[0] > widths[1] > 0.02
+
+
+def test_a_guessed_hole_and_a_guessed_box_have_the_odds_of_their_confidence():
+    vertices_m, triangles, normals = sheet(20, 20, 0.05)
+    inside = np.all(np.abs(vertices_m[triangles].mean(axis=1)[:, :2] - 0.5) < 0.1, axis=1)
+    holed, box = (vertices_m, triangles[~inside], normals), box_on_table()
+
+    def widths(guessed, confidence):
+        def surface(mesh):
+            count = len(mesh[0])
+            return measured(
+                mesh,
+                guessed=np.full(count, guessed),
+                ranges_m=np.full(count, 2.0),
+                confidence=np.full(count, confidence),
+            )
+
+        area = measures.hole_area(surface(holed), np.array([0.5, 0.5, 0.0])).values
+        top, side, front = [0.1, 0.1, 0.15], [0.0, 0.1, 0.07], [0.1, 0.0, 0.07]
+        boxes = surface(box)
+        part = measures.box_of_part(boxes, np.array(top)).values
+        faces = measures.box_of_planes(
+            boxes, tuple(plane_at(boxes, np.array(face)) for face in (top, side, front))
+        ).values
+        values = (*area, *part, *faces)
+        assert all(value.guessed == guessed for value in values)
+        return np.array([value.ci95[1] - value.value for value in values])
+
+    known, sure, unsure = widths(False, np.nan), widths(True, 0.95), widths(True, 0.55)
+    assert np.all(known < sure)
+    assert np.all(sure < unsure)
+    assert unsure[0] > 0.5 * 0.04
+    assert np.all(unsure[1:] > 1.0)

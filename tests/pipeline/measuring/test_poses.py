@@ -121,3 +121,26 @@ def test_keyframes_of_a_walk_are_less_sure_the_more_links_lead_to_them():
     local = motion_covariances(T, [edge(1, 0, information), edge(2, 1, information)], 0)[1]
     expected = moved_points(local, apply(T_first, np.array(point_m)))
     assert np.linalg.norm(near) == pytest.approx(np.linalg.norm(expected))
+
+
+def test_a_node_that_no_edge_joins_to_the_reference_is_not_sure():
+    information = np.diag(1.0 / SDS**2)
+    held, near, apart = motion_covariances(T, [edge(1, 0, information)], 0)
+    assert not held.any()
+    assert np.isfinite(near).all()
+    assert np.isnan(apart).all()
+    place = Placement((), tuple(POSES[:2]))
+    seen_m = [np.array([[0.0, 0.0, 0.5]])] * 2
+    first, second = poses.of_placement(place, seen_m, 0.0)
+    assert not first.any()
+    assert moved_points(second, seen_m[1]) == pytest.approx(poses.UNHELD_M)
+
+
+def test_a_keyframe_without_links_or_without_a_pose_has_a_finite_covariance():
+    frames = (POSES[0], None, POSES[1])
+    nothing = PointCloud(np.empty((0, 3)))
+    walk = Walk(np.arange(3.0), frames, (0, 1, 2), (), nothing, 0.01, np.empty(0, int), frames)
+    first, lost, alone = poses.of_walk(walk)
+    assert not first.any()
+    assert np.isfinite(lost).all()
+    assert moved_points(alone, [POSES[1][:3, 3]]) == pytest.approx(poses.UNHELD_M)
