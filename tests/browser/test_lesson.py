@@ -74,6 +74,7 @@ def test_five_stops_are_led_through_by_keys_alone(page, lesson):
         press_until(page, "ArrowRight" if stop % 2 else "Space", f"({stop + 1} of {stops})", NEXT_MS)
     press_until(page, "ArrowLeft", f"(5 of {stops})", NEXT_MS)
     assert page.get_by_text(WAITS).locator("visible=true").count() == 0
+    unfold(page, f"Lesson: {lesson}")
 
 
 def test_the_dock_has_the_keys_after_a_click_on_it_until_escape(page):
