@@ -22,6 +22,7 @@ from app.session.framing import Framing
 from app.session.places import Places
 from app.session.views import Views
 from app.web.uploads import Uploads, plain
+from app.web.viser_private import call_in_order
 from app.window.gui import Gui
 from app.window.header import Header
 from app.window.page import screen_mark
@@ -55,6 +56,7 @@ class Session:
         lecture: SharedBy | None = None,
     ) -> None:
         self.target = target
+        call_in_order(target)
         self.gui, self.scene = Gui(target.gui), target.scene
         self.ui = Ui(self.gui, target.scene, self.post, target.atomic, target.flush, lecture=lecture)
         self.store, self.uploads = store, uploads

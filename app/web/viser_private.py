@@ -7,6 +7,8 @@ moment, ``set`` fails with "deque mutated during iteration", once in some thousa
 half built.
 - ``remember_hints``: viser evaluates the type hints of a control's properties anew for every control, which
 is a seventh of the time in which a session's panels are built.
+- ``call_in_order``: viser handles a browser's messages on any of 32 threads, so that on busy cores a click on
+*Reset* can be handled before the choice that it should undo.
 - ``listen``: viser gives every message of a browser to its handlers and has no hook before them.
 - ``find_control``, ``find_command``, ``is_live``: the target of a message, and whether a user could reach it.
 - ``address_of``, ``close``, ``cookies``: parts of a browser's connection.
@@ -17,6 +19,7 @@ from __future__ import annotations
 import asyncio
 import functools
 from collections.abc import Awaitable, Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeAlias, get_type_hints
 
 import viser
@@ -47,6 +50,13 @@ def queue_from_any_thread(server: viser.ViserServer) -> None:
 
     queue_to(server._websock_server)
     server._websock_server.on_client_connect(queue_to)
+
+
+def call_in_order(target: viser.ViserServer | viser.ClientHandle) -> None:
+    """Call the callbacks of a browser's controls and scene nodes one after the other, as messages come."""
+    in_order = ThreadPoolExecutor(1, thread_name_prefix="callbacks")
+    for owner in (target.gui, target.scene):
+        setattr(owner, "_thread_executor", in_order)  # noqa: B010
 
 
 def remember_hints() -> None:

@@ -4,6 +4,7 @@
   const STEPPER = "div:has(> .packetmesh-steps) + div";
   const BUTTON = "button:not([role=tab], .packetmesh-term)";
   const SETTING = `${BUTTON}, [role=option], [role=slider], .mantine-Slider-root, [type=checkbox]`;
+  const NONE = `${STEPPER}, .mantine-Modal-root`; // what has no settings
   const KEPT = ["screen", "cam"]; // parts of the address that Reset leaves as they are
   let idle = []; // buttons for which the server has nothing to do
   let used = false; // whether a setting was used since the last Reset
@@ -19,7 +20,7 @@
   function use({target, type, isTrusted}) {
     if (!target.closest) return;
     if (!row()?.contains(target))
-      used ||= isTrusted && !target.closest(STEPPER) && (type === "input" || target.closest(SETTING) !== null);
+      used ||= isTrusted && !target.closest(NONE) && (type === "input" || target.closest(SETTING) !== null);
     else if (type === "click" && target.closest("button")?.textContent === "Reset") used = false;
     setTimeout(draw); // after the click, which a disabled button would not get
   }

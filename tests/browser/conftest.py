@@ -154,6 +154,7 @@ def tab(loaded):
 def page(tab):
     """The tab with the settings of the start, on its first step."""
     reset = tab.get_by_role("button", name="Reset", exact=True)
+    tab.evaluate("() => new Promise(done => setTimeout(done, 50))")  # what the last click leaves to do is done
     if reset.is_enabled():
         reset.click()
     tab.get_by_role("button", name="Scene").click()

@@ -103,6 +103,10 @@ def test_buttons_with_nothing_to_do_are_dead(page):
     )
     for button in (cancel, retry, reset):
         expect(button).to_be_disabled()
+    page.get_by_role("button", name="Copy as command").click()
+    page.get_by_role("button", name="Close").click()
+    expect(page.get_by_role("button", name="Close")).to_have_count(0)
+    expect(reset).to_be_disabled()
     go(page, "Depth")
     pick(page, "Colours", "photo")
     expect(reset).to_be_enabled()

@@ -6,9 +6,10 @@ from collections import deque
 import pytest
 import viser
 from viser._assignable_props_api import AssignablePropsBase
-from viser._messages import GuiSliderProps
+from viser._messages import GuiSliderProps, GuiUpdateMessage
 from websockets.sync.client import connect
 
+from app.load.connection import Connection
 from app.server import build_server
 from app.web import viser_private
 from app.web.viser_private import AnyThreadEvent
@@ -71,6 +72,24 @@ def test_the_hints_of_a_kind_of_control_are_evaluated_once(monkeypatch):
     finally:
         server.stop()
     assert evaluated.count(GuiSliderProps) == 1
+
+
+def test_a_browsers_clicks_are_handled_in_their_order():
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    handled, slow, done = [], threading.Event(), threading.Event()
+    try:
+        viser_private.call_in_order(server)
+        first, second = server.gui.add_button("first"), server.gui.add_button("second")
+        first.on_click(lambda _: (slow.wait(0.3), handled.append("first")))
+        second.on_click(lambda _: (handled.append("second"), done.set()))
+        page = Connection(f"http://127.0.0.1:{server.get_port()}")
+        for button in (first, second):
+            page.send(GuiUpdateMessage(button._impl.uuid, {"value": True}))
+        assert done.wait(30.0)
+        page.close()
+    finally:
+        server.stop()
+    assert handled == ["first", "second"]
 
 
 @pytest.mark.parametrize("lecture", [False, True], ids=["a session each", "lecture"])
