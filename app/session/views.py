@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import TypeAlias
 
@@ -19,6 +20,7 @@ ALIKE = 1e-3
 """Tolerance over the distance to the look-at point: two views closer than this are equal."""
 ECHO_S = 0.7
 """Time after the app turned the view in which a browser's report is not taken for the user's, seconds."""
+MOST_KNOWN = 16
 FARTHEST_M = 1e5
 
 
@@ -28,8 +30,10 @@ class Views:
     def __init__(self, client: viser.ClientHandle, clock: Callable[[], float] = time.monotonic) -> None:
         self._client, self._clock = client, clock
         self._kind = ""
-        self._framed = self._before = self._now()
+        self._framed = self._now()
         self._framed_s = -ECHO_S
+        self._known = deque([self._framed], MOST_KNOWN)
+        """Views before and after the app's last turns: a slow browser may report any of them later."""
         self._turned: dict[str, View] = {}
         """By kind: the view that the user has turned to."""
         self._requested: View | None = None
@@ -53,7 +57,8 @@ class Views:
             return
         if moved and not keep:
             self._turned.pop(kind, None)
-        self._framed, self._before, self._framed_s = after, before, self._clock()
+        self._framed, self._framed_s = after, self._clock()
+        self._known += before, after
         view = self._turned.get(kind) if self._requested is None else self._requested
         if view is not None:
             turn(self._client, view[1], view[0])
@@ -90,6 +95,7 @@ class Views:
                 "The address has an invalid camera; give its position and target, x,y,z,x,y,z in metres"
             )
         self._requested = view.reshape(2, 3)
+        self._known += self._now(), self._requested
         turn(self._client, self._requested[1], self._requested[0])
 
     def _now(self) -> View:
@@ -97,11 +103,11 @@ class Views:
         return np.array([camera.position, camera.look_at])
 
     def _by_hand(self) -> bool:
-        """Whether the view differs from the one the app turned to and from the one before that turn."""
+        """Whether the view differs from all that the app turned to or from."""
         if self._clock() - self._framed_s < ECHO_S or self._requested is not None:
             return False
         now = self._now()
-        return not (_alike(now, self._framed) or _alike(now, self._before))
+        return not any(_alike(now, known) for known in self._known)
 
 
 def _alike(one: View, other: View) -> bool:

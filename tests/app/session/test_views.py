@@ -69,6 +69,17 @@ def test_a_hands_view_comes_back_after_another_screen(eye):
     assert eye.views.place() == "4.000,0.000,1.000,0.000,0.000,0.000"
 
 
+def test_a_slow_browsers_report_of_an_older_view_is_not_a_hands(eye):
+    """Its report of the start arrives after two turns of the app and after the address's view."""
+    eye.frame("scene", RACE)
+    eye.views.take("4,0,1,0,0,0")
+    eye.views.settle()
+    for late in (START, SCENE, RACE):
+        eye.turn(late)
+        eye.frame("scene", SCENE if late is RACE else RACE)
+        assert eye.view == HAND
+
+
 def test_what_is_new_is_looked_at_anew(eye):
     eye.turn(HAND)
     eye.frame("scene", RACE, keep=False)
