@@ -82,6 +82,7 @@ def summary(rows: Iterable[Row]) -> list[Row]:
             "every": some[0]["every"],
             "walks": len(some),
             "lost": sum(row["lost"] for row in some),
+            "crashed": sum(row.get("crashed", False) for row in some),
             "peak_memory_bytes": max(row["peak_memory_bytes"] for row in some),
         }
         for name in (*ERRORS, *GAINS):
@@ -126,7 +127,7 @@ def _median_and_worst(
 
 def _line(group: Row) -> str:
     parts = [
-        f"{group['lost']} of {group['walks']} walks lost",
+        f"{group['lost']} of {group['walks']} walks lost{_crashes(group)}",
         f"ATE {_both(group, 'ate_m', 100, 'cm')}",
         f"{_both(group, 'ate_share', 100, '%')} of the path",
         f"RPE {_both(group, 'rpe_m', 100, 'cm')}",
@@ -141,6 +142,10 @@ def _line(group: Row) -> str:
             f"{_both(group, 'without_surface', 100, '%')} of rays without a surface",
         ]
     return f"{group['program']}: {', '.join(parts)}"
+
+
+def _crashes(group: Row) -> str:
+    return f", {group['crashed']} by a crash" if group["crashed"] else ""
 
 
 def _both(group: Row, name: str, factor: float, unit: str) -> str:

@@ -6,7 +6,9 @@ does not have, for the smallest ATE.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
@@ -60,8 +62,20 @@ def available_walk_peers() -> tuple[str, ...]:
 
 
 def measure_peer(task: WalkTask) -> Row:
-    """Measure one of the programs on a walk in a fresh process; returns the row of ``measured``."""
-    return run_alone(solve_peer, task)
+    """Measure one of the programs on a walk in a fresh process; returns the row of ``measured``.
+
+    A program that ends the process, as by a segmentation fault, has no poses.
+    """
+    started = time.perf_counter()
+    try:
+        return run_alone(solve_peer, task)
+    except BrokenProcessPool:
+        elapsed_s = time.perf_counter() - started
+        return run_alone(measured, task, _without_poses) | {
+            "crashed": True,
+            "elapsed_s": elapsed_s,
+            "frames_s": None,
+        }
 
 
 def solve_peer(task: WalkTask) -> Row:
@@ -69,6 +83,10 @@ def solve_peer(task: WalkTask) -> Row:
     peer = WALK_PEERS[task.program]
     import_module(peer.module)  # before the clock starts
     return measured(task, peer.program)
+
+
+def _without_poses(frames: FramesInMemory) -> WalkAnswer:
+    return WalkAnswer((None,) * len(frames.times_s))
 
 
 def _open3d_slam(frames: FramesInMemory, voxel_m: float | None = None) -> WalkAnswer:

@@ -1,12 +1,14 @@
 """Walks: every program answers on one, and trajectories, maps and summaries are judged as they should be."""
 
 import shutil
+from concurrent.futures.process import BrokenProcessPool
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from lab.benchmarks.recording import compared, summary
+from lab.walks import peers
 from lab.walks.held_out import FIRST_ROOM, WalkTask, frames_in_memory, held_out_walks
 from lab.walks.judging import map_errors, rpe_m, to_truth, trajectory_errors
 from lab.walks.ours import OURS, OURS_TRACKING, OWN, solve_own
@@ -121,6 +123,19 @@ def test_tracked_poses_follow_the_links_and_other_parts_have_none():
     clouds = dict.fromkeys((0, 1, 2, 5), SimpleNamespace())
     poses = poses_by_tracking(Track(frames, clouds, links))
     assert [None if T is None else T[0, 3] for T in poses] == [0.0, 1.0, 2.0, 3.0, None, None]
+
+
+def test_a_program_that_ends_its_process_has_no_poses_and_the_benchmark_goes_on(walk, monkeypatch):
+    def crashes(function, *arguments):
+        if function is peers.solve_peer:
+            raise BrokenProcessPool
+        return function(*arguments)
+
+    monkeypatch.setattr(peers, "run_alone", crashes)
+    row = peers.measure_peer(WalkTask("open3d-slam", walk, 1))
+    assert (row["without_pose"], row["lost"], row["crashed"]) == (FRAMES, True, True)
+    (group,) = summary([row])
+    assert (group["crashed"], group["frames_s"], group["ate_m"]) == (1, None, None)
 
 
 def test_a_summary_has_medians_and_worst_values_and_a_walk_without_poses_is_the_worst():

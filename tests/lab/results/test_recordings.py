@@ -6,6 +6,7 @@ RUN = {
     "program": "ours",
     "walks": 3,
     "lost": 1,
+    "crashed": 0,
     "peak_memory_bytes": 5.0e8,
     "ate_m": 0.0123,
     "worst_ate_m": None,
@@ -37,3 +38,8 @@ def test_a_row_has_median_and_worst_in_its_units_and_dashes_where_nothing_is_kno
     assert cells[7:10] == ["500", cells[8], "84.7 % (79.1 %)"]
     assert cells[11] == "8.1 % (20.0 %)"
     assert cells[8] == cells[10]  # not measured
+
+
+def test_a_walk_that_a_programs_crash_lost_is_named():
+    page = recordings({"recording: every frame": {"runs": [RUN | {"crashed": 1}]}})
+    assert "| 1 of 3 (1 by a crash) |" in page
