@@ -24,7 +24,7 @@ from tests.browser.hands import (
     press,
 )
 
-ALL = re.compile(r"^\d cameras sent [\d.]+ MB in [\d,]+ packets; simulated in [\d.]+ s\.$")
+ALL = re.compile(r"^\d nodes sent [\d.]+ MB in [\d,]+ packets; simulated in [\d.]+ s\.$")
 
 
 @pytest.fixture(scope="module")

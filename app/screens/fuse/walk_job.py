@@ -10,12 +10,13 @@ import numpy as np
 from app.compute.records import SCREEN_POINTS
 from app.compute.state import Spec
 from app.compute.store import Store
-from app.screens.fuse.walk_view import LoopView, Pictures, WalkView
+from app.screens.fuse.walk_view import MOTIONS, LoopView, Pictures, WalkView
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress
 from pipeline.folders.walk import lost_spans, path_m
 from pipeline.kernels.geometry import inverse, rotation_angle_rad
 from pipeline.recording.recording import Recording
+from pipeline.registration.photometric import open_motions
 from pipeline.sources import Recorded
 from pipeline.spec import key
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray, IntArray, Link, Walk
@@ -109,8 +110,18 @@ def _loop(link: Link, poses: FloatArray, tracked: FloatArray, T_color_depth: Flo
     T = T_color_depth @ link.T_target_source @ inverse(T_color_depth)
     moved_m, turned_rad = _apart(T, inverse(tracked[link.target]) @ tracked[link.source])
     left_m, left_rad = _apart(T, inverse(poses[link.target]) @ poses[link.source])
-    shares = link.overlap_share, link.agreeing_share
-    return LoopView(link.source, link.target, moved_m, turned_rad, left_m, left_rad, *shares, used=link.used)
+    return LoopView(
+        source=link.source,
+        target=link.target,
+        moved_m=moved_m,
+        turned_rad=turned_rad,
+        left_m=left_m,
+        left_rad=left_rad,
+        overlap_share=link.overlap_share,
+        agreeing_share=link.agreeing_share,
+        held=MOTIONS - open_motions(link.information).shape[1],
+        used=link.used,
+    )
 
 
 def _apart(one: FloatArray, other: FloatArray) -> tuple[float, float]:

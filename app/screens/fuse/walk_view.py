@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from pipeline.types import ByteArray, FloatArray, IntArray
 
+MOTIONS = 6
+"""Number of a camera's turns and shifts."""
+
 
 @dataclass(frozen=True, slots=True)
 class LoopView:
@@ -27,6 +30,8 @@ class LoopView:
     overlap_share: float
     agreeing_share: float
     """Share of the points that both measured and at about the same depth."""
+    held: int
+    """Number of the six motions of the camera that the registration fixes."""
     used: bool
     """False if it contradicts the other registrations."""
 

@@ -146,7 +146,7 @@ def more_rows(view: DeliveryView, now: MomentView | None) -> Markup:
 def summary(view: DeliveryView) -> Markdown:
     """Return a sentence on the computed part of the delivery."""
     computed, planned = len(view.moments), len(view.times_ns)
-    sentence = Markdown("{} cameras sent {:.2f} MB in {:,} packets; simulated in {:.1f} s.").format(
+    sentence = Markdown("{} nodes sent {:.2f} MB in {:,} packets; simulated in {:.1f} s.").format(
         len([node for node in view.nodes if node.row >= 0]),
         view.total_bytes * BYTES_MB,
         view.run.packets,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from dataclasses import replace
 from types import SimpleNamespace
 
 import cv2
@@ -217,3 +218,11 @@ def test_a_loop_that_contradicts_says_why_it_does_not_count(view):
     assert "30.0 cm and 5.00° elsewhere" in html
     assert "elsewhere" not in loop_html(view, used, NO_PICTURES)
     assert "7.8 cm, 0.00°" in loop_html(view, used, NO_PICTURES)
+
+
+def test_a_loop_names_how_many_motions_it_fixes():
+    """A floor fixes its own normal's shift and two turns, and leaves two shifts and a turn open."""
+    floor = replace(link(39, 0, loop=True), information=np.diag([1e6, 1e6, 1.0, 1.0, 1.0, 1e6]))
+    (loop,) = view_of(walk(loops=(floor,)), CAMERA, T_COLOR_DEPTH).loops
+    assert loop.held == 3
+    assert "3 of 6" in loop_html(view_of(walk(), CAMERA, T_COLOR_DEPTH), loop, NO_PICTURES)
