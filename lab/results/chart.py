@@ -44,11 +44,27 @@ def chart(x_label: str, y_label: str, places: Sequence[str], series: Sequence[Se
         parts.append(f'<path d="M{x} {y}h22" stroke="{color}" stroke-width="2"/>')
         parts.append(f'<circle cx="{x + 11}" cy="{y}" r="3.5" fill="{color}"/>')
         parts.append(f'<text x="{x + 30}" y="{y + 4}">{escape(one.label)}</text>')
+    return document(parts)
+
+
+def document(parts: Sequence[str]) -> str:
+    """Return the whole picture of its parts."""
     body = "\n".join(parts)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" '
         f'font-family="sans-serif" font-size="13">\n{body}\n</svg>\n'
     )
+
+
+def titled(x_label: str, y_label: str) -> list[str]:
+    """Return the white background and the texts below and on the left."""
+    middle_x, middle_y = 0.5 * (LEFT + WIDTH - RIGHT), 0.5 * (TOP + HEIGHT - BOTTOM)
+    turned = f'transform="translate(14 {middle_y:.1f}) rotate(-90)" text-anchor="middle"'
+    return [
+        f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#ffffff"/>',
+        f'<text x="{middle_x:.1f}" y="{HEIGHT - 8}" text-anchor="middle">{escape(x_label)}</text>',
+        f"<text {turned}>{escape(y_label)}</text>",
+    ]
 
 
 def _x(place: int, count: int) -> float:
@@ -63,7 +79,7 @@ def _y(share: float) -> float:
 def _frame(x_label: str, y_label: str, places: Sequence[str]) -> str:
     """Return background, axes and their texts."""
     right, bottom = WIDTH - RIGHT, HEIGHT - BOTTOM
-    parts = [f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#ffffff"/>']
+    parts = titled(x_label, y_label)
     for percent in range(0, 101, 20):
         y = _y(percent / 100.0)
         parts.append(f'<path d="M{LEFT} {y:.1f}H{right}" stroke="#dddddd"/>')
@@ -71,10 +87,6 @@ def _frame(x_label: str, y_label: str, places: Sequence[str]) -> str:
     for k, name in enumerate(places):
         x = _x(k, len(places))
         parts.append(f'<text x="{x:.1f}" y="{bottom + 18}" text-anchor="middle">{escape(name)}</text>')
-    middle_x, middle_y = 0.5 * (LEFT + right), 0.5 * (TOP + bottom)
-    parts.append(f'<text x="{middle_x:.1f}" y="{HEIGHT - 8}" text-anchor="middle">{escape(x_label)}</text>')
-    turned = f'transform="translate(14 {middle_y:.1f}) rotate(-90)" text-anchor="middle"'
-    parts.append(f"<text {turned}>{escape(y_label)}</text>")
     return "\n".join(parts)
 
 

@@ -21,8 +21,12 @@ WORTH = ROOT / "assets" / "depth" / "worth.md"
 BEGIN, END = "<!-- results: written by `make results` -->", "<!-- end of results -->"
 """Marks around the results in a page."""
 
-PLACES = "bench_places"
-"""Record with pictures, which are written next to the page."""
+PLACES, RECORDINGS = "bench_places", "bench_recording"
+PICTURES: dict[str, Callable[[Row], dict[str, str]]] = {
+    PLACES: places.pictures,
+    RECORDINGS: recordings.pictures,
+}
+"""Pictures by record, which are written next to the page."""
 
 SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "reconstruct": ("What comes out", tables.reconstructions),
@@ -39,7 +43,7 @@ SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "bench_registration": ("Registration: speed", tables.registration_speed),
     "bench_problems": ("Registration: problems in the form of a public benchmark", tables.problems),
     PLACES: ("Registration: views placed without a start", places.places),
-    "bench_recording": ("Recordings: a camera that walks", recordings.recordings),
+    RECORDINGS: ("Recordings: a camera that walks", recordings.recordings),
     "surface_claims": ("Ball pivoting: the thesis's claims", tables.claims),
     "bench_surface": ("Ball pivoting: speed", tables.rolling_speed),
     "bench_measuring": ("Measuring on the surface", measuring.measuring),
@@ -68,10 +72,10 @@ def write_pages() -> None:
         DEPTH_README: marked(DEPTH_README.read_text("utf-8"), worth(records)),
         WORTH: f"{worth(records)}\n",
     }
-    if PLACES in records:
-        pages |= {
-            RESULTS.parent / name: text for name, text in places.pictures(records[PLACES].numbers).items()
-        }
+    for record, pictures in PICTURES.items():
+        if record in records:
+            found = pictures(records[record].numbers)
+            pages |= {RESULTS.parent / name: text for name, text in found.items()}
     for path, content in pages.items():
         with atomic_path(path) as temporary:
             temporary.write_text(content, "utf-8")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from lab.results.markdown import Cell, Row, percent, table
+from lab.results.scatter import Mark, scatter
 
 COLUMNS = (
     "program",
@@ -20,6 +21,26 @@ COLUMNS = (
 )
 
 
+PICTURE = "recordings.svg"
+"""File of the picture, next to the page."""
+
+
+def pictures(numbers: Row) -> dict[str, str]:
+    """Return the record's picture as SVG by file name."""
+    marks = [
+        Mark(run["program"], run["frames_s"], 100.0 * run["ate_m"], _worst_cm(run), hollow=run["every"] > 1)
+        for result in numbers.values()
+        for run in result["runs"]
+        if run["ate_m"] is not None and run["frames_s"] is not None
+    ]
+    y_label = "ATE, cm: median, bar to the worst walk"
+    return {PICTURE: scatter("frames a second on one core (hollow: every fifth frame)", y_label, marks)}
+
+
+def _worst_cm(run: Row) -> float | None:
+    return None if run["worst_ate_m"] is None else 100.0 * run["worst_ate_m"]
+
+
 def recordings(numbers: Row) -> str:
     """Return a table for each case of the record."""
     parts = [
@@ -30,6 +51,7 @@ def recordings(numbers: Row) -> str:
         "of its frames have no pose. F-scores compare the surface with the part of the room that the walk "
         "looks at within 4 m; rays without a surface are those from viewpoints 25 cm beside the camera's."
     ]
+    parts += [f"![Error of the trajectory over frames a second, by program]({PICTURE})"]
     for case, result in numbers.items():
         rows = [_row(run) for run in result["runs"]]
         parts += [f"{case.removeprefix('recording: ').capitalize()}:", table(COLUMNS, rows)]
