@@ -11,6 +11,8 @@ from lab.claims.registry import CLAIMS
 from lab.results import completion, measuring, places, recordings, tables, verdicts
 from lab.results.markdown import Row, listed, percent
 from lab.results.record import ROOT, Record, Records, read_records
+from lab.walks.ours import OURS as WALKER
+from lab.walks.path import RATE_HZ
 from packetmesh.files import atomic_path
 
 RESULTS = ROOT / "docs" / "results.md"
@@ -121,6 +123,8 @@ def readme_results(records: Records) -> Iterator[str]:
         yield _registration(records["registration_claims"].numbers)
     if PLACES in records:
         yield _places(records[PLACES].numbers)
+    if RECORDINGS in records:
+        yield _walks(records[RECORDINGS].numbers)
     if "depth_claims" in records:
         yield _depth(records["depth_claims"].numbers["C12"]["ours"])
     if "bench_depth" in records:
@@ -151,6 +155,15 @@ def _registration(numbers: Row) -> str:
     return (
         f"**CEICP does not always win.** Plain ICP ends nearer to the truth in {lost} of {conditions} "
         f"conditions ({_link('which', 'registration-the-thesiss-claims')})."
+    )
+
+
+def _walks(numbers: Row) -> str:
+    run = next(run for run in numbers[recordings.EVERY]["runs"] if run["program"] == WALKER)
+    return (
+        f"**A walk takes longer than it lasted.** One core follows and maps {run['frames_s']:.0f} frames of "
+        f"320 x 240 a second, and the camera takes {RATE_HZ:.0f} "
+        f"({_link('other programs', 'recordings-a-camera-that-walks')})."
     )
 
 
