@@ -25,6 +25,7 @@ from app.drawing.picking import picked_hole
 from app.measuring.kinds import Step, steps_of
 from app.measuring.survey import Survey, survey_of
 from packetmesh.errors import InputError
+from pipeline.measuring.lookup import lookup_of
 from pipeline.measuring.marks import Mark, mark_on_ray
 from pipeline.measuring.measures import (
     Measure,
@@ -39,7 +40,6 @@ from pipeline.measuring.measures import (
 )
 from pipeline.measuring.planes import Plane, rectangle
 from pipeline.measuring.surface import MeasuredSurface
-from pipeline.surface.holes import find_holes
 from pipeline.types import FloatArray
 
 NO_HOLE = "There is no hole at the click; click a red rim, or into a hole"
@@ -64,6 +64,9 @@ def answer(surfaces: Sequence[MeasuredSurface], request: MeasureRequest) -> Meas
         request: measures and clicks. What cannot be measured has its reason in the answer.
     """
     surveys = [survey_of(surface) for surface in surfaces]
+    if not request.clicks:
+        for surface in surfaces:
+            lookup_of(surface).prepare()
     pending, completed, missed = request.pending, list[Taken](), ""
     for click in request.clicks:
         try:
@@ -129,8 +132,7 @@ def _point_on_ray(surface: MeasuredSurface, origin_m: FloatArray, direction: Flo
 
 def _rim_on_ray(surface: MeasuredSurface, origin_m: FloatArray, direction: FloatArray) -> FloatArray:
     """Return the vertex of the rim that a ray means, the one that it passes at the smallest angle."""
-    holes = find_holes(surface.vertices_m, surface.triangles)
-    loops = [_Loop(surface.vertices_m[hole.loop]) for hole in holes if hole.open]
+    loops = [_Loop(surface.vertices_m[hole.loop]) for hole in lookup_of(surface).open_holes]
     picked = picked_hole(loops, origin_m, direction)
     if picked is None:
         raise InputError(NO_HOLE)

@@ -1,11 +1,11 @@
-"""Lengths, heights and angles measured in rendered rooms: how often their intervals hold, and how fast."""
+"""Measures in rendered rooms: how often their intervals hold, and how fast."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from lab.benchmarks.benchmark import Benchmark
-from lab.measuring.judging import RoomTask, Row, judged_room, summaries
+from lab.measuring.judging import UNITS, RoomTask, Row, judged_room, summaries
 from lab.measuring.rooms import HELD_OUT
 from lab.trials import iterate_trials
 from packetmesh.memory import peak_memory_bytes
@@ -45,7 +45,7 @@ def benchmark(rooms: int = ROOMS) -> Benchmark:
 def _line(group: Row) -> str:
     """Return one kind of measure as a sentence."""
     low, high = group["coverage_ci95"]
-    unit, times = ("°", 1.0) if group["kind"] == "angle" else (" mm", 1000.0)
+    unit, times = UNITS.get(group["kind"], (" mm", 1000.0))
     ratio = group["error_over_raw"]
     beside = "" if ratio is None else f", {ratio:.2f} x that of single measurements"
     return (

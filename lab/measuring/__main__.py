@@ -1,40 +1,23 @@
-"""Fit the table of ``pipeline.measuring.guesses``: ``python -m lab.measuring [ROOMS]``."""
+"""Print what set a constant of measuring: ``python -m lab.measuring guesses|misfit|poses [ROOMS]``."""
 
 from __future__ import annotations
 
-import sys
-from itertools import islice
+import argparse
 
-import numpy as np
+from lab.measuring.constants import guesses, misfit, poses
 
-from lab.measuring.clicks import clicks
-from lab.measuring.rooms import TUNING, measured_room
-from pipeline.measuring.guesses import CHANCES, CONFIDENCES, class_of
-
+COMMANDS = {"guesses": guesses, "misfit": misfit, "poses": poses}
 ROOMS = 40
-CLICKS = 3000
-MOST_OF_A_ROOM = 60
-"""Guessed clicks of a room that count in a class, so that no room decides alone."""
 
 
-def main(rooms: int = ROOMS) -> None:
-    """Print the quantiles of the guesses' errors by class of confidence, from the tuning rooms."""
-    errors: list[list[float]] = [[] for _ in CONFIDENCES[1:]]
-    for seed in range(TUNING, TUNING + rooms):
-        room = measured_room(seed)
-        if room is None:
-            continue
-        own: list[list[float]] = [[] for _ in errors]
-        for click in islice(clicks(room, np.random.default_rng([seed, 31])), CLICKS):
-            if click.mark.guessed:
-                own[class_of(click.mark.confidence)].append(click.log_error)
-        for all_rooms, some in zip(errors, own, strict=True):
-            all_rooms += some[:MOST_OF_A_ROOM]
-        sys.stderr.write(f"{seed}: {[len(some) for some in errors]}\n")
-    for some in errors:
-        values = ", ".join(f"{value:.3f}" for value in np.quantile(some, CHANCES))
-        sys.stdout.write(f"    ({values}),\n")
+def main() -> None:
+    """Print the numbers from the tuning rooms, in which nothing is judged."""
+    parser = argparse.ArgumentParser(prog="python -m lab.measuring", description=__doc__)
+    parser.add_argument("constant", choices=COMMANDS)
+    parser.add_argument("rooms", nargs="?", type=int, default=ROOMS)
+    options = parser.parse_args()
+    COMMANDS[options.constant](options.rooms)
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    main()

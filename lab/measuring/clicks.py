@@ -18,8 +18,9 @@ EDGE_PX = 4
 """A click is at least this far from a depth edge: a hand does not aim better."""
 EDGE_STEP = 0.05
 """Least step of an edge, as a share of the depth, besides what a slanted surface has."""
-FLAT_PX, FLAT_M = 12, 0.001
-"""A place is flat if the true surface within this distance is within this of one plane."""
+FLAT_PX, FLAT_M = 36, 0.0005
+"""A place is flat if the true surface within this distance is within this of one plane: a smaller patch of a
+cushion is as flat, and its normal is not that of the plane that is fitted to the cushion's top."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +32,8 @@ class Click:
     """(3,) true point of the same pixel."""
     raw_m: FloatArray | None
     """(3,) the sensor's own measurement of it, by the true camera; None in a hole."""
-    true_normal: FloatArray
-    """(3,) true normal there."""
-    flat: bool
-    """Whether the true surface is flat around it."""
+    true_normal: FloatArray | None
+    """(3,) normal of the true surface around it; None if that is not flat."""
     log_error: float
     """Logarithm of the true distance from the camera over that of the mark."""
 
@@ -47,6 +46,7 @@ def clicks(room: Room, rng: np.random.Generator) -> Iterator[Click]:
     """
     away = [away_from_edges(view) for view in room.true]
     rays = [geometry.pixel_rays(frame.intrinsics) for frame in room.frames]
+    points_m = [view.points_m() for view in room.true]
     while True:
         k = int(rng.integers(len(room.frames)))
         frame, view, T = room.frames[k], room.true[k], room.T_world_camera[k]
@@ -57,15 +57,15 @@ def clicks(room: Room, rng: np.random.Generator) -> Iterator[Click]:
             marked = mark_on_ray(room.surface, T[:3, 3], T[:3, :3] @ rays[k][v, u])
         except InputError:
             continue
-        own = geometry.pixel_rays(view.camera)[v, u]
-        true_m, raw_z = _world_m(view, own * view.z_m[v, u]), float(frame.depth.z_m[v, u])
-        raw_m = _world_m(view, own * raw_z) if np.isfinite(raw_z) else None
+        true_m, camera_m = points_m[k][v, u], view.T_world_camera[:3, 3]
+        raw_z = float(frame.depth.z_m[v, u])
+        raw_m = camera_m + (true_m - camera_m) * raw_z / view.z_m[v, u] if np.isfinite(raw_z) else None
         ranges_m = (
-            np.linalg.norm(true_m - view.T_world_camera[:3, 3]),
+            np.linalg.norm(true_m - camera_m),
             np.linalg.norm(marked.point_m - T[:3, 3]),
         )
         error = float(np.log(ranges_m[0] / ranges_m[1]))
-        yield Click(marked, true_m, raw_m, view.normals[v, u].astype(float), is_flat(view, u, v), error)
+        yield Click(marked, true_m, raw_m, flat_normal(points_m[k], camera_m, u, v), error)
 
 
 def away_from_edges(view: TrueView) -> BoolArray:
@@ -76,17 +76,22 @@ def away_from_edges(view: TrueView) -> BoolArray:
     return cv2.dilate(bend.astype(np.uint8), np.ones((side, side), np.uint8)) == 0
 
 
-def is_flat(view: TrueView, u: int, v: int) -> bool:
-    """Return whether the true surface around a pixel is a plane."""
-    height, width = view.z_m.shape
+def flat_normal(points_m: FloatArray, camera_m: FloatArray, u: int, v: int) -> FloatArray | None:
+    """Return the (3,) normal, towards the camera, of the true surface around a pixel; None if it is not flat.
+
+    Args:
+        points_m: (H, W, 3) true points.
+        camera_m: (3,) centre of the camera.
+        u: column of the pixel.
+        v: row of the pixel.
+    """
+    height, width = points_m.shape[:2]
     if not (FLAT_PX <= v < height - FLAT_PX and FLAT_PX <= u < width - FLAT_PX):
-        return False
-    square = np.s_[v - FLAT_PX : v + FLAT_PX + 1 : 4, u - FLAT_PX : u + FLAT_PX + 1 : 4]
-    points_m = geometry.pixel_rays(view.camera)[square] * view.z_m[square][..., None]
-    own = view.T_world_camera[:3, :3].T @ view.normals[v, u]
-    off_m = (points_m - geometry.pixel_rays(view.camera)[v, u] * view.z_m[v, u]) @ own
-    return bool(np.abs(off_m).max() <= FLAT_M)
-
-
-def _world_m(view: TrueView, point_m: FloatArray) -> FloatArray:
-    return geometry.apply(view.T_world_camera, point_m[None])[0]
+        return None
+    square = np.s_[v - FLAT_PX : v + FLAT_PX + 1 : 8, u - FLAT_PX : u + FLAT_PX + 1 : 8]
+    away_m = points_m[square].reshape(-1, 3)
+    away_m = away_m - away_m.mean(axis=0)
+    normal = np.linalg.eigh(away_m.T @ away_m)[1][:, 0]
+    if np.abs(away_m @ normal).max() > FLAT_M:
+        return None
+    return normal * (1.0 if float((camera_m - points_m[v, u]) @ normal) > 0.0 else -1.0)

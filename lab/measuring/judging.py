@@ -12,16 +12,33 @@ import numpy as np
 
 from lab.measuring.clicks import Click, clicks
 from lab.measuring.rooms import measured_room
+from lab.measuring.things import true_boxes, true_holes
 from packetmesh.errors import InputError
 from pipeline.measuring.marks import mark_on_ray
-from pipeline.measuring.measures import Measure, angle_of_planes, distance, point_to_plane
+from pipeline.measuring.measures import (
+    Measure,
+    Value,
+    angle,
+    angle_of_planes,
+    are_parallel,
+    distance,
+    plane_to_plane,
+    point_to_plane,
+)
 from pipeline.measuring.planes import Plane, plane_at
 from pipeline.measuring.surface import MeasuredSurface
+from pipeline.types import FloatArray
 
 LENGTHS = 30
 """Lengths of each kind in a room: both ends measured, and at least one guessed."""
 PLANES = 12
-"""Heights over a plane, and angles of planes, in a room."""
+"""Heights over a plane, angles of planes, and gaps of planes, in a room."""
+CORNERS = 12
+"""Angles of three points in a room."""
+PARALLEL_DEG = 0.5
+"""Planes whose true angle is smaller have a true distance."""
+UNITS = {"angle": ("°", 1.0), "corner": ("°", 1.0), "hole": (" cm²", 1e4)}
+"""Unit of a kind of measure and how many are 1 of its SI unit; others are in mm."""
 SHORTEST_M = 0.1
 MOST_CLICKS = 3000
 Row = dict[str, Any]
@@ -48,9 +65,21 @@ def judged_room(task: RoomTask) -> list[Row] | None:
         for firsts in (measured, guessed)
         for row in _lengths(room.surface, firsts, found if firsts is guessed else measured)
     ]
-    flat = [click for click in measured if click.flat][: 6 * PLANES]
-    rows += [{"room": task.seed} | row for row in _with_planes(room.surface, measured, flat)]
-    return rows
+    flat = [click for click in measured if click.true_normal is not None][: 6 * PLANES]
+    others = [
+        *_with_planes(room.surface, measured, flat),
+        *_corners(room.surface, measured),
+        *(
+            _row(value, "box", true_m, elapsed_s)
+            for measure, sides_m, elapsed_s in true_boxes(room)
+            for value, true_m in zip(measure.values, sides_m, strict=True)
+        ),
+        *(
+            _row(measure.values[0], "hole", area_m2, elapsed_s)
+            for measure, (area_m2,), elapsed_s in true_holes(room)
+        ),
+    ]
+    return rows + [{"room": task.seed} | row for row in others]
 
 
 def _lengths(surface: MeasuredSurface, firsts: Sequence[Click], seconds: Sequence[Click]) -> list[Row]:
@@ -70,43 +99,75 @@ def _lengths(surface: MeasuredSurface, firsts: Sequence[Click], seconds: Sequenc
             mark_on_ray(surface, one.mark.point_m + 0.01 * one.mark.normal, -one.mark.normal)
         measure = distance(surface, a.mark, b.mark)
         elapsed_s = time.perf_counter() - started
-        rows.append(_row(measure, true_m, elapsed_s) | {"raw_error": raw})
+        rows.append(_row(measure.values[0], measure.kind, true_m, elapsed_s) | {"raw_error": raw})
     return rows
 
 
 def _with_planes(surface: MeasuredSurface, ends: Sequence[Click], flat: Sequence[Click]) -> list[Row]:
-    """Return the rows of heights of clicks over planes, and of angles of two planes."""
-    rows: list[Row] = []
-    previous: tuple[Click, Plane] | None = None
+    """Return the rows of heights of clicks over planes, and of angles and gaps of two planes."""
+    kinds: dict[str, list[Row]] = {"point-plane": [], "angle": [], "plane-plane": []}
+    before: list[tuple[Click, Plane]] = []
+
+    def add(measure: Measure, true: float, elapsed_s: float) -> None:
+        if len(kinds[measure.kind]) < PLANES:
+            kinds[measure.kind].append(_row(measure.values[0], measure.kind, true, elapsed_s))
+
     for click, end in zip(flat, reversed(ends), strict=False):
-        if len(rows) >= 2 * PLANES:
-            break
         started = time.perf_counter()
         try:
             plane = plane_at(surface, click.mark.point_m)
         except InputError:
             continue
         grown_s = time.perf_counter() - started
-        height_m = abs(float((end.true_m - click.true_m) @ click.true_normal))
+        height_m = abs(float((end.true_m - click.true_m) @ _normal(click)))
         if height_m >= SHORTEST_M:
-            rows.append(_row(point_to_plane(surface, end.mark, plane), height_m, grown_s))
-        if previous is not None:
-            before, other = previous
-            cosine = float(np.clip(click.true_normal @ before.true_normal, -1.0, 1.0))
-            angle_deg = 180.0 - float(np.degrees(np.arccos(cosine)))
+            add(point_to_plane(surface, end.mark, plane), height_m, grown_s)
+        if before:
+            angle_deg = 180.0 - _angle_deg(_normal(click), _normal(before[-1][0]))
             if 5.0 < angle_deg < 175.0:
-                rows.append(_row(angle_of_planes(surface, plane, other), angle_deg, grown_s))
-        previous = click, plane
+                add(angle_of_planes(surface, plane, before[-1][1]), angle_deg, grown_s)
+        for earlier, other in before:
+            gap_m = abs(float((earlier.true_m - click.true_m) @ _normal(click)))
+            apart_deg = _angle_deg(_normal(click), _normal(earlier))
+            parallel = min(apart_deg, 180.0 - apart_deg) < PARALLEL_DEG and are_parallel(plane, other)
+            if parallel and gap_m >= SHORTEST_M:
+                add(plane_to_plane(surface, plane, other), gap_m, grown_s)
+                break
+        before.append((click, plane))
+    return [row for rows in kinds.values() for row in rows]
+
+
+def _corners(surface: MeasuredSurface, found: Sequence[Click]) -> list[Row]:
+    """Return the rows of angles of three clicks, every click in one of them."""
+    rows: list[Row] = []
+    for a, corner, b in zip(found[::3], found[1::3], found[2::3], strict=False):
+        sides_m = [a.true_m - corner.true_m, b.true_m - corner.true_m]
+        if len(rows) == CORNERS:
+            break
+        if min(np.linalg.norm(side_m) for side_m in sides_m) < SHORTEST_M:
+            continue
+        started = time.perf_counter()
+        measure = angle(surface, a.mark, corner.mark, b.mark)
+        elapsed_s = time.perf_counter() - started
+        rows.append(_row(measure.values[0], "corner", _angle_deg(*sides_m), elapsed_s))
     return rows
 
 
-def _row(measure: Measure, true: float, elapsed_s: float) -> Row:
-    one = measure.values[0]
-    low, high = one.ci95
+def _normal(click: Click) -> FloatArray:
+    assert click.true_normal is not None
+    return click.true_normal
+
+
+def _angle_deg(one: FloatArray, other: FloatArray) -> float:
+    return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other)))
+
+
+def _row(value: Value, kind: str, true: float, elapsed_s: float) -> Row:
+    low, high = value.ci95
     return {
-        "kind": measure.kind,
-        "guessed": one.guessed,
-        "value": one.value,
+        "kind": kind,
+        "guessed": value.guessed,
+        "value": value.value,
         "true": true,
         "low": low,
         "high": high,

@@ -10,11 +10,13 @@ from lab.places.views import two_poses
 from lab.worlds.demos import disturbed
 from lab.worlds.render import Renderer
 from lab.worlds.rooms import random_room
+from lab.worlds.scene import Scene
 from lab.worlds.sensor import sense_depth
 from packetmesh.errors import InputError, ReconstructionError
 from packetmesh.progress import drain
 from packetmesh.settings import with_settings
 from pipeline.config import PRESETS
+from pipeline.kernels import geometry
 from pipeline.measuring.surface import MeasuredSurface, surface_of_rig
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
@@ -40,7 +42,11 @@ class TrueView:
     z_m: FloatArray
     """(H, W) true depth."""
     normals: FloatArray
-    """(H, W, 3) true normals, world frame, towards the camera."""
+    """(H, W, 3) true normals, world frame, towards the camera; shaded: bevelled faces have bent ones."""
+
+    def points_m(self) -> FloatArray:
+        """Return (H, W, 3) true points, world frame."""
+        return geometry.apply(self.T_world_camera, geometry.pixel_rays(self.camera) * self.z_m[..., None])
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +59,7 @@ class Room:
     """Poses that the chain found."""
     surface: MeasuredSurface
     true: tuple[TrueView, ...]
+    scene: Scene
 
 
 def measured_room(seed: int) -> Room | None:
@@ -90,4 +97,4 @@ def measured_room(seed: int) -> Room | None:
     if not all(verdict.placed for verdict in placement.verdicts):
         return None
     surface = surface_of_rig(rig, done["nodes"].value, placement, done["after"].value)
-    return Room(seed, rig.frames, placement.T_world_camera, surface, tuple(true))
+    return Room(seed, rig.frames, placement.T_world_camera, surface, tuple(true), scene)

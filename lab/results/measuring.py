@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from lab.measuring.clicks import EDGE_PX
+from lab.measuring.judging import UNITS
 from lab.measuring.rooms import FOCAL_SD, POINTS
 from lab.results.markdown import Cell, Row, percent, table
 
@@ -16,7 +17,15 @@ COLUMNS = (
     "median half width",
     "ms, 95th percentile",
 )
-NAMES = {"distance": "length", "point-plane": "height over a plane", "angle": "angle of two planes"}
+NAMES = {
+    "distance": "length",
+    "point-plane": "height over a plane",
+    "plane-plane": "gap of two planes",
+    "angle": "angle of two planes",
+    "corner": "angle of three points",
+    "box": "side of a box",
+    "hole": "area of a hole",
+}
 
 
 def measuring(numbers: Row) -> str:
@@ -29,14 +38,15 @@ def measuring(numbers: Row) -> str:
         f"Surfaces of {POINTS:,} points, focal lengths wrong by {100.0 * FOCAL_SD:g} % (standard deviation), "
         "the second pose registered from 3° and 6 cm off. Intervals of the shares resample rooms. Over "
         "single measurements: median error over that of the sensor's own depth at both pixels, with the true "
-        "cameras and poses."
+        "cameras and poses. Boxes are things with a level rectangular top that one camera sees whole; the "
+        "true area of a hole is that in the true points of its rim."
     )
     return f"{text}\n\n{table(COLUMNS, [_row(run) for run in runs])}"
 
 
 def _row(run: Row) -> tuple[Cell, ...]:
     low, high = run["coverage_ci95"]
-    unit, times = ("°", 1.0) if run["kind"] == "angle" else (" mm", 1000.0)
+    unit, times = UNITS.get(run["kind"], (" mm", 1000.0))
     return (
         NAMES[run["kind"]],
         "guessed" if run["guessed"] else "measured",

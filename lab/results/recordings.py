@@ -64,7 +64,7 @@ def recordings(numbers: Row) -> str:
 def _row(run: Row) -> tuple[Cell, ...]:
     return (
         run["program"],
-        f"{run['lost']} of {run['walks']}" + (f" ({run['crashed']} by a crash)" if run.get("crashed") else ""),
+        f"{run['lost']} of {run['walks']}{_crashes(run)}",
         _both(run, "ate_m", 100.0, 2),
         _shares(run, "ate_share", 2),
         _both(run, "rpe_m", 100.0, 2),
@@ -76,6 +76,10 @@ def _row(run: Row) -> tuple[Cell, ...]:
         _shares(run, "f_5cm", 1),
         _shares(run, "without_surface", 1),
     )
+
+
+def _crashes(run: Row) -> str:
+    return f" ({run['crashed']} by a crash)" if run.get("crashed") else ""
 
 
 def _both(run: Row, name: str, factor: float, digits: int) -> str | None:

@@ -8,12 +8,11 @@ from packetmesh.errors import InputError
 from pipeline.measuring.guesses import relative_half
 from pipeline.measuring.lookup import lookup_of
 from pipeline.measuring.near import NEAR_M, NEAR_SPACINGS
-from pipeline.measuring.planes import guess_of
+from pipeline.measuring.planes import BORDER, guess_of
 from pipeline.measuring.propagation import Z95
 from pipeline.measuring.surface import MeasuredSurface
 from pipeline.measuring.values import Measure, Value
 from pipeline.surface.boundary import loop_areas_m2
-from pipeline.surface.holes import find_holes
 from pipeline.types import FloatArray
 
 
@@ -21,14 +20,15 @@ def hole_area(surface: MeasuredSurface, point_m: FloatArray) -> Measure:
     """Return the area of the hole whose rim is nearest to a point, or around it.
 
     A rim vertex stands up to half a spacing inside the surface, so that is the standard deviation of its
-    place in the surface, besides its noise along the ray. The covariance of the nodes' poses is left out. The
+    place in the surface, besides its noise along the ray, in which it and the next vertices that smoothing
+    averaged with it err together (taken at its largest). The covariance of the nodes' poses is left out. The
     area in a guessed rim is wrong by twice its range's error, as if the hole faced its camera.
 
     Raises:
         InputError: there is no hole near the point.
     """
     point_m = np.asarray(point_m, float)
-    holes = [hole for hole in find_holes(surface.vertices_m, surface.triangles) if hole.open]
+    holes = lookup_of(surface).open_holes
     spacing_m = lookup_of(surface).spacing_m
     away_m = [_away_m(surface.vertices_m[hole.loop], hole.center_m, point_m) for hole in holes]
     nearest = int(np.argmin(away_m)) if holes else -1
@@ -43,9 +43,11 @@ def hole_area(surface: MeasuredSurface, point_m: FloatArray) -> Measure:
     vector_m2 = loop_areas_m2(rim_m, np.roll(rim_m, -1, axis=0), np.array([0]))[0]
     area_m2 = float(np.linalg.norm(vector_m2))
     slopes_m = 0.5 * np.cross(chord_m, vector_m2 / max(area_m2, 1e-12))
-    along_m2 = np.einsum("vi,vi->v", slopes_m, surface.rays[loop]) ** 2 * surface.sigma_m[loop] ** 2
-    ragged_m2 = np.sum(slopes_m**2, axis=1) * (0.5 * spacing_m) ** 2
-    variance = float(np.sum(along_m2 + ragged_m2)) + (2.0 * area_m2 * surface.scale_sd) ** 2
+    along_m2 = np.einsum("vi,vi->v", slopes_m, surface.rays[loop]) * surface.sigma_m[loop]
+    beside = range(-min(BORDER, (len(loop) - 1) // 2), min(BORDER, (len(loop) - 1) // 2) + 1)
+    together_m4 = float(sum(np.abs(along_m2) @ np.abs(np.roll(along_m2, shift)) for shift in beside))
+    ragged_m4 = float(np.sum(slopes_m**2)) * (0.5 * spacing_m) ** 2
+    variance = together_m4 + ragged_m4 + (2.0 * area_m2 * surface.scale_sd) ** 2
     guessed = bool(np.mean(surface.guessed[loop]) > 0.5)
     guess_m2 = 2.0 * area_m2 * relative_half(guess_of(surface, loop)[1]) if guessed else 0.0
     half_m2 = float(np.hypot(Z95 * np.sqrt(variance), guess_m2))

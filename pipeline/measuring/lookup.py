@@ -11,8 +11,10 @@ import numpy as np
 from pipeline.kernels.kdtree import KdTree
 from pipeline.kernels.open3d_runtime import o3d
 from pipeline.kernels.rays import tensor, triangle_scene
+from pipeline.measuring.flood import flooded
 from pipeline.measuring.surface import MeasuredSurface
 from pipeline.surface.boundary import edges_and_faces
+from pipeline.surface.holes import Hole, find_holes
 from pipeline.surface.radii import spacing
 from pipeline.types import BoolArray, FloatArray, IntArray
 
@@ -49,6 +51,26 @@ class Lookup:
     def edges(self) -> IntArray:
         """(E, 2) pairs of neighbouring vertices."""
         return self._edges_and_faces[0]
+
+    @cached_property
+    def neighbours(self) -> tuple[IntArray, IntArray]:
+        """(V + 1,) first place of each vertex's neighbours in the (2 E,) list of all neighbours."""
+        ends = np.concatenate([self.edges, self.edges[:, ::-1]])
+        counts = np.bincount(ends[:, 0], minlength=len(self._vertices_m))
+        first = np.concatenate([[0], np.cumsum(counts)])
+        return first, ends[np.argsort(ends[:, 0], kind="stable"), 1]
+
+    @cached_property
+    def open_holes(self) -> tuple[Hole, ...]:
+        """Holes of the surface, the largest first."""
+        return tuple(hole for hole in find_holes(self._vertices_m, self._triangles) if hole.open)
+
+    def prepare(self) -> None:
+        """Make at once what clicks on the surface need, so that the first click does not wait for it."""
+        self.nearest(self._vertices_m[0])
+        flooded(*self.neighbours, self.rim, 0)
+        self.tree.nearest(self._vertices_m[:1], 1)
+        _ = self.spacing_m
 
     @cached_property
     def rim(self) -> BoolArray:

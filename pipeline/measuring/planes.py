@@ -9,10 +9,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from packetmesh.errors import InputError
+from pipeline.measuring.flood import flooded
 from pipeline.measuring.lookup import Lookup, lookup_of
 from pipeline.measuring.near import spot_near
 from pipeline.measuring.surface import MeasuredSurface
-from pipeline.surface.boundary import connected_parts
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 SEED_POINTS = 12
@@ -25,6 +25,9 @@ WITHIN_SD = 3.0
 """Standard deviations of the part's median vertex up to which a vertex belongs to the plane."""
 LEAST_WITHIN = 0.1
 """The same limit is at least this share of the spacing."""
+BORDER = 2
+"""Edges from a part's border within which its vertices are not fitted: smoothing (over 20 neighbours) and the
+rolling ball round what meets it there."""
 FLAT = 0.35
 """Largest ratio of the seed's thickness to its width; a corner or an edge is thicker."""
 MOST_PASSES = 15
@@ -81,7 +84,20 @@ def plane_at(surface: MeasuredSurface, point_m: FloatArray) -> Plane:
             f"The surface has no plane at {where} m; try a point in the middle of a flat part, or a "
             "surface of more points"
         )
-    return fitted(surface, rows)
+    return fitted(surface, rows, _inner(lookup, rows))
+
+
+def _inner(lookup: Lookup, rows: IntArray) -> IntArray:
+    """Return the vertices of a part that are not next to its border; all if too few are left."""
+    inside = np.zeros(len(lookup.rim), bool)
+    inside[rows] = True
+    for _ in range(BORDER):
+        ends = lookup.edges[inside[lookup.edges].sum(axis=1) == 1]
+        fewer = inside & ~lookup.rim
+        fewer[ends.ravel()] = False
+        inside = fewer
+    found = np.flatnonzero(inside)
+    return found if len(found) >= LEAST_POINTS else rows
 
 
 def _grown(surface: MeasuredSurface, lookup: Lookup, seed: int) -> IntArray | None:
@@ -100,7 +116,7 @@ def _grown(surface: MeasuredSurface, lookup: Lookup, seed: int) -> IntArray | No
         limit_m = max(WITHIN_SD * _median_sd_m(surface, rows), LEAST_WITHIN * lookup.spacing_m)
         within = np.abs((points_m - center_m) @ normal) <= limit_m
         within &= normals @ normal > np.cos(np.radians(FACING_DEG))
-        grown = _around(lookup.edges, within, seed)
+        grown = _around(lookup, within, seed)
         if len(grown) < 4:
             return None
         same = len(grown) == len(rows) and np.array_equal(grown, rows)
@@ -118,12 +134,11 @@ def _median_sd_m(surface: MeasuredSurface, rows: IntArray) -> float:
     return float(np.median(surface.sigma_m[rows] * facing))
 
 
-def _around(edges: IntArray, within: BoolArray, seed: int) -> IntArray:
+def _around(lookup: Lookup, within: BoolArray, seed: int) -> IntArray:
     """Return the rows of ``within`` that edges connect with the seed; none if the seed is not within."""
     if not within[seed]:
         return np.empty(0, int)
-    labels = connected_parts(edges[within[edges].all(axis=1)], len(within))
-    return np.flatnonzero(within & (labels == labels[seed]))
+    return np.flatnonzero(flooded(*lookup.neighbours, within, seed))
 
 
 def _weights(surface: MeasuredSurface, rows: IntArray) -> FloatArray:
@@ -141,8 +156,8 @@ def _principal(points_m: FloatArray, weights: FloatArray) -> tuple[FloatArray, F
     return center_m, vectors.T, np.sqrt(np.maximum(values, 0.0))
 
 
-def fitted(surface: MeasuredSurface, rows: IntArray) -> Plane:
-    """Return the plane of some vertices by weighted least squares.
+def fitted(surface: MeasuredSurface, part: IntArray, inner: IntArray | None = None) -> Plane:
+    """Return the plane of a part of a surface by weighted least squares.
 
     Its covariance is the residuals' variance, or the vertices' own if that is larger, over the effective
     number of independent vertices: smoothing and the sensor's steps correlate neighbours, and the residuals
@@ -150,8 +165,10 @@ def fitted(surface: MeasuredSurface, rows: IntArray) -> Plane:
 
     Args:
         surface: the surface.
-        rows: (M,) at least four vertices that are not on a line.
+        part: (P,) vertices of the part.
+        inner: (M,) those that are fitted, at least four that are not on a line; all if None.
     """
+    rows = part if inner is None else inner
     points_m, weights = surface.vertices_m[rows], _weights(surface, rows)
     center_m, axes, _ = _principal(points_m, weights)
     toward = surface.normals[rows].mean(axis=0)
@@ -181,7 +198,7 @@ def fitted(surface: MeasuredSurface, rows: IntArray) -> Plane:
         normal,
         covariance,
         tilts,
-        rows,
+        part,
         float(np.sqrt(np.mean(residuals_m**2))),
         guessed,
         int(nodes[most]) if counts[most] > 0.5 * len(rows) else -1,
@@ -227,12 +244,11 @@ def together(points_m: FloatArray, residuals_m: FloatArray, spacing_m: float) ->
     if variance_m2 <= 0.0 or len(points_m) < LEAST_POINTS:
         return 1.0
     every = max(1, len(points_m) // COMPARED)
-    asked, tree = np.arange(0, len(points_m), every), cKDTree(points_m)
-    reach_m = LAGS * spacing_m
-    pairs = tree.query_ball_point(points_m[asked], reach_m)
-    here = np.repeat(asked, [len(found) for found in pairs])
-    there = np.concatenate([np.asarray(found, int) for found in pairs])
-    lag = np.linalg.norm(points_m[here] - points_m[there], axis=1) / spacing_m
+    asked = np.arange(0, len(points_m), every)
+    pairs = cKDTree(points_m[asked]).sparse_distance_matrix(
+        cKDTree(points_m), LAGS * spacing_m, output_type="ndarray"
+    )
+    here, there, lag = asked[pairs["i"]], pairs["j"], pairs["v"] / spacing_m
     others = here != there
     bins = np.minimum(np.rint(lag[others]).astype(int), LAGS - 1)
     count = np.bincount(bins, minlength=LAGS)

@@ -19,7 +19,7 @@ SLACK_OF_SCALE = 0.35
 """Ratio of what cameras of wrong scale leave in a registration, as a turn in rad and as a shift over the
 distance of what they see, to the scale's own deviation: rendered rooms of ``lab.measuring.rooms.TUNING`` on,
 two nodes each, whose focal lengths were wrong by 0.3 % (standard deviation), ended 1.1 mrad and 1.05 mm per m
-off (SPEC 11)."""
+off (SPEC 11). ``python -m lab.measuring poses`` prints it."""
 UNHELD_RAD, UNHELD_M = 0.02, 0.03
 """Standard deviations of a placed node that no registration holds: it stands where its given pose says."""
 

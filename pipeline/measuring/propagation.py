@@ -89,6 +89,9 @@ def joint_covariance(surface: MeasuredSurface, things: Sequence[Thing]) -> Float
         if motion.any() and shares[:, node].any():
             moved = by_motion * np.repeat(shares[:, node], 3)[:, None]
             covariance += moved @ motion @ moved.T
+    for k, thing in enumerate(things):
+        if isinstance(thing, Mark) and not 0 <= thing.node < count:
+            covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] += _choice_of_node_m2(surface, thing)
     bent = (BENT_OF_SCALE * surface.scale_sd) ** 2
     for k, thing in enumerate(things):
         if isinstance(thing, Plane):
@@ -101,6 +104,19 @@ def joint_covariance(surface: MeasuredSurface, things: Sequence[Thing]) -> Float
 def _shares(node: int, count: int) -> FloatArray:
     """Return (N,) share of each node in a thing's motion."""
     return np.full(count, 1.0 / max(count, 1)) if not 0 <= node < count else np.eye(count)[node]
+
+
+def _choice_of_node_m2(surface: MeasuredSurface, thing: Mark) -> FloatArray:
+    """Return the (3, 3) covariance of which node's image shows the place of a mark of several nodes.
+
+    The surface is the nodes' mean, but what is seen at a place on it is where one of them saw it: the
+    nodes' motions differ from their mean in the surface's plane. Along the normal, their disagreement is in
+    the noise of the vertices.
+    """
+    count = len(surface.pose_covariances)
+    in_plane = (np.eye(3) - np.outer(thing.normal, thing.normal)) @ _by_motion(thing)
+    spread = (1.0 - 1.0 / count) * surface.pose_covariances.mean(axis=0)
+    return in_plane @ spread @ in_plane.T
 
 
 def _by_motion(thing: Thing) -> FloatArray:

@@ -17,7 +17,8 @@ SLACK_RAD, SLACK_M = 0.003, 0.006
 three edges close within 5 cm (a right registration has up to 2 cm, SPEC 4.7)."""
 WEAK_SHARE = 1e-4
 """As ``OPEN_SHARE``, for the standard errors of measures: in rendered rooms, motions that the pairs hold by a
-share of 2e-4 to 2e-3 are right to millimetres, and noise alone holds 2e-5."""
+share of 2e-4 to 2e-3 are right to millimetres, and noise alone holds 2e-5; ``python -m lab.measuring poses``
+prints how often poses are inside their ellipsoids by several shares."""
 OPEN_M = 1.0
 """Standard error given to a motion that the pairs do not determine at all."""
 

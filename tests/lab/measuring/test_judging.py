@@ -1,18 +1,28 @@
 """Measures of a rendered room beside the truth, and their summary."""
 
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 import pytest
 
 from lab.benchmarks import measuring
-from lab.measuring.clicks import away_from_edges, clicks, is_flat
+from lab.measuring.clicks import away_from_edges, clicks, flat_normal
 from lab.measuring.judging import RoomTask, judged_room, summaries
-from lab.measuring.rooms import FOCAL_SD, TUNING, TrueView, measured_room
+from lab.measuring.rooms import FOCAL_SD, TUNING, Room, TrueView, measured_room
+from lab.measuring.things import true_boxes, true_holes
 from lab.results.measuring import measuring as measuring_table
-from pipeline.types import CameraIntrinsics
+from lab.worlds.furniture.placing import board
+from lab.worlds.raycast import world_mesh
+from lab.worlds.scene import Material, Scene
+from pipeline.kernels import geometry
+from pipeline.kernels.geometry import look_at
+from pipeline.kernels.rays import hit_depth
+from pipeline.types import CameraIntrinsics, RgbdFrame
+from tests.pipeline.measuring.scenes import BOX_M, box_on_table, measured, sheet
 
 CAMERA = CameraIntrinsics.pinhole(130.0, 130.0, 79.5, 59.5, 160, 120)
+FINE = CameraIntrinsics.pinhole(520.0, 520.0, 319.5, 239.5, 640, 480)
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +59,65 @@ def test_no_click_is_at_a_depth_edge_and_flat_is_flat():
     assert away[60, 20]
     assert away[60, 140]
     assert not away[60, 76:84].any()
-    assert is_flat(view, 40, 60)
-    assert not is_flat(view, 75, 60)
-    assert not is_flat(view, 5, 60)
+    points_m = view.points_m()
+    assert flat_normal(points_m, np.zeros(3), 42, 60) == pytest.approx([0.0, 0.0, -1.0])
+    assert flat_normal(points_m, np.zeros(3), 75, 60) is None
+    assert flat_normal(points_m, np.zeros(3), 5, 60) is None
+
+
+def test_all_kinds_are_judged_by_the_truth(room, monkeypatch):
+    monkeypatch.setattr("lab.measuring.judging.measured_room", lambda seed: room)
+    rows = judged_room(RoomTask(room.seed))
+    assert {row["kind"] for row in rows} >= {"distance", "point-plane", "angle", "corner"}
+    for kind, off in (("distance", 0.01), ("angle", 0.5), ("corner", 0.5)):
+        some = [row for row in rows if row["kind"] == kind and not row["guessed"]]
+        assert np.median([abs(row["value"] - row["true"]) for row in some]) < off
+
+
+def box_room():
+    """A camera above a box on a table, both as parts of a scene after six of the shell."""
+    grey = Material(lambda points_m, normals: np.full(points_m.shape, 0.5))
+    table = board((3.0, 3.0, 0.1), grey, np.eye(4), (0.0, 0.0, -0.05))
+    box = board(BOX_M, grey, np.eye(4), [0.5 * side_m for side_m in BOX_M])
+    scene = Scene("box", (*[table] * 6, box), (), np.ones(3), (), FINE)
+    T = look_at((0.5, 0.8, 1.2), (0.15, 0.1, 0.1))
+    depth = hit_depth(*world_mesh(scene), FINE, T)
+    up = np.broadcast_to([0.0, 0.0, 1.0], (*depth.z_m.shape, 3))
+    frame = RgbdFrame("node", np.zeros((*depth.z_m.shape, 3), np.uint8), depth, FINE, T)
+    true = TrueView(FINE, T, depth.z_m.astype(float), up)
+    return Room(0, (frame,), (T,), measured(box_on_table()), (true,), scene)
+
+
+def test_the_true_sides_of_a_box_are_those_of_its_top_and_its_stand():
+    ((measure, sides_m, _),) = true_boxes(box_room())
+    assert sides_m == pytest.approx(BOX_M, abs=1e-6)
+    assert [value.name for value in measure.values] == ["width", "depth", "height"]
+    for value, true_m in zip(measure.values, sides_m, strict=True):
+        assert value.ci95[0] <= true_m <= value.ci95[1]
+
+
+def test_a_box_that_is_partly_hidden_is_not_judged():
+    room = box_room()
+    (view,) = room.true
+    z_m = view.z_m.copy()
+    z_m[:, : z_m.shape[1] // 2] = 0.4
+    assert not list(true_boxes(replace(room, true=(replace(view, z_m=z_m),))))
+
+
+def test_the_true_area_of_a_hole_is_that_between_the_true_points_of_its_rim():
+    vertices_m, triangles, normals = sheet(12, 12, 0.05)
+    middle = np.all(np.abs(vertices_m[triangles].mean(axis=1)[:, :2] - 0.3) < 0.1, axis=1)
+    room = box_room()
+    surface = measured((vertices_m, triangles[~middle], normals))
+    T = look_at((0.3, 0.31, 1.5), (0.3, 0.3, 0.0))
+    rays = geometry.pixel_rays(FINE) @ T[:3, :3].T
+    flat_m = -(T[2, 3] - 0.01) / rays[..., 2]
+    view = TrueView(FINE, T, flat_m, room.true[0].normals)
+    ((measure, (area_m2,), _),) = true_holes(
+        replace(room, surface=surface, true=(view,), T_world_camera=(T,))
+    )
+    assert measure.values[0].value == pytest.approx(0.04)
+    assert area_m2 == pytest.approx(0.04 * ((1.5 - 0.01) / 1.5) ** 2, rel=0.06)
 
 
 def row(room, covered, value=1.01, guessed=False, raw=0.02):

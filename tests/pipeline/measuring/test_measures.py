@@ -7,6 +7,7 @@ import pytest
 
 from packetmesh.errors import InputError
 from pipeline.measuring import measures
+from pipeline.measuring.lookup import lookup_of
 from pipeline.measuring.marks import mark, mark_on_ray
 from pipeline.measuring.planes import plane_at
 from pipeline.measuring.propagation import Z95
@@ -98,6 +99,57 @@ def test_marks_snap_to_vertices_edges_and_planes():
     assert mark(surface, np.array([0.1, 0.1, 0.16]), "plane").point_m == pytest.approx([0.1, 0.1, 0.15])
     with pytest.raises(InputError, match="No edge is near"):
         mark(surface, np.array([0.15, 0.1, 0.15]), "edge")
+
+
+def worn_box():
+    """The box whose vertices within 12 mm of two faces are rounded off by as much as 5 mm."""
+    vertices_m, triangles, normals = box_on_table()
+    center_m, half_m = 0.5 * np.array(BOX_M), 0.5 * np.array(BOX_M)
+    off_m = vertices_m - center_m
+    near = np.clip(1.0 - (half_m - np.abs(off_m)) / 0.012, 0.0, 1.0)
+    near[:, 2] *= off_m[:, 2] > 0.0
+    two = (np.sort(near, axis=1)[:, 1:2] > 0.0) & (vertices_m[:, 2:] > 0.0)
+    return vertices_m - 0.005 * near * np.sign(off_m) * two, triangles, normals
+
+
+def test_a_corner_is_where_three_planes_meet_however_worn_it_is():
+    surface = measured(worn_box(), SIGMA_M)
+    ends = [mark(surface, np.array([0.005, y_m, 0.148]), "vertex") for y_m in (0.006, BOX_M[1] - 0.006)]
+    for end, y_m in zip(ends, (0.0, BOX_M[1]), strict=True):
+        assert end.point_m == pytest.approx([0.0, y_m, BOX_M[2]], abs=1e-3)
+        assert end.snapped == "vertex"
+    (value,) = measures.distance(surface, *ends).values
+    assert value.ci95[0] < BOX_M[1] < value.ci95[1]
+    assert half(value) < 0.005
+
+
+def test_a_corner_whose_third_face_was_not_seen_ends_its_edge():
+    vertices_m, triangles, normals = box_on_table()
+    hidden = (normals[:, 1] < -0.5) | ((normals[:, 2] > 0.5) & (vertices_m[:, 2] == 0.0))
+    seen = ~hidden[triangles].any(axis=1)
+    surface = measured((vertices_m, triangles[seen], normals), SIGMA_M)
+    end = mark(surface, np.array([0.005, 0.006, 0.149]), "vertex")
+    assert end.point_m[[0, 2]] == pytest.approx([0.0, BOX_M[2]], abs=1e-3)
+    along_sd_m = np.sqrt(end.covariance_m2[1, 1])
+    assert along_sd_m == pytest.approx(2.0 * lookup_of(surface).spacing_m / np.sqrt(12.0), rel=0.02)
+    assert abs(end.point_m[1]) < 2.0 * along_sd_m
+    far = mark(surface, np.array([0.15, 0.1, 0.15]), "vertex")
+    assert far.point_m == pytest.approx([0.15, 0.1, 0.15])
+
+
+def test_what_several_nodes_saw_is_where_one_of_them_saw_it():
+    """The second node may be shifted; along the surface, a mark of both is where either shows it."""
+    shift_sd_m = 0.01
+    motion = np.zeros((2, 6, 6))
+    motion[1, 3:, 3:] = shift_sd_m**2 * np.eye(3)
+    flat = sheet(20, 20, 0.05)
+    surface = measured(flat, 0.0, nodes=np.full(len(flat[0]), -1), pose_covariances=motion)
+    along = length(surface, (0.2, 0.5, 0.0), (0.7, 0.5, 0.0))
+    assert half(along) == pytest.approx(Z95 * np.sqrt(2.0 * 0.25) * shift_sd_m, rel=1e-3)
+    rng = np.random.default_rng(0)
+    of_second = rng.integers(0, 2, (2, 100_000))
+    moves_m = rng.normal(0.0, shift_sd_m, 100_000) * (of_second[0] - of_second[1])
+    assert half(along) / Z95 == pytest.approx(np.std(moves_m), rel=0.02)
 
 
 def test_heights_and_gaps_of_planes():

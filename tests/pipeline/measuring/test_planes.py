@@ -93,3 +93,15 @@ def test_a_place_far_from_everything_is_told_with_the_nearest_one():
         plane_at(surface, np.array([0.25, 0.25, 3.0]))
     with pytest.raises(InputError, match="three numbers"):
         plane_at(surface, np.array([0.25, np.nan, 3.0]))
+
+
+def test_a_rounded_border_does_not_tilt_the_plane():
+    """One side of the sheet bends by 4 mm at its last row of vertices, as smoothing bends it at a crease."""
+    vertices_m, triangles, normals = sheet(12, 12, 0.01)
+    bent_m = vertices_m.copy()
+    bent_m[:, 2] -= 0.004 * (vertices_m[:, 0] > vertices_m[:, 0].max() - 0.005)
+    surface = measured((bent_m, triangles, normals), 0.002)
+    plane = plane_at(surface, np.array([0.05, 0.05, 0.0]))
+    assert len(plane.rows) == len(vertices_m)
+    assert plane.normal == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
+    assert np.degrees(np.arccos(fitted(surface, plane.rows).normal[2])) > 0.5
