@@ -35,29 +35,48 @@
 
   const seen = element => element.offsetParent !== null;
 
-  // Open the folder of this label, and call `act` with it.
-  function openFolder(label, act) {
+  // Open the folder of one of these labels, and call `act` with it.
+  function openFolder(labels, act) {
     const head = () => [...document.querySelectorAll("svg.tabler-icon-chevron-down")]
-      .map(arrow => arrow.parentElement).find(one => one.textContent.trim() === label && seen(one));
+      .map(arrow => arrow.parentElement).find(one => labels.includes(one.textContent.trim()) && seen(one));
     once(head, found => {
       found.click();
       act(found.parentElement);
     });
   }
 
-  function openLesson(title) {
+  // Open the lesson with one of these titles: the title in the language of the session.
+  function openLesson(titles) {
     const next = folder => () => [...folder.querySelectorAll("button")].find(one => one.textContent === "Next" && seen(one));
-    openFolder(`Lesson: ${title}`, folder => once(next(folder), go => { go.click(); leave(); }));
+    openFolder(titles.map(title => `Lesson: ${title}`), folder => once(next(folder), go => { go.click(); leave(); }));
   }
+
+  // The cards of the lessons are in the chosen language, at first the one that the browser prefers.
+  const choice = landing.querySelector("[data-languages] select");
+  const offered = [...choice.options].map(one => one.value);
+  const preferred = navigator.languages.map(one => one.split("-")[0].toLowerCase()).find(one => offered.includes(one)) ?? "en";
+  choice.value = preferred;
+  choice.closest("label").hidden = shared || offered.length < 2; // a lecture's language is chosen in its lesson
+
+  function translate() {
+    for (const card of landing.querySelectorAll("[data-titles]")) {
+      const titles = JSON.parse(card.dataset.titles);
+      const language = !shared && choice.value in titles ? choice.value : Object.keys(titles)[0];
+      Object.assign(card.querySelector("span"), {textContent: titles[language], lang: language});
+    }
+  }
+  choice.addEventListener("change", translate);
+  translate();
 
   landing.addEventListener("click", event => {
     const card = event.target.closest("button");
     if (!card) return;
     if ("explore" in card.dataset) return leave();
     landing.style.cursor = "progress";
-    goTo(card.dataset.place);
-    if ("lesson" in card.dataset) openLesson(card.dataset.lesson);
-    else if ("folder" in card.dataset) openFolder(card.dataset.folder, leave);
+    const language = "titles" in card.dataset && choice.value !== preferred ? `&lang=${choice.value}` : "";
+    goTo(card.dataset.place + language);
+    if ("titles" in card.dataset) openLesson(Object.values(JSON.parse(card.dataset.titles)));
+    else if ("folder" in card.dataset) openFolder([card.dataset.folder], leave);
     else leave();
   });
   window.addEventListener("keydown", escape, true);

@@ -8,26 +8,34 @@ in a lecture only the teacher's link shows it, without the scenes.
 from __future__ import annotations
 
 import base64
+import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from app.lesson.files import LESSONS
+from app.lesson.files import LESSONS, Lesson, screen_of
+from app.lesson.languages import NAMES
+from app.lesson.reading import head_of, translations_of
 from app.web.entrance import WELCOME
 from app.web.markup import Markup
 from app.web.page import Page
+from app.window.teaching import ENGLISH
 from pipeline.io.demos import DEMOS
 
 PICTURES = Path(__file__).resolve().parents[1] / "assets" / "landing"
 """Folder of ``NAME.jpg`` of every lesson and scene."""
-LESSON_PLACES = {
-    "can-a-picture-measure": ("living-room", "depth"),
-    "icp-against-ceicp": ("living-room", "fuse"),
-    "which-ball-radius": ("living-room", "surface"),
-    "how-images-cross-a-network": ("living-room", "network"),
-    "what-one-lost-packet-costs": ("living-room", "network"),
-    "how-good-is-my-calibration": ("uncalibrated", "calibrate"),
-    "how-a-walk-becomes-a-room": ("living-room-walk", "fuse"),
-}
-"""Scene and screen of each lesson, in the order in which the lessons are offered."""
+SHIPPED = (
+    "can-a-picture-measure",
+    "icp-against-ceicp",
+    "which-ball-radius",
+    "how-images-cross-a-network",
+    "what-one-lost-packet-costs",
+    "how-good-is-my-calibration",
+    "how-a-walk-becomes-a-room",
+)
+"""The lessons that ship, in the order in which they are offered."""
+OwnCards = Sequence[tuple[Lesson[Any], str]]
+"""A teacher's own lessons, each with the query of its scene and screen."""
 OWN_FOLDER = "Use your own images"
 """Title of the Scene screen's folder for uploads."""
 
@@ -35,10 +43,10 @@ _HERE = Path(__file__).parent
 SCRIPTS = tuple(
     _HERE / f"{name}.js"
     for name in (
-        *("window/page", "window/plotly", "window/hint", "window/notice", "window/dock_row"),
+        *("window/page", "window/names", "window/plotly", "window/hint", "window/notice", "window/dock_row"),
         *("dock/dock_view", "dock/dock", "dock/dock_plots"),
-        *("session/address", "window/actions", "lesson/lesson", "session/lecture"),
-        *("screens/fuse/lanes", "screens/fuse/board"),
+        *("session/address", "window/actions", "window/palette", "lesson/lesson", "session/lecture"),
+        *("window/frames", "screens/fuse/lanes", "screens/fuse/board", "looking/look", "looking/scale"),
         *("landing", "web/refused"),
     )
 )
@@ -46,53 +54,84 @@ SCRIPTS = tuple(
 STYLES = tuple(
     _HERE / f"{name}.css"
     for name in (
-        *("window/page", "window/hint", "window/notice", "lesson/lesson", "dock/dock", "session/lecture"),
-        *("screens/fuse/board", "landing", "web/refused"),
+        *("window/page", "window/hint", "window/notice", "window/palette", "lesson/lesson", "dock/dock"),
+        *("session/lecture", "screens/fuse/board", "looking/scale", "landing", "web/refused"),
     )
 )
 
 
-def app_page(lecture: bool) -> Page:
+def app_page(lecture: bool, own: OwnCards = ()) -> Page:
     """Return the app's page; in a lecture only the teacher sees the landing.
 
     Raises:
         InputError: the installed viser has an unknown page.
     """
-    return Page(SCRIPTS, STYLES, {WELCOME if lecture else "/": landing_html(lecture)})
+    return Page(SCRIPTS, STYLES, {WELCOME if lecture else "/": landing_html(lecture, own)})
 
 
-def landing_html(lecture: bool = False) -> Markup:
+def landing_html(lecture: bool = False, own: OwnCards = ()) -> Markup:
     """Return the landing's HTML; its style and script are among the page's files."""
     lessons = Markup("").join(
-        _card(name, _title(name), f"scene={scene}&screen={screen}", lesson=True)
-        for name, (scene, screen) in LESSON_PLACES.items()
+        _card(name, _titles(name)[ENGLISH], _place(name), _titles(name)) for name in SHIPPED
     )
+    teachers = Markup("").join(_own_card(lesson, place) for lesson, place in own)
+    if teachers:
+        teachers = Markup("<h2>Your own lessons</h2><section data-own>{}</section>").format(teachers)
     scenes = Markup("").join(_card(name, scene.title, f"scene={name}") for name, scene in DEMOS.items())
     shared = Markup(" data-lecture") if lecture else ""
-    own = Markup('<button type="button" data-place="screen=scene" data-folder="{}">Open your own …</button>')
+    upload = Markup(
+        '<button type="button" data-place="screen=scene" data-folder="{}">Open your own …</button>'
+    )
     others = Markup("<div><h2>Or a scene to explore</h2><section>{}</section>{}</div>").format(
-        scenes, own.format(OWN_FOLDER)
+        scenes, upload.format(OWN_FOLDER)
     )
     return Markup(
         '<main id="packetmesh-landing"{} inert role="dialog" aria-label="Welcome">'
         "<header><div><h1>PacketMesh</h1><p>From a camera network's packets to a surface mesh.</p></div>"
+        "<label data-languages>Lessons in <select>{}</select></label>"
         '<button type="button" data-explore>Explore <kbd>Esc</kbd></button></header>'
-        "<article><div><h2>Seven lessons, each about one question</h2><section>{}</section></div>{}"
+        "<article><div>{}<h2>Seven lessons, each about one question</h2><section>{}</section></div>{}"
         "</article></main>"
-    ).format(shared, lessons, "" if lecture else others)
+    ).format(shared, _languages(own), teachers, lessons, "" if lecture else others)
 
 
-def _title(lesson: str) -> str:
-    """Return the title in the first line of a lesson's file."""
-    text = (LESSONS / f"{lesson}.md").read_text(encoding="utf-8")
-    return text.partition("\n")[0].removeprefix("# ").strip()
+def _titles(lesson: str) -> dict[str, str]:
+    """Return the titles of a lesson that ships, by language, English first."""
+    path = LESSONS / f"{lesson}.md"
+    paths = {ENGLISH: path, **translations_of(path)}
+    return {code: head_of(one.read_text(encoding="utf-8"))[0]["title"][1] for code, one in paths.items()}
 
 
-def _card(name: str, title: str, place: str, lesson: bool = False) -> Markup:
-    """Return a button that opens a place by its address and, for a lesson, the lesson of that title."""
+def _place(lesson: str) -> str:
+    """Return the query of an address that opens the scene and screen of a lesson that ships."""
+    head, _ = head_of((LESSONS / f"{lesson}.md").read_text(encoding="utf-8"))
+    return f"scene={head['scene'][1]}&screen={screen_of(head['screen'][1])}"
+
+
+def _languages(own: OwnCards) -> Markup:
+    """Return the options of the language in which the lessons are shown."""
+    codes = {code for name in SHIPPED for code in _titles(name)}
+    for lesson, _ in own:
+        codes |= {lesson.language, *lesson.translations}
+    options = ((code, code, name) for code, name in NAMES.items() if code in codes)
+    return Markup("").join(Markup('<option value="{}" lang="{}">{}</option>').format(*one) for one in options)
+
+
+def _own_card(lesson: Lesson[Any], place: str) -> Markup:
+    """Return a button that opens one of the teacher's own lessons."""
+    titles = {lesson.language: lesson.title}
+    titles |= {code: other.title for code, other in lesson.translations.items()}
+    data = Markup('data-place="{}" data-titles="{}"').format(place, json.dumps(titles))
+    return Markup('<button type="button" {}><span lang="{}">{}</span></button>').format(
+        data, lesson.language, lesson.title
+    )
+
+
+def _card(name: str, title: str, place: str, titles: Mapping[str, str] | None = None) -> Markup:
+    """Return a button that opens a place by its address and, for a lesson, the lesson of these titles."""
     picture = base64.b64encode((PICTURES / f"{name}.jpg").read_bytes()).decode()
     image = Markup('<img alt="" src="data:image/jpeg;base64,{}">').format(picture)
     data = Markup('data-place="{}"').format(place)
-    if lesson:
-        data += Markup(' data-lesson="{}"').format(title)
+    if titles is not None:
+        data += Markup(' data-titles="{}"').format(json.dumps(titles))
     return Markup('<button type="button" {}>{}<span>{}</span></button>').format(data, image, title)

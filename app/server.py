@@ -6,7 +6,7 @@ import contextlib
 import io
 import logging
 import socket
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,6 +23,8 @@ from app.compute.state import Spec
 from app.compute.store import Store
 from app.drawing.colors import BRAND
 from app.landing import app_page
+from app.lesson.languages import preferred
+from app.lessons import OwnLesson, by_kind, languages
 from app.screens.calibrate.panel import CalibratePanel
 from app.screens.depth.panel import DepthPanel
 from app.screens.export.panel import ExportPanel
@@ -44,6 +46,7 @@ from app.web.origin import only_own_page, well_formed
 from app.web.own_folder import OwnFolder, own_folder
 from app.web.page import Page
 from app.web.uploads import Uploads
+from app.window.teaching import Teaching
 from app.window.ui import Target
 from packetmesh.errors import InputError
 from packetmesh.files import file_trouble
@@ -128,6 +131,7 @@ def build_server(
     with_token: bool = True,
     pool: ComputePool | None = None,
     allow_hosts: Iterable[str] = (),
+    lessons: Sequence[OwnLesson] = (),
     ahead: bool = False,
 ) -> AppServer:
     """Start a server and return at once.
@@ -141,6 +145,7 @@ def build_server(
         with_token: admit only browsers that open ``class_link``, if other machines can reach the host.
         pool: a pool that is already started; None starts one. It stops with the server.
         allow_hosts: further names of this server, which a proxy in front of it has.
+        lessons: a teacher's own lessons.
         ahead: begin with the results of the set-up, and compute the surfaces of the shown scene at all radii
             while nobody asks for anything.
 
@@ -153,7 +158,7 @@ def build_server(
     _check_address(host, port)
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # a port scan needs no stack trace
     share_arenas()
-    page = app_page(lecture)
+    page = app_page(lecture, [(one.lesson, one.place) for one in lessons])
     spec = start_spec(scene, config or PipelineConfig())
     folder = own_folder()
     pool = start_pool() if pool is None else pool
@@ -177,14 +182,20 @@ def build_server(
         app.ahead = _working_ahead(pool, store, shared)
     compute_ahead(pool, store, shared, spec, app)
 
+    known = languages(lessons)
+
     def begin(target: Target, number: int, lecture: Lecture | None = None) -> Session:
-        app.sessions[number] = Session(target, pool, store, uploads, shared, spec, PANELS, lecture)
+        language = preferred(private.languages(server, number), known)
+        teaching = Teaching(by_kind(lessons), known, language)
+        app.sessions[number] = Session(target, pool, store, uploads, shared, spec, PANELS, lecture, teaching)
         return app.sessions[number]
 
     if teacher is not None:
         together = Lecture(server, gate, teacher, app.class_link)
         session = begin(server, -1, together)
-        together.begin(session.post, lambda: session.frame_view(anew=True), session.places.add)
+        together.begin(
+            session.post, lambda: session.frame_view(anew=True), session.places.add, session.palettes.add
+        )
     else:
         _let_in(app, gate, begin)
     door.is_open = True

@@ -243,6 +243,8 @@ class SurfaceConfig:
     be smaller than twice the sensors' noise."""
     smoothing_passes: int = 2
     """Times that every averaged point is moved onto the plane of its neighbours; 0 keeps the noise."""
+    even_rims: bool = True
+    """Close notches of the rims, drop spikes, and smooth the rims' curves within the sensors' noise."""
 
     def __post_init__(self) -> None:
         _at_least("surface.max_points", self.max_points, 3)
@@ -278,7 +280,7 @@ PRESETS: dict[str, PipelineConfig] = {
         inferred_registration=RegistrationConfig(method="ceicp-n", metric="point"),
         node_registration=RegistrationConfig(method="ceicp-n", metric="point"),
         fusion=FusionConfig(mode="union", align_nodes_with="fused", register_inferred=True),
-        surface=SurfaceConfig(radius_rule="thesis", max_points=30_000, smoothing_passes=0),
+        surface=SurfaceConfig(radius_rule="thesis", max_points=30_000, smoothing_passes=0, even_rims=False),
     ),
 }
 """Settings by name: ours (the default) and those of the thesis."""

@@ -46,6 +46,7 @@ class FusedCloud:
     """All nodes' fused clouds in the world frame, thinned, with normals."""
 
     fused: PointCloud
+    """Its ``sigma_m`` is NaN for inferred points; None if points of both kinds are averaged."""
     voxel_m: float
     """Edge of the voxels over which the points were averaged."""
     r_F_m: float
@@ -106,7 +107,7 @@ def merge_fused(
     guesses = smooth(whole, smoothing_passes, guessed_alone(sensors, whole, voxel_m))
     measured = smoothed.result()
     labelled = replace(measured, source=np.full(len(measured), PointSource.SENSOR, np.uint8))
-    fused = PointCloud.concatenate([labelled, guesses])
+    fused = PointCloud.concatenate([labelled, _without_noise(guesses)])
     return FusedCloud(fused, voxel_m, *spacing(fused.points_m), len(measured))
 
 
@@ -146,8 +147,14 @@ def merge_map(
     if some:
         whole = thinned((guessed[k] for k in some), [T_world_camera[k] for k in some], walk.voxel_m)
         alone = ~in_cubes_of(measured.points_m, whole.points_m, walk.voxel_m)
-        fused = PointCloud.concatenate([measured, smooth(whole, smoothing_passes).select(alone)])
+        guesses = _without_noise(smooth(whole, smoothing_passes).select(alone))
+        fused = PointCloud.concatenate([measured, guesses])
     return FusedCloud(fused, walk.voxel_m, *spacing(fused.points_m), len(measured))
+
+
+def _without_noise(guesses: PointCloud) -> PointCloud:
+    """Return inferred points with NaN as noise: the sensor's noise law does not hold for them."""
+    return replace(guesses, sigma_m=np.full(len(guesses), np.nan))
 
 
 def _joint(nodes: Sequence[NodeClouds], keep: Sequence[BoolArray | None]) -> Iterator[PointCloud]:

@@ -51,6 +51,7 @@ from pipeline.surface.ball_pivoting import roll_or_nothing
 from pipeline.surface.baselines import alpha_surface, poisson_surface
 from pipeline.surface.quality import measured
 from pipeline.surface.radii import radii
+from pipeline.surface.rims import even_rims
 from pipeline.surface.texture import photographed
 from pipeline.surface.truth import Yardstick, compare_with_truth, yardstick_of
 from pipeline.types import DepthMap, PointCloud, Rig, Surface, SurfaceResult
@@ -268,6 +269,8 @@ def roll_over(
     yield Progress(f"rolling the ball over the {name} cloud", fraction)
     cloud: PointCloud = getattr(clouds, name)
     surface = roll_or_nothing(cloud, radii(config, clouds.r_F_m, clouds.sigma_D_m))
+    if config.even_rims and surface.rows is not None:
+        surface = even_rims(surface, None if cloud.sigma_m is None else cloud.sigma_m[surface.rows]).surface
     return measured(surface, cameras_of(rig, placement), len(cloud), _sensed(rig, placement))
 
 

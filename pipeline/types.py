@@ -388,6 +388,8 @@ class Surface(ShownInNotebooks):
     """(V, 3) normals of the points from which the vertices come."""
     source: ByteArray | None = None
     """(V,) ``PointSource`` of those points."""
+    rows: IntArray | None = None
+    """(V,) int32 rows of those points in the cloud over which the ball rolled; None for other methods."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -60,17 +60,16 @@ def pytest_collection():
 
 @pytest.hookimpl(tryfirst=True)  # pytest-xdist looks at the groups afterwards
 def pytest_collection_modifyitems(items):
-    """Mark slow tests and begin with them, so that no worker is left with one in the end; those of a file
-    stay on one worker, which makes once what they share, as do those that use the store.
+    """Mark slow tests. Begin with the browser, beside which others compute, then with slow tests, so that no
+    worker is left with one in the end. The tests of a file stay on one worker, which makes once what they
+    share.
     """
     for item in items:
-        slow = _slow(item.path)
-        if slow:
+        if _slow(item.path):
             item.add_marker(pytest.mark.slow)
-        shares = (slow and item.path.name not in APART) or "store" in item.fixturenames
-        if shares and item.get_closest_marker("xdist_group") is None:
+        if item.path.name not in APART and item.get_closest_marker("xdist_group") is None:
             item.add_marker(pytest.mark.xdist_group(_below(item.path)))
-    items.sort(key=lambda item: not (_slow(item.path) or _below(item.path).startswith("browser/")))
+    items.sort(key=lambda item: (not _below(item.path).startswith("browser/"), not _slow(item.path)))
 
 
 @cache

@@ -15,6 +15,7 @@ from app.cli.deliver import deliver
 from app.cli.doctor import doctor
 from app.cli.import_rig import import_rig
 from app.cli.infer_depth import infer_depth
+from app.cli.lesson import lesson
 from app.cli.measure import measure
 from app.cli.mesh import mesh
 from app.cli.reconstruct import reconstruct
@@ -41,6 +42,7 @@ COMMANDS: dict[str, Any] = {
     "infer-depth": infer_depth,
     "simulate": simulate,
     "deliver": deliver,
+    "lesson": lesson,
     "reproduce": reproduce,
     "bench": bench,
     "scenes": scenes,

@@ -42,7 +42,8 @@ def measure(
             points on three faces of a box give its width, depth and height.
         box: A point on the top of a thing that stands on a plane, for its width, depth and height.
         hole: A point in a hole or on its rim, for its area.
-        snap: Move --points to the nearest vertex, to the edge where two planes meet, or onto their plane.
+        snap: Move --points to the corner of flat faces (else the nearest vertex), to the edge
+            where two planes meet, or onto their plane.
         scale_by: True length, in metres, of the first length that is measured: the surface is scaled by it,
             and everything is measured again.
         json: Print the values as JSON.

@@ -5,7 +5,8 @@ from __future__ import annotations
 import signal
 import time
 import webbrowser
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -14,9 +15,13 @@ from app.cli.text import say
 from packetmesh.settings import config_named
 from pipeline.config import PRESETS
 
+if TYPE_CHECKING:
+    from app.lessons import OwnLesson
+
 HostNames = Annotated[
     tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(name="allow-host", metavar="NAME")
 ]
+Lessons = Annotated[tuple[Path, ...], tyro.conf.UseAppendAction, tyro.conf.arg(name="lesson", metavar="FILE")]
 HEED_S = 0.2
 """Time between two checks for a signal to stop."""
 ALONE = ", from this machine only; --host 0.0.0.0 admits other machines"
@@ -31,6 +36,7 @@ def serve(
     lecture: bool = False,
     no_token: bool = False,
     allow_host: HostNames = (),
+    lessons: Lessons = (),
 ) -> None:
     """Open the app: step through a reconstruction in the browser.
 
@@ -46,10 +52,17 @@ def serve(
             printed link.
         allow_host: Further name of this server, with any port, for example lab.example.org of a proxy in
             front of it.
+        lessons: A lesson of your own (my-lesson.md), or a folder of them; `packetmesh lesson check` finds
+            their faults, docs/using.md describes the format.
     """
     from app.compute.jobs import start_pool
 
     config = config_named(preset, PRESETS)
+    own: tuple[OwnLesson, ...] = ()
+    if lessons:
+        from app.lessons import own_lessons
+
+        own = tuple(own_lessons(lessons))
     stops = list[int]()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: stops.append(number))
@@ -58,7 +71,9 @@ def serve(
         from app.server import build_server
         from app.web.entrance import is_loopback
 
-        app = build_server(scene, config, host, port, lecture, not no_token, pool, allow_host, ahead=True)
+        app = build_server(
+            scene, config, host, port, lecture, not no_token, pool, allow_host, own, ahead=True
+        )
     except BaseException:
         pool.close()
         raise

@@ -82,7 +82,8 @@ window.packetmeshDockView = (() => {
         lane.said = said;
         lane.names.replaceChildren(...(labels[index] ?? []).map(([y, text, color]) => {
           const word = make("div", "", null, {textContent: text});
-          Object.assign(word.style, {top: `${Math.max(y - 8, -2)}px`, color: css(color)});
+          const dark = `color-mix(in srgb, ${css(color)} 70%, black)`; // the curve's colour, readable as a text
+          Object.assign(word.style, {top: `${Math.max(y - 8, -2)}px`, color: dark});
           return word;
         }));
       });

@@ -78,6 +78,7 @@
     if (html !== written) {
       written = card.innerHTML = html;
       card.toggleAttribute("data-large", large);
+      card.lang = mark.lang;
     }
     if (!card.isConnected) home.append(card);
   }

@@ -6,31 +6,24 @@ import re
 from collections.abc import Callable, Collection
 from dataclasses import replace
 from functools import partial
-from typing import Generic
+from typing import Any, Generic, TypeVar
 
+from app.lesson.ballot import Ballot, votes_csv
 from app.lesson.files import CHOICES, CLAUSE, FIELD, SCENE, Lesson, Look, Numbers, Question, settled
-from app.web.markup import Markdown, Markup, shipped_markdown
+from app.lesson.languages import PHRASES, Phrases, phrases_of
+from app.web.markup import Markup, escape, shipped_markdown
 from app.window.page import page_call
+from app.window.teaching import ENGLISH
 from app.window.ui import Ui
 from packetmesh.errors import InputError
 
-OFF, BEGIN = "not now", Markdown("Choose a stop, or press **Next**.")
+Text = TypeVar("Text", bound=str)
+OFF = "not now"
 SKIP, SKIPPED = "Skip", -1
-GUESS = f"Take a guess: 1, 2 or 3. Or press **{SKIP}**."
-FIRST = "**Guess before you go on: 1, 2 or 3.** A wrong guess costs nothing. Or press **Skip**."
-VOTING = f"The class votes: 1, 2 or 3. The teacher's guess, or **{SKIP}**, shows the answer."
-COMPUTING = "The answer depends on the scene: it appears when the numbers of this stop are computed."
 FIRST_OF_ALL = -1.0
 """Order of the lesson's folder in its screen's panel: it comes first."""
 BAR = 12
 """Length of the bar for all votes, blocks."""
-KEYS = Markup(
-    "<span class='keys'><span><b>→</b> or <b>space</b> next, <b>←</b> back, <b>1 2 3</b> guess, <b>S</b> "
-    "skip.<span class='docked'> After a click on the dock, the keys control the "
-    "dock.</span></span><span>The keys control the dock now; <b>Esc</b> returns them to the "
-    "lesson.</span></span>"
-)
-"""The page's line about the keys, while they belong to the lesson and while they belong to the dock."""
 TO_COME = "…"
 REPLACED = re.compile(rf"{FIELD.pattern}|!\[|\](?!\(https?://)")
 """Parts of a file's markdown to replace: fields, and the start of an image or of a link outside the web."""
@@ -54,17 +47,20 @@ class LessonFolder(Generic[Look]):
             on_stop: called with the state that the stop shows.
             numbers: returns the texts for the fields, once the screen shows the stop.
         """
-        self._lesson, self._on_stop, self._numbers = lesson, on_stop, numbers
+        self._written, self._on_stop, self._numbers = lesson, on_stop, numbers
+        self._teaching, self._lecture = ui.teaching, ui.lecture
         self._known: dict[int, Numbers] = {}
         """Numbers by stop."""
-        self._names = [f"{i}. {stop.title}" for i, stop in enumerate(lesson.stops, 1)]
         self._guesses: dict[int, int] = {}
-        self._votes: dict[int, dict[int, int]] = {}
-        """Votes by stop and voter."""
-        self._lecture = ui.lecture
-        self._waiting = self._prompt()
-        self._title = f"Lesson: {lesson.title}"
-        with ui.gui.add_folder(self._title, expand_by_default=False, order=FIRST_OF_ALL):
+        self._ballots: list[Ballot] = []
+        """The votes on all questions that were asked, in their order."""
+        self._open: dict[int, Ballot] = {}
+        """The votes since the lesson began, by stop."""
+        self._refused = False
+        """Whether the last press of *Next* came before a guess."""
+        self._translate()
+        self._folder = ui.gui.add_folder(self._title, expand_by_default=False, order=FIRST_OF_ALL)
+        with self._folder:
             self._stop = ui.gui.add_dropdown(
                 "Stop",
                 [OFF, *self._names],
@@ -77,7 +73,8 @@ class LessonFolder(Generic[Look]):
                 hint="Shows less text in large type, readable across a room.",
             )
             ui.when_changed(self._large, self._point_out)
-            self._text = ui.gui.add_markdown(BEGIN)
+            self._add_languages(ui)
+            self._text = ui.gui.add_markdown(shipped_markdown(self._phrases.begin))
             guesses = {str(index + 1): partial(self._take, index) for index in range(CHOICES)}
             self._guess = ui.buttons(
                 "Your guess",
@@ -90,21 +87,71 @@ class LessonFolder(Generic[Look]):
                 {"Back": lambda: self._go(-1), "Next": lambda: self._go(1), "End": self._end},
                 "Back, Next: previous or next stop. End: leave the lesson.",
             )
+            if ui.lecture is not None:
+                votes = ui.gui.add_button(
+                    "Download the votes",
+                    hint="All votes of this lecture on this lesson, as a table (CSV), without names.",
+                )
+                votes.on_click(lambda event: ui.post(self._send_votes, event.client))
             self._mark = ui.gui.add_html(Markup(""))
         self._marked = 0
         ui.resets.append(self.reset)
+
+    @property
+    def lesson(self) -> Lesson[Look]:
+        """Return the lesson in the language in which it was written."""
+        return self._written
+
+    def _add_languages(self, ui: Ui) -> None:
+        """Add the choice of the language, if there is one."""
+        lesson = self._written
+        codes = [lesson.language, *lesson.translations]
+        known = ui.teaching.languages
+        self._languages = {known[code]: code for code in codes if code in known}
+        if not lesson.translations or len(self._languages) < len(codes):
+            return
+        self._language = ui.gui.add_dropdown(
+            "Language",
+            list(self._languages),
+            initial_value=known[self._lesson.language],
+            hint="Language of the lessons' texts. The app itself is in English.",
+        )
+        ui.when_changed(self._language, lambda: ui.teaching.take(self._languages[self._language.value]))
+        ui.teaching.on_change.append(self._change_language)
+
+    def _translate(self) -> None:
+        """Take the texts in the chosen language."""
+        self._lesson = self._written.in_language(self._teaching.language)
+        self._phrases = phrases_of(self._lesson.language)
+        self._names = [f"{i}. {stop.title}" for i, stop in enumerate(self._lesson.stops, 1)]
+        self._title = f"Lesson: {self._lesson.title}"
+
+    def _change_language(self) -> None:
+        """Show the lesson in the chosen language, at the same stop."""
+        index = self._index()
+        self._translate()
+        self._folder.label = self._title
+        self._stop.options = (OFF, *self._names)
+        self._stop.value = (OFF, *self._names)[index + 1]
+        self._language.value = self._teaching.languages[self._lesson.language]
+        if index < 0:
+            self._text.content = shipped_markdown(self._phrases.begin)
+        else:
+            self._write()
+            self._point_out()
 
     def reset(self) -> None:
         """Leave the lesson, restore the settings of its stop and forget the guesses."""
         if self._stop.value != OFF:
             self._stop.value = OFF
             self._picked()
-            self._on_stop(self._lesson.default)
+            self._on_stop(self._written.default)
 
     def _go(self, count: int) -> None:
         index = self._index() + count
         if count > 0 and self._waits():
-            self._write(FIRST)
+            self._refused = True
+            self._write()
         elif 0 <= index < len(self._names):
             self._stop.value = self._names[index]
             self._picked()
@@ -139,23 +186,24 @@ class LessonFolder(Generic[Look]):
 
     def _picked(self) -> None:
         index = self._index()
+        self._refused = False
         if index < 0:
             self._guesses.clear()
-            self._votes.clear()
-            self._text.content, self._guess.visible = BEGIN, False
+            self._open.clear()
+            self._text.content, self._guess.visible = shipped_markdown(self._phrases.begin), False
             self._poll()
             self._point_out()
             return
         self._known.pop(index, None)
         self._on_stop(self._lesson.stops[index].look)
-        self._write(self._prompt())
+        self._write()
         self._poll()
         self._point_out()
 
     def refresh(self) -> None:
         """Update the numbers of the stop, because the screen shows something else."""
         if self._index() >= 0:
-            self._write(self._waiting)
+            self._write()
 
     def _point_out(self) -> None:
         """Let the page show the stop in its size, give it the keys and open its folders."""
@@ -168,48 +216,76 @@ class LessonFolder(Generic[Look]):
         unfold = page_call("unfold", [self._title, *stop.opens], mark=self._marked)
         lesson = page_call("lesson", stop.opens, stop.sees, mark=self._marked)
         large = "data-large" if self._large.value else ""
-        self._mark.content = Markup("<div class='packetmesh-lesson' {}>{}{}</div>").format(
-            large, KEYS, unfold + lesson
+        self._mark.content = Markup("<div class='packetmesh-lesson' lang='{}' {}>{}{}</div>").format(
+            self._lesson.language, large, keys_html(self._phrases), unfold + lesson
         )
+
+    # The answers.
 
     def _take(self, guess: int) -> None:
         """Take a guess; only the first one counts."""
         if self._waits():
             self._guesses[self._index()] = guess
-            self._write(self._prompt())
+            ballot = self._open.get(self._index())
+            if ballot is not None and guess != SKIPPED:
+                ballot.teacher = guess
+            self._write()
             self._poll()
 
     def _voted(self, voter: int, vote: int) -> None:
         """Count a vote of the class; each voter's last vote counts until the answer is shown."""
-        if self._waits():
-            self._votes.setdefault(self._index(), {})[voter] = vote - 1
-            self._write(self._prompt())
+        ballot = self._open.get(self._index())
+        if self._waits() and ballot is not None:
+            ballot.votes[voter] = vote - 1
+            self._write()
 
     def _poll(self) -> None:
         """Open a vote while the stop waits for an answer, and close it otherwise."""
-        if self._lecture is not None:
-            self._lecture.poll(self._voted if self._waits() else None)
+        if self._lecture is None:
+            return
+        index, waits = self._index(), self._waits()
+        question = self._lesson.stops[index].question if waits else None
+        if question is not None and index not in self._open:
+            rounds = sum(one.stop == index + 1 for one in self._ballots)
+            self._open[index] = Ballot(rounds + 1, index + 1, self._lesson.stops[index].title, question)
+            self._ballots.append(self._open[index])
+        self._lecture.poll(self._voted if waits else None)
 
-    def _prompt(self) -> str:
-        return GUESS if self._lecture is None else VOTING
+    def _send_votes(self, client: Any) -> None:
+        """Send a browser the table of the votes."""
+        answered = [one for one in self._ballots if one.votes or one.teacher is not None]
+        content = votes_csv(self._written.title, answered)
+        client.send_file_download(f"votes-{self._written.name}.csv", content, save_immediately=True)
 
-    def _write(self, waiting: str) -> None:
-        """Show the stop; ``waiting`` is in the place of the answer until there is one."""
-        index, self._waiting = self._index(), waiting
-        stop = self._lesson.stops[index]
-        lines = [f"**{stop.title}** ({index + 1} of {len(self._names)})", stop.text]
+    # The text.
+
+    def _waiting(self) -> str:
+        """Return the text in the place of the answer until there is one."""
+        if self._refused:
+            return self._phrases.first
+        return self._phrases.guess if self._lecture is None else self._phrases.voting
+
+    def _write(self) -> None:
+        """Show the stop, and the answer once it was guessed."""
+        index, phrases, waiting = self._index(), self._phrases, self._waiting()
+        stop, ballot = self._lesson.stops[index], self._open.get(index)
+        place = phrases.place.format(index + 1, len(self._names))
+        lines = [f"**{stop.title}** {place}", stop.text]
         if stop.question is not None:
             guess, question = self._guesses.get(index), settled(stop.question, self._numbers())
             if guess is not None and question is None:
-                guess, waiting = None, COMPUTING
-            shown_question = with_votes(question or stop.question, self._votes.get(index, {}).values())
-            lines += [f"**{stop.question.text}**", *question_paragraphs(shown_question, guess, waiting)]
-        text = self._filled("\n\n".join(lines), index)
+                guess, waiting = None, phrases.computing
+            shown = question or stop.question
+            if ballot is not None:
+                ballot.question = _with_texts(shown, lambda text: self._filled(text, index, _plain))
+                shown = with_votes(shown, ballot.votes.values())
+            lines += [f"**{stop.question.text}**", *question_paragraphs(shown, guess, waiting, phrases)]
+        text = self._filled("\n\n".join(lines), index, shipped_markdown)
         if text != self._text.content:
             self._text.content = text
         self._guess.visible = self._waits()
 
-    def _filled(self, text: str, index: int) -> Markdown:
+    def _filled(self, text: str, index: int, fill: Callable[..., Text]) -> Text:
         """Return the text with its numbers, of this stop or as they were at another in the same scene.
         Clauses about stops that the user has not visited are left out."""
         now = self._numbers()
@@ -227,7 +303,27 @@ class LessonFolder(Generic[Look]):
             known = self._known[int(found[1]) - 1] if found[1] else now
             return known.get(found[2], TO_COME)
 
-        return shipped_markdown(CLAUSE.sub(clause, text), REPLACED, value)
+        return fill(CLAUSE.sub(clause, text), REPLACED, value)
+
+
+def _plain(text: str, fields: re.Pattern[str], value: Callable[[re.Match[str]], str]) -> str:
+    """Return the text with its fields replaced and without emphasis."""
+    return fields.sub(value, text).replace("*", "")
+
+
+def _with_texts(question: Question, read: Callable[[str], str]) -> Question:
+    choices = tuple(replace(choice, text=read(choice.text)) for choice in question.choices)
+    return replace(question, text=read(question.text), choices=choices)
+
+
+def keys_html(phrases: Phrases) -> Markup:
+    """Return the page's line about the keys, while they belong to the lesson and while to the dock."""
+    names = ("→", phrases.space, "←", "1 2 3", "S")
+    keys = escape(phrases.keys).format(*map(Markup("<b>{}</b>").format, names))
+    dock_keys = escape(phrases.dock_keys).format(Markup("<b>Esc</b>"))
+    return Markup(
+        "<span class='keys'><span>{}<span class='docked'> {}</span></span><span>{}</span></span>"
+    ).format(keys, phrases.docked, dock_keys)
 
 
 def with_votes(question: Question, votes: Collection[int]) -> Question:
@@ -248,13 +344,16 @@ def with_votes(question: Question, votes: Collection[int]) -> Question:
     return replace(question, choices=tuple(choices))
 
 
-def question_paragraphs(question: Question, guess: int | None, waiting: str) -> list[str]:
+def question_paragraphs(
+    question: Question, guess: int | None, waiting: str, phrases: Phrases = PHRASES[ENGLISH]
+) -> list[str]:
     """Return paragraphs of markdown: the choices, and the answer to a guess, or ``waiting`` before it.
 
     Args:
         question: the question.
         guess: index of a choice, ``SKIPPED``, or None before a guess.
         waiting: text shown before a guess.
+        phrases: in the language of the question.
     """
     if guess is None:
         return [*(f"{i}. {choice.text}" for i, choice in enumerate(question.choices, 1)), waiting]
@@ -263,7 +362,7 @@ def question_paragraphs(question: Question, guess: int | None, waiting: str) -> 
     if guess != SKIPPED:
         reason = question.choices[guess].reason
         marks[guess] = "✗ " if reason else "✓ "
-        answer = f"**Not quite, and many think so.** {reason} " if reason else "**Right.** "
+        answer = f"**{phrases.wrong}** {reason} " if reason else f"**{phrases.right}** "
     listed = zip(marks, question.choices, strict=True)
     choices = (f"{i}. {mark}{choice.text}" for i, (mark, choice) in enumerate(listed, 1))
     return [*choices, answer + question.reveal]

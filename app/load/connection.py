@@ -51,6 +51,8 @@ class Connection:
             max_size=None,
         )
         self.uuids: dict[str, list[str]] = {}
+        self.commands: dict[str, str] = {}
+        """Entries of the command palette: uuids by label, of several the last."""
         self.values: dict[str, object] = {}
         """The server's last values by the controls' uuids."""
         self.texts: dict[str, str] = {}
@@ -135,10 +137,12 @@ class Connection:
         assert isinstance(properties, dict)
         if message["type"] == "NotificationShowMessage":
             self.notices.append(f"{properties['title']}: {properties['body']}")
-        if props is not None and properties.get("label"):
-            self.uuids.setdefault(properties["label"], []).append(uuid)
+        if message["type"] == "RegisterCommandMessage":
+            self.commands[properties["label"]] = uuid
             if properties["label"] == DRAWN:
                 self._drawn.add(uuid)
+        elif props is not None and properties.get("label"):
+            self.uuids.setdefault(properties["label"], []).append(uuid)
         if "_markdown" in properties:
             self.texts[uuid] = properties["_markdown"]
         if "content" in properties:

@@ -25,8 +25,8 @@ FULL = "The address has no room for another measure; delete one first"
 HINTS = {
     "on": "While this is on, a click in the picture measures; other clicks, such as on a hole, do nothing.",
     "what": "What the clicks measure.",
-    "snap": "Where a click's point moves to: the surface as it is, its nearest vertex, the nearest edge "
-    "between two planes, or the plane that fits there.",
+    "snap": "Where a click's point moves to: the surface as it is, the corner of flat faces near it (else "
+    "its nearest vertex), the nearest edge between two planes, or the plane that fits there.",
     "chosen": "Measure that the controls below change.",
     "name": "Name of the chosen measure, in the list, the picture, the address and exports.",
     "true": "Length of the chosen measure as you know it, for example by a tape; it checks the scale.",

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+import numpy as np
 import viser
 
+from app.compute.records import SceneNode
 from app.drawing.cameras import look, stage_of
-from app.session.views import Views
+from app.session.views import View, Views
 from app.window.panel import PanelSession
+from pipeline.kernels.geometry import apply
+from pipeline.types import FloatArray
+
+MOST_POINTS = 4000
+"""Points of a node's cloud that are looked at, approximately."""
+BARE = "/scene"
+"""Node below which only what the sensors measured is drawn."""
 
 
 class Framing:
@@ -15,8 +26,40 @@ class Framing:
     def __init__(self, session: PanelSession, views: Views | None) -> None:
         """Keep the session and its ``views``, which are None in a lecture."""
         self._session, self._views = session, views
-        self._wide = False
+        self._wide = self._by_screen = False
         self._shape = self._seen_shape = 0.0
+        self._framed: View | None = None
+
+    @property
+    def framed(self) -> View | None:
+        """Return the view to which the app turned last; None before that."""
+        return self._framed if self._views is None else self._views.framed
+
+    @property
+    def nodes(self) -> tuple[SceneNode, ...]:
+        """Return the camera nodes of the scene, if the scene itself is drawn and in one copy."""
+        scene = self._session.results.view("scene")
+        shows_scene = scene is not None and not self._by_screen and not self._wide
+        return tuple(scene.nodes) if shows_scene else ()
+
+    @property
+    def clouds_m(self) -> list[FloatArray]:
+        """Return the (N, 3) points of each of these nodes in the world frame, with inferred ones if drawn."""
+        nodes, depth = self.nodes, self._session.results.view("depth")
+        clouds = [node.sensor for node in nodes]
+        bare = self._session.current.drawn_below == BARE
+        if depth is not None and not bare and len(depth.nodes) == len(nodes):
+            clouds = [one.fused for one in depth.nodes]
+        thinned = [one.points_m[:: max(1, len(one.points_m) // MOST_POINTS)] for one in clouds]
+        return [
+            apply(node.T_world_camera, points_m.astype(float))
+            for node, points_m in zip(nodes, thinned, strict=True)
+        ]
+
+    def forget_turned(self) -> None:
+        """Forget to which view the user has turned what is shown."""
+        if self._views is not None:
+            self._views.take("")
 
     def frame(self, anew: bool, keep: bool) -> None:
         """Turn the view to what is shown.
@@ -27,6 +70,7 @@ class Framing:
         """
         if self._views is None:
             self._turn(anew)
+            self._framed = _view_of(self._session.clients())
         else:
             self._views.frame(lambda: self._turn(anew), keep)
 
@@ -40,7 +84,8 @@ class Framing:
         """Turn the view. Returns the kind of object that it looks at."""
         session = self._session
         below = session.current.drawn_below
-        if session.current.look():
+        self._by_screen = session.current.look()
+        if self._by_screen:
             self._shape = 0.0
             return below
         wide = any(panel.wide for panel in session.panels if panel.drawn_below == below)
@@ -55,3 +100,9 @@ class Framing:
         """Return the picture's width over height to one decimal; 1 for a session that many browsers share."""
         target = self._session.target
         return 1.0 if isinstance(target, viser.ViserServer) else round(target.camera.aspect, 1)
+
+
+def _view_of(clients: Iterable[viser.ClientHandle]) -> View | None:
+    """Return the view of the first browser; None if there is none."""
+    camera = next((client.camera for client in clients), None)
+    return None if camera is None else np.array([camera.position, camera.look_at])

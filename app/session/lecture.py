@@ -53,6 +53,8 @@ class _Seat:
     """Shows the teacher the number of students, in markdown."""
     leave: Callable[[], None] = lambda: None
     """Stops updating the teacher's address."""
+    forget: Callable[[], None] = lambda: None
+    """Stops offering the browser its own commands."""
 
 
 class Lecture:
@@ -74,6 +76,7 @@ class Lecture:
         post: Callable[..., None],
         frame: Callable[[], None],
         add_address: Callable[[Ui], Callable[[], None]],
+        add_commands: Callable[[Ui, viser.ClientHandle, Callable[[], None]], Callable[[], None]],
     ) -> None:
         """Accept browsers.
 
@@ -82,8 +85,11 @@ class Lecture:
             frame: turns the followers' views to what the screen shows.
             add_address: connects a browser's address to the session; it returns the function that disconnects
                 it.
+            add_commands: offers a browser its own commands and takes a function that is called after one of
+                them has turned its view; it returns the function that stops offering them.
         """
         self._post, self._frame, self._add_address = post, frame, add_address
+        self._add_commands = add_commands
         self._server.on_client_connect(lambda client: post(self._join, client))
         self._server.on_client_disconnect(lambda client: post(self._leave, client.client_id))
 
@@ -118,13 +124,22 @@ class Lecture:
             client.camera.on_update(lambda _: self._moved(seat))
         else:
             self._add_chip(seat)
+        seat.forget = self._add_commands(self._own_ui(client), client, lambda: self._let_roam(seat))
         self._catch_up(seat)
         self._count()
+
+    def _let_roam(self, seat: _Seat) -> None:
+        """Let a student keep the view to which a command has turned it."""
+        if not seat.teaches and seat.follows:
+            seat.follows = False
+            self._show(seat)
+            self._count()
 
     def _leave(self, number: int) -> None:
         seat = self._seats.pop(number, None)
         if seat is not None:
             seat.leave()
+            seat.forget()
         self._count()
 
     def _leader(self) -> _Seat | None:

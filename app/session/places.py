@@ -23,9 +23,18 @@ REST_S = 0.3
 class Places:
     """The addresses of a session: of its one browser, or of the teachers' browsers in a lecture."""
 
-    def __init__(self, session: PanelSession, views: Views | None) -> None:
-        """Keep the addresses of a session; ``views`` are None where many browsers share it."""
-        self._session, self._views = session, views
+    def __init__(
+        self, session: PanelSession, views: Views | None, on_opened: Callable[[], None] = lambda: None
+    ) -> None:
+        """Keep the addresses of a session.
+
+        Args:
+            session: the session.
+            views: its views; None where many browsers share it.
+            on_opened: called when the place of the address with which the session was opened is set.
+        """
+        self._session, self._views, self._on_opened = session, views, on_opened
+        self._opened = False
         self._start = self._now()
         self._addresses: list[Address] = []
         if isinstance(session.target, viser.ClientHandle):
@@ -46,6 +55,16 @@ class Places:
             address.close()
 
         return remove
+
+    def reset(self) -> None:
+        """Restore what the screens and the settings were at the start."""
+        session = self._session
+        for reset in session.ui.resets:
+            reset()
+        for part in (part for panel in session.panels for part in panel.in_address.values()):
+            if part.place():
+                part.take("")
+        session.want(self._start.spec)
 
     def follow(self) -> None:
         """Update the addresses after a possible change."""
@@ -79,6 +98,9 @@ class Places:
         if wrong:
             more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
             session.notify("Part of the address was ignored", f"{wrong[0].rstrip('.')}{more}.")
+        if not self._opened:
+            self._opened = True
+            self._on_opened()
 
     def _take(self, added: Mapping[str, str], spec: Spec) -> list[str]:
         """Apply lesson stops first, then the parts that differ from them. Returns the error sentences."""

@@ -7,6 +7,7 @@ import logging
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from app.compute.shared import SharedViews
 from app.compute.state import CHAIN, STEPS, Results, Spec, Step
 from app.compute.store import Store
 from app.session.framing import Framing
+from app.session.palettes import Palettes
 from app.session.places import Places
 from app.session.views import Views
 from app.web.uploads import Uploads, plain
@@ -27,7 +29,7 @@ from app.window.gui import Gui
 from app.window.header import Header
 from app.window.page import screen_mark
 from app.window.panel import Offers, Panel
-from app.window.ui import SharedBy, Target, Ui
+from app.window.ui import SharedBy, Target, Teaching, Ui
 from packetmesh.errors import PacketMeshError
 from packetmesh.files import file_trouble
 from packetmesh.progress import Progress
@@ -54,15 +56,15 @@ class Session:
         spec: Spec,
         panels: Sequence[type[Panel]],
         lecture: SharedBy | None = None,
+        teaching: Teaching | None = None,
     ) -> None:
         self.target = target
         call_in_order(target)
         self.gui, self.scene = Gui(target.gui), target.scene
-        self.ui = Ui(self.gui, target.scene, self.post, target.atomic, target.flush, lecture=lecture)
-        self.store, self.uploads = store, uploads
-        self._shared = shared
-        self.spec = self._start = spec
-        self.results = Results()
+        own = (self.post, target.atomic, target.flush, lecture, teaching or Teaching())
+        self.ui = Ui(self.gui, target.scene, *own)
+        self.store, self.uploads, self._shared = store, uploads, shared
+        self.spec, self.results = spec, Results()
         self.folder = self.new_folder()
         self._tracks = (
             Track(LatestWins(pool, self), CHAIN),
@@ -76,7 +78,8 @@ class Session:
         self.current = self.panels[0]
         self.views = Views(target) if isinstance(target, viser.ClientHandle) else None
         self._framing = Framing(self, self.views)
-        self.places = Places(self, self.views)
+        self.palettes = Palettes(self, self._framing)
+        self.places = Places(self, self.views, self.palettes.accept)
         self.built = self._thread.submit(self._guarded, self._build_in_turn)
         """Done when the panels are built."""
         if isinstance(target, viser.ClientHandle):
@@ -300,12 +303,7 @@ class Session:
 
     def _build(self) -> None:
         titles = [panel.title for panel in self.panels]
-        self._header = Header(
-            self.gui,
-            titles,
-            lambda title: self.post(self.show, title),
-            lambda action: self.post(self._act, action),
-        )
+        self._header = Header(self.gui, titles, partial(self.post, self.show), partial(self.post, self._act))
         self._folders: dict[str, viser.GuiFolderHandle] = {}
         for panel in self.panels:
             self.scene.add_frame(panel.drawn_below, show_axes=False, visible=False)
@@ -314,8 +312,10 @@ class Session:
                 self.gui.add_html(screen_mark(panel.title))
                 panel.build()
         self.show(self.current.title)
-        if self.views is not None:  # in a lecture the teachers' browsers have the addresses
+        self.palettes.begin(self._folders, self._header.tools)
+        if isinstance(self.target, viser.ClientHandle):  # in a lecture, Lecture does this for each browser
             self.places.add(self.ui)
+            self.palettes.add(self.ui, self.target)
 
     def show(self, title: str) -> None:
         """Show the step of that title."""
@@ -354,12 +354,7 @@ class Session:
             self.results.retry_failed()
             self.advance()
         elif action == "Reset":
-            for reset in self.ui.resets:
-                reset()
-            for part in (part for panel in self.panels for part in panel.in_address.values()):
-                if part.place():
-                    part.take("")
-            self.want(self._start)
+            self.places.reset()
         else:
             self.ui.show_command(self.current.command)
 
@@ -381,8 +376,10 @@ class Session:
         failures = [self.results.failure(step, self.spec) for step in STEPS]
         failure = next((sentence for sentence in failures if sentence), None)
         self._header.show(self.current.title, statuses, running, failure, self._side.busy)
-        if self.views is not None and not (running or failure or self._side.busy):
-            self.views.settle()
+        if not (running or failure or self._side.busy):
+            self.palettes.rest()
+            if self.views is not None:
+                self.views.settle()
 
     def _guarded(self, function: Callable[..., None], *arguments: Any) -> None:
         if self._closed:
@@ -391,6 +388,7 @@ class Session:
             with self.target.atomic():
                 function(*arguments)
                 self.places.follow()
+                self.palettes.follow(function not in (self._ended, self._progressed))
         except PacketMeshError as error:
             self.notify("That did not work", str(error))
         except OSError as error:

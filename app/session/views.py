@@ -39,6 +39,11 @@ class Views:
         self._requested: View | None = None
         """The view that the address asks for, until the results of the address have been computed."""
 
+    @property
+    def framed(self) -> View:
+        """Return the view to which the app turned last."""
+        return self._framed
+
     def frame(self, look: Callable[[], str], keep: bool) -> None:
         """Let the app turn the view, then restore the view to which the user had turned it.
 
@@ -87,7 +92,8 @@ class Views:
             view = np.zeros(1)
         if not place:
             self._requested = None
-            if self._by_hand() or self._turned.pop(self._kind, None) is not None:
+            turned = self._turned.pop(self._kind, None)
+            if self._by_hand() or turned is not None:
                 turn(self._client, self._framed[1], self._framed[0])
             return
         if view.shape != (6,) or not np.all(np.abs(view) < FARTHEST_M) or np.allclose(view[:3], view[3:]):

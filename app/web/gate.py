@@ -136,7 +136,9 @@ class Gate:
         found = private.find_command(self._server, number, message.uuid) if _is_name(message.uuid) else None
         if found is not None and (found[0]._impl.removed or found[0].disabled):
             return Verdict.LATE
-        return self._touch(number, found)
+        if (touched := self._touch(number, found)) is Verdict.REFUSED:
+            self.on_refused(number)
+        return touched
 
     def begin_upload(self, number: int, message: messages.FileTransferStartUpload) -> Verdict:
         """Check the start of an upload."""

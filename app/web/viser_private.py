@@ -11,14 +11,15 @@ is a seventh of the time in which a session's panels are built.
 *Reset* can be handled before the choice that it should undo.
 - ``listen``: viser gives every message of a browser to its handlers and has no hook before them.
 - ``find_control``, ``find_command``, ``is_live``: the target of a message, and whether a user could reach it.
-- ``address_of``, ``close``, ``cookies``: parts of a browser's connection.
+- ``contents``: the controls in a folder, so that they can be found by typing.
+- ``address_of``, ``close``, ``cookies``, ``languages``: parts of a browser's connection.
 """
 
 from __future__ import annotations
 
 import asyncio
 import functools
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeAlias, get_type_hints
 
@@ -157,6 +158,19 @@ def is_live(handle: Any) -> bool:
     return True
 
 
+def contents(container: Any, titles: tuple[str, ...] = ()) -> Iterator[tuple[Any, tuple[str, ...]]]:
+    """Yield each visible control in a folder or tab, with the titles of the folders and tabs around it."""
+    for child in list(container._children.values()):
+        if not getattr(child, "visible", True):
+            continue
+        yield child, titles
+        if isinstance(child, viser.GuiFolderHandle):
+            yield from contents(child, (*titles, child.label) if child.label else titles)
+        elif isinstance(child, viser.GuiTabGroupHandle):
+            for tab in child._tab_handles:
+                yield from contents(tab, (*titles, tab._label))
+
+
 def awaits_render(server: viser.ViserServer, number: int) -> bool:
     """Whether the server waits for a picture from a browser."""
     client = server._connected_clients.get(number)
@@ -177,6 +191,13 @@ def cookies(server: viser.ViserServer, number: int) -> str:
     connection = server._websock_server._live_connections.get(number)
     request = None if connection is None else connection.request
     return "" if request is None else ", ".join(request.headers.get_all("Cookie"))
+
+
+def languages(server: viser.ViserServer, number: int) -> str:
+    """Return the languages that a browser prefers, as its request names them; empty if it names none."""
+    connection = server._websock_server._live_connections.get(number)
+    request = None if connection is None else connection.request
+    return "" if request is None else ", ".join(request.headers.get_all("Accept-Language"))
 
 
 def address_of(server: viser.ViserServer, number: int) -> str:

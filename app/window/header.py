@@ -13,6 +13,7 @@ from app.web.markup import Markdown, Markup
 from app.window.gui import Gui
 from app.window.page import page_call, stale_html
 from app.window.stepper import Stepper
+from app.window.tools import Tools
 from packetmesh.progress import Progress
 
 STARTING = Markdown("**Starting** …")
@@ -30,6 +31,7 @@ class Header:
     ) -> None:
         """Add the parts to the current container."""
         self._stepper = Stepper(gui, titles, on_pick)
+        self.tools = Tools(gui)
         self._status = gui.add_markdown(STARTING)
         self._bar = gui.add_progress_bar(0.0)
         self._stale = gui.add_html(Markup(""))

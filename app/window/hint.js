@@ -56,6 +56,18 @@
     [note.style.left, note.style.top] = place(one).map(px => `${px}px`);
   }
 
+  // Show an explanation that was found by its name, over the picture.
+  packetmesh.calls.define = (_, name, hint) => {
+    close();
+    stood = undefined; // it belongs to nothing that could scroll
+    note.replaceChildren(Object.assign(document.createElement("b"), {textContent: name}), `: ${hint}`);
+    document.body.append(note);
+    const picture = document.querySelector("canvas[data-engine]").getBoundingClientRect();
+    const {width, height} = note.getBoundingClientRect();
+    note.style.left = `${picture.left + Math.max(8, 0.5 * (picture.width - width))}px`;
+    note.style.top = `${picture.top + Math.max(8, 0.4 * (picture.height - height))}px`;
+  };
+
   // viser's own hints, which open while a mouse rests on a control, go beside the panel too.
   window.addEventListener("pointerover", ({target}) => {
     const panel = panelOf(target);

@@ -14,6 +14,7 @@ from app.web.uploads import plain
 from app.window.debounce import Debounce
 from app.window.gui import Gui
 from app.window.tables import command_html
+from app.window.teaching import Teaching
 from pipeline.types import FloatArray
 
 if TYPE_CHECKING:
@@ -59,12 +60,14 @@ class Ui:
     """Groups messages to the browser."""
     flush: Callable[[], None]
     """Sends the messages now."""
+    lecture: SharedBy | None = None
+    """The lecture whose browsers all show the same; None for a session of one browser."""
+    teaching: Teaching = field(default_factory=Teaching)
+    """What its lessons share."""
     closers: list[Callable[[], None]] = field(default_factory=list)
     """Functions that stop the timers and threads of the screens."""
     resets: list[Callable[[], None]] = field(default_factory=list)
     """Functions that *Reset* calls, besides resetting the settings and the screens."""
-    lecture: SharedBy | None = None
-    """The lecture whose browsers all show the same; None for a session of one browser."""
 
     def when_changed(self, handle: Input, action: Callable[[], object]) -> Input:
         """Call ``action`` when a user, not the program, changes ``handle``. Returns the handle."""

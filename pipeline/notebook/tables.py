@@ -53,8 +53,8 @@ def _cloud(cloud: PointCloud) -> str:
     if 2 <= len(cloud) <= SPACING_POINTS:
         mean_m, deviation_m = spacing(cloud.points_m)
         rows.append(("Spacing, mean and deviation", f"{1000 * mean_m:.1f} and {1000 * deviation_m:.1f} mm"))
-    if cloud.sigma_m is not None and len(cloud):
-        rows.append(("Noise, median", f"{1000 * np.median(cloud.sigma_m):.1f} mm"))
+    if cloud.sigma_m is not None and np.isfinite(cloud.sigma_m).any():
+        rows.append(("Noise, median", f"{1000 * np.nanmedian(cloud.sigma_m):.1f} mm"))
     if cloud.source is not None and len(cloud):
         rows.append(("Inferred points", _percent(float(np.mean(cloud.source == PointSource.INFERRED)))))
     columns = [name for name in ("colors", "normals", "pixels", "sigma_m", "source") if _has(cloud, name)]

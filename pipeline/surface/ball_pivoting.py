@@ -55,6 +55,7 @@ def iterate_ball(
         radii_m=radii_m,
         normals=kept.normals,
         source=kept.source,
+        rows=np.flatnonzero(used).astype(np.int32),
     )
 
 

@@ -30,6 +30,13 @@ def edges_and_faces(triangles: IntArray) -> tuple[IntArray, IntArray]:
     return edges, np.diff(first, append=len(order))
 
 
+def edges_with_one_face(triangles: IntArray) -> IntArray:
+    """Return (B,) ascending rows of ``directed_edges`` whose edge has exactly one face."""
+    order, begins = _by_edge(directed_edges(triangles))
+    rows: IntArray = np.sort(order[begins & np.append(begins[1:], True)[: len(begins)]])
+    return rows
+
+
 def boundary_loops(triangles: IntArray) -> list[IntArray]:
     """Return the boundary of a mesh as closed loops of vertex indices, the first vertex not repeated.
 
@@ -82,10 +89,8 @@ def loop_areas_m2(start_m: FloatArray, end_m: FloatArray, first: IntArray) -> Fl
 def _boundary_successors(triangles: IntArray) -> dict[int, list[int]]:
     """Return, for each boundary vertex, the vertices to which its directed boundary edges lead."""
     directed = directed_edges(triangles)
-    order, begins = _by_edge(directed)
-    alone = begins & np.append(begins[1:], True)[: len(begins)]
     following: dict[int, list[int]] = {}
-    for start, end in directed[np.sort(order[alone])].tolist():
+    for start, end in directed[edges_with_one_face(triangles)].tolist():
         following.setdefault(start, []).append(end)
         following.setdefault(end, [])
     return following

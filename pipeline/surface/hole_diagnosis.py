@@ -163,7 +163,10 @@ def _place(hole: Hole, surface: SurfaceResult, cloud: PointCloud) -> _Place:
     rows, nearest, reach_m = _cut(cloud.points_m, centers_m, radius_m, surface.radii_m[-1])
     points_m, normals = cloud.points_m[rows], np.asarray(cloud.normals)[rows]
     tree = cKDTree(points_m)
-    local = _rows_of(tree, surface.vertices_m[edges].reshape(-1, 3)).reshape(-1, 2)
+    local = _rows_of(tree, _points_m(surface, edges, cloud).reshape(-1, 3)).reshape(-1, 2)
+    by_ball = half_edges(roll(points_m, normals, surface.radii_m).triangles, local) >= 0
+    if by_ball.any():  # others are the new edges of closed notches
+        edges, local = edges[by_ball], local[by_ball]
     owner = cKDTree(centers_m).query(surface.vertices_m[edges].mean(axis=1))[1]
     directions = _means(normals[local[:, 0]] + normals[local[:, 1]], owner, len(centers_m))
     if ends:
@@ -198,6 +201,18 @@ def _cut(
     rows = np.flatnonzero(distances_m <= reach_m)
     rows = rows[distinct_rows(points_m[rows])]
     return rows, nearest[rows], reach_m
+
+
+def _points_m(surface: SurfaceResult, edges: IntArray, cloud: PointCloud) -> FloatArray:
+    """Return (E, 2, 3) the points of the cloud from which the ends of edges come.
+
+    Vertices at rims have moved (``rims.even_rims``); if most vertices have, the cloud is another one.
+    """
+    rows = surface.rows
+    if rows is None or rows.max(initial=0) >= len(cloud):
+        return surface.vertices_m[edges]
+    unmoved = np.all(cloud.points_m[rows] == surface.vertices_m, axis=1)
+    return (cloud.points_m[rows] if unmoved.mean() > MOST else surface.vertices_m)[edges]
 
 
 def _rows_of(tree: cKDTree, places_m: FloatArray) -> IntArray:

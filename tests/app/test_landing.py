@@ -14,8 +14,9 @@ import viser
 
 import app.landing
 from app.compute.state import Spec
-from app.landing import LESSON_PLACES, OWN_FOLDER, PICTURES, SCRIPTS, STYLES, app_page, landing_html
-from app.lesson.files import LESSONS
+from app.landing import OWN_FOLDER, PICTURES, SCRIPTS, SHIPPED, STYLES, app_page, landing_html
+from app.lesson.files import LESSONS, screen_of
+from app.lesson.reading import head_of
 from app.screens.scene.panel import ScenePanel
 from app.server import PANELS
 from app.session.address import Place, place_of
@@ -111,16 +112,14 @@ def test_another_page_of_viser_is_no_page_of_the_app(monkeypatch, tmp_path, know
 
 
 def test_it_offers_every_lesson_and_every_scene_with_a_small_picture():
-    assert set(LESSON_PLACES) == {path.stem for path in LESSONS.glob("*.md")}
-    assert {screen for _, screen in LESSON_PLACES.values()} <= {panel.title.lower() for panel in PANELS}
-    assert {scene for scene, _ in LESSON_PLACES.values()} <= set(DEMOS)
-    names = {*LESSON_PLACES, *DEMOS}
+    assert set(SHIPPED) == {path.stem for path in LESSONS.glob("*.md") if "." not in path.stem}
+    names = {*SHIPPED, *DEMOS}
     assert {path.stem for path in PICTURES.iterdir()} == names
     assert all(path.stat().st_size <= 40_000 for path in PICTURES.iterdir())
     page = landing_html()
     assert page.count("data:image/jpeg") == len(names)
     assert all(f">{scene.title}</span>" in page for scene in DEMOS.values())
-    for name in LESSON_PLACES:
+    for name in SHIPPED:
         title = (LESSONS / f"{name}.md").read_text().splitlines()[0].removeprefix("# ")
         assert f">{title}</span>" in page
 
@@ -132,7 +131,8 @@ def test_every_card_leads_to_a_place_that_an_address_can_name():
     places = [html.unescape(place) for place in re.findall('data-place="([^"]+)"', landing_html())]
     found, wrong = zip(*(place_of(place, start, titles, sources) for place in places), strict=True)
     assert not any(wrong)
-    wanted = [(scene, screen) for scene, screen in LESSON_PLACES.values()]
+    heads = [head_of((LESSONS / f"{name}.md").read_text())[0] for name in SHIPPED]
+    wanted = [(head["scene"][1], screen_of(head["screen"][1])) for head in heads]
     wanted += [(name, "scene") for name in DEMOS]
     wanted += [("office", "scene")]  # the folder for uploads, in the scene that is open
     assert [(place.spec.source.title, place.screen.lower()) for place in found] == wanted

@@ -45,6 +45,18 @@ for (const name of ["drawElements", "drawArrays", "drawElementsInstanced", "draw
 """
 """Pages draw nothing into their 3-D picture before ``window.draws`` is true: without a graphics card that
 takes most of the time, and few tests look at the picture."""
+RESTING = """
+{
+  const ask = window.requestAnimationFrame.bind(window);
+  const waiting = [];
+  window.requestAnimationFrame = call => (window.rests ? waiting.push(call) : ask(call));
+  window.goOn = () => {
+    window.rests = false;
+    waiting.splice(0).forEach(ask);
+  };
+}
+"""
+"""Pages begin no frame while ``window.rests`` is true."""
 CONNECTION = """
 window.Worker = class extends Worker {
   constructor(...given) {
@@ -56,8 +68,10 @@ window.Worker = class extends Worker {
 """Pages keep the worker that holds their connection to the server, the only one that viser starts."""
 SIZE_PX = {"width": 900, "height": 640}
 """Of the tab, small so that drawing in software is quick."""
-TOGETHER = {"test_landing": "test_calibrate"}
-"""Files that need the cameras which those of another file have calibrated: they follow on the same worker."""
+HALF = "test_lesson"
+"""The first file of the second half. A browser mostly waits: each half runs on one worker, in one Chromium,
+while others compute. Landing needs the cameras that Calibrate has calibrated before it.
+"""
 
 
 def chromium_path() -> str | None:
@@ -69,11 +83,12 @@ def chromium_path() -> str | None:
 
 @pytest.hookimpl(tryfirst=True)  # pytest-xdist looks at the groups, and where a path is named it came first
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark every test here, and keep those of a file on one worker: they share a page."""
+    """Mark every test here, and keep those of a half on one worker: they share a page."""
     for item in items:
         if item.path.parent == HERE:
             item.add_marker(pytest.mark.browser)
-            item.add_marker(pytest.mark.xdist_group(TOGETHER.get(item.path.stem, item.path.stem)))
+            half = 1 + (item.path.stem >= HALF)
+            item.add_marker(pytest.mark.xdist_group(f"browser {half}"))
 
 
 @pytest.hookimpl(wrapper=True)
@@ -112,6 +127,7 @@ def browser(chromium):
         def undrawn(**options):
             context = new_context(**options)
             context.add_init_script(UNDRAWN)
+            context.add_init_script(RESTING)
             context.add_init_script(CONNECTION)
             return context
 
@@ -154,7 +170,7 @@ def tab(loaded):
 def page(tab):
     """The tab with the settings of the start, on its first step."""
     reset = tab.get_by_role("button", name="Reset", exact=True)
-    tab.evaluate("() => new Promise(done => setTimeout(done, 50))")  # what the last click leaves to do is done
+    tab.evaluate("() => new Promise(done => setTimeout(done, 50))")  # the last click has had its effect
     if reset.is_enabled():
         reset.click()
     tab.get_by_role("button", name="Scene").click()

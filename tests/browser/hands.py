@@ -39,13 +39,13 @@ ALIKE = 0.02
 UNCOVERED = ".mantine-Notifications-root, .packetmesh-notice, [role=tooltip] { display: none !important }"
 
 
-DRAW = """() => {
+DRAW = """patience_ms => {
   [window.drew, window.draws] = [false, true];
-  const end = performance.now() + 5000; // an empty scene has nothing to draw
+  const end = performance.now() + patience_ms; // an empty scene has nothing to draw
   return new Promise(done => {
     const look = () => {
       if (!window.drew && performance.now() < end) return void setTimeout(look, 20);
-      requestAnimationFrame(() => requestAnimationFrame(done));
+      requestAnimationFrame(() => requestAnimationFrame(() => done(window.drew)));
     };
     look();
   });
@@ -53,25 +53,31 @@ DRAW = """() => {
 
 
 def canvas(page, still=2):
-    """The 3-D picture once `still` looks at it in a row are the same, without what pops up over it."""
-    last, same = b"", 1
-    with drawn(page):
-        for _ in range(40):
-            page.wait_for_timeout(200)
+    """The 3-D picture once `still` looks at it in a row are the same, without what pops up over it.
+
+    For each look it is drawn anew; no more frames are drawn while the picture is taken, which takes seconds.
+    """
+    last, same, patience_ms = b"", 1, 5000
+    for _ in range(40):
+        page.wait_for_timeout(200)
+        with drawn(page, patience_ms) as drew:
+            page.evaluate("() => { window.rests = true; }")
             picture = page.locator("canvas").first.screenshot(style=UNCOVERED)
-            same = same + 1 if picture == last else 1
-            if same == still:
-                break
-            last = picture
+        same = same + 1 if picture == last else 1
+        if same == still:
+            break
+        last, patience_ms = picture, 5000 if drew else 500
     return picture
 
 
 @contextlib.contextmanager
-def drawn(page):
-    """The page draws its 3-D picture meanwhile, from the next frame on."""
-    page.evaluate(DRAW)
-    yield
-    page.evaluate("() => { window.draws = false; }")
+def drawn(page, patience_ms=5000):
+    """The page draws its 3-D picture meanwhile, from the next frame on. Yields whether there was anything."""
+    drew = page.evaluate(DRAW, patience_ms)
+    try:
+        yield drew
+    finally:
+        page.evaluate("() => { window.draws = false; window.goOn?.(); }")
 
 
 def differing(one, other):

@@ -18,7 +18,7 @@ from tests.browser.hands import ALIKE, PATIENCE_MS, STEPS, canvas, changed_from,
 def test_all_of_a_file_run_on_one_worker(request):
     if "PYTEST_XDIST_WORKER" not in os.environ:
         pytest.skip("there are no workers: pytest runs without -n")
-    assert request.node.nodeid.endswith("@test_app")  # pytest-xdist sends a group by this
+    assert request.node.nodeid.endswith("@browser 1")  # pytest-xdist sends a group by this
 
 
 def test_every_step_shows_its_own_picture_and_no_error(page):

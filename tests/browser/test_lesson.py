@@ -45,14 +45,14 @@ def press_until(page, key, text, wait_ms=3_000):
     raise AssertionError(f"{key} does not bring '{text}'")
 
 
-def begin(page, lesson, stops):
+def begin(page, lesson, stops, place="", begins="Choose a stop, or press"):
     """Open the lesson at its first stop; what moves under the hand may miss a click, and gets another."""
     unfold(page, f"Lesson: {lesson}")
     for _ in range(10):
         page.get_by_role("button", name="Next", exact=True).first.click()  # the pictures may have one, too
         with contextlib.suppress(TimeoutError):
-            return seen(page, f"(1 of {stops})").wait_for(timeout=10_000)
-        if not page.get_by_text("Choose a stop, or press").locator("visible=true").count():
+            return seen(page, place or f"(1 of {stops})").wait_for(timeout=10_000)
+        if not page.get_by_text(begins).locator("visible=true").count():
             unfold(page, f"Lesson: {lesson}")
     raise AssertionError(f"'{lesson}' does not begin")
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Literal
 
 import numpy as np
 
-from app.lesson.files import LESSONS, SCENE, Numbers, Setting, choice, quantity, sets
+from app.lesson.files import LESSONS, SCENE, Kind, Numbers, Setting, choice, quantity, sets
 from app.screens.calibrate.labels import AROUND, PAIRS, STRAIGHTENED, Around
 from app.screens.calibrate.numbers import unseen_rms_px, views_used, within
 from app.screens.calibrate.view import CameraView
@@ -104,3 +104,14 @@ def numbers(scene: str, circles: int, camera: CameraView) -> Numbers:
         "held_out": number(unseen_rms_px(camera), 3, "px"),
         "fx": within(found, "fx"),
     }
+
+
+def statement(values: Mapping[str, str]) -> str:
+    """Return how well the photographs fit, for screen readers."""
+    return (
+        f"{values[SCENE]}: from {values['views']} views, with an RMS error of {values['rms']} and of "
+        f"{values['held_out']} for views left out. The focal length is {values['fx']}."
+    )
+
+
+KIND = Kind("calibrate", SETTINGS, CalibrateLook(), NUMBERS, statement)

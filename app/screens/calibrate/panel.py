@@ -9,14 +9,14 @@ from typing import Any, ClassVar
 
 from app.compute.records import SceneView
 from app.compute.state import BoardViews, Spec, Step
-from app.lesson.files import Numbers, read_lesson
-from app.lesson.player import LessonFolder
+from app.lesson.files import Numbers
+from app.lesson.on_screen import ScreenLessons
 from app.screens.calibrate.answers import Answers
 from app.screens.calibrate.depth import DepthFolder
 from app.screens.calibrate.draw import BELOW, BoardsDrawing, place_of, stand_before
 from app.screens.calibrate.labels import AROUND, DEPTH, NOTHING, TEXT
 from app.screens.calibrate.lens_folder import LensFolder
-from app.screens.calibrate.lesson import NUMBERS, SETTINGS, SHIPPED, CalibrateLook, left_out, numbers
+from app.screens.calibrate.lesson import KIND, SHIPPED, CalibrateLook, left_out, numbers
 from app.screens.calibrate.noise import NoiseFolder
 from app.screens.calibrate.noise_view import NoiseRequest
 from app.screens.calibrate.numbers import ParameterFolder, summary_table
@@ -61,8 +61,8 @@ class CalibratePanel(Panel):
         """Controls that need photographs."""
         with self._group():
             gui.add_markdown(TEXT)
-            lesson = read_lesson(SHIPPED, SETTINGS, CalibrateLook(), NUMBERS)
-            self._lesson = LessonFolder(ui, lesson, self._take_look, self._lesson_numbers)
+            shipped = {STOP: SHIPPED}
+            self._lessons = ScreenLessons(ui, KIND, shipped, self._take_look, self._lesson_numbers)
         self._status = gui.add_markdown(Markdown(""))
         scenes = {DEMO_SCENES[name].title: partial(self._open_scene, name) for name in with_boards()}
         self._open = ui.buttons("Open", scenes, "Scene with photographs of a board.", visible=False)
@@ -75,7 +75,7 @@ class CalibratePanel(Panel):
         self._photographs = Photographs(
             ui, self._answers, self._pick, self._show_view, self._drop, self._keep_all
         )
-        self.in_address |= {STOP: self._lesson, "node": self._camera}
+        self.in_address |= self._lessons.in_address | {"node": self._camera}
         self.in_address |= {"photo": self._photographs, "pictures": self._photographs.area}
         self._around = gui.add_dropdown(
             "In space", list(AROUND), hint="Object that is fixed in the 3-D scene."
@@ -227,6 +227,7 @@ class CalibratePanel(Panel):
         self._lens.load(camera)
         self._depth.load(self._view.depth.get(camera.name))
         self._rig.load(self._view.rig)
+        self._lessons.refresh()
 
     def _show_view(self) -> None:
         """Show the chosen view, and the maps of its pixels."""

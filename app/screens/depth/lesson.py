@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import get_args
 
 from app.compute.records import DepthNode, SceneView
-from app.lesson.files import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, quantity, sets, short
+from app.lesson.files import LESSONS, NUMBER, SCENE, Kind, Numbers, Setting, choice, quantity, sets, short
 from app.screens.depth.labels import COLORINGS, DRAWN, HOLES, PICTURES, PointColoring
 from app.screens.depth.view import Disc, HideRequest, PictureName
 from app.window.tables import number
@@ -77,3 +78,15 @@ def numbers(scene: SceneView, index: int, node: DepthNode) -> Numbers:
     errors = {"median": node.residuals.median_m, "rms": node.residuals.rms_m}
     values |= {name: number(error_m, 1, "cm", 100.0) for name, error_m in errors.items()}
     return {SCENE: f"{scene.title}, {node.name}", **values}
+
+
+def statement(values: Mapping[str, str]) -> str:
+    """Return what the pictures and the points show, for screen readers."""
+    return (
+        f"{values[SCENE]}: {values['no_depth']} of the picture has no measured depth. The inferred depth is "
+        f"{values['rms']} off where the sensor measured (RMS); it fills {values['let_in']} of the pixels "
+        "without depth."
+    )
+
+
+KIND = Kind("depth", SETTINGS, DepthLook(), NUMBERS, statement)

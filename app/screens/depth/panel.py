@@ -12,11 +12,11 @@ from app.compute.records import DepthNode, DepthView, Sample, SceneView
 from app.compute.state import Spec, Step
 from app.drawing.clouds import add_sensor_cloud, clear
 from app.drawing.colors import INFERRED, LOSS, TARGET
-from app.lesson.files import Numbers, read_lesson
-from app.lesson.player import LessonFolder
+from app.lesson.files import Numbers
+from app.lesson.on_screen import ScreenLessons
 from app.screens.depth.hide import HideFolder
 from app.screens.depth.labels import COLORINGS, DRAWN, EVERYWHERE, HOLES, PICTURES
-from app.screens.depth.lesson import NUMBERS, SETTINGS, SHIPPED, DepthLook, numbers
+from app.screens.depth.lesson import KIND, SHIPPED, DepthLook, numbers
 from app.screens.depth.model import ModelFolder
 from app.screens.depth.numbers import confidence_table, depth_table, residual_figure, residual_table
 from app.screens.depth.settings import ADVANCED, CONFIDENCE_CONTROLS, FIRST, with_model
@@ -55,8 +55,8 @@ class DepthPanel(Panel):
         self._here, self._undrawn = False, True
         self._source, self._key = session.spec.source, session.spec.key("depth")
         gui.add_markdown(TEXT)
-        lesson = read_lesson(SHIPPED, SETTINGS, DepthLook(), NUMBERS)
-        self._lesson = LessonFolder(self.ui, lesson, self._take_look, self._lesson_numbers)
+        shipped = {STOP: SHIPPED}
+        self._lessons = ScreenLessons(self.ui, KIND, shipped, self._take_look, self._lesson_numbers)
         nodes = gui.add_dropdown("Node", ["node_00"], hint="Node whose images and numbers are shown below.")
         self._node = Awaited(self.ui, nodes, self._picked_node)
         self._area = CompareArea(self.ui, PICTURES, "photo", "sensor")
@@ -67,7 +67,8 @@ class DepthPanel(Panel):
         self.ui.when_changed(self._coloring, self._draw)
         self._numbers = gui.add_html(Markup(""))
         colors: dict[str, str] = {coloring: label for label, coloring in COLORINGS.items()}
-        self.in_address |= {STOP: self._lesson, "color": Picked(self._coloring, colors, self._draw)}
+        self.in_address |= self._lessons.in_address
+        self.in_address["color"] = Picked(self._coloring, colors, self._draw)
         self.in_address |= {"node": self._node, "pictures": self._area}
         self._build_folders()
 
@@ -192,7 +193,7 @@ class DepthPanel(Panel):
             self._residuals.content = residual_table(node)
             self._confidence_table.content = confidence_table(node)
             self._histogram.figure = residual_figure(node.residuals)
-            self._lesson.refresh()
+            self._lessons.refresh()
 
     # The folders.
 

@@ -2,14 +2,12 @@
 // turned view turns every lane about its own middle, and no lane reaches into another one's window.
 window.packetmeshLanes = (() => {
   const NODE = "/fuse/race/lane"; // draw.py
-  const POLL_MS = 100;
   const POINTED = ["pointermove", "pointerdown", "pointerup", "pointercancel", "click", "dblclick", "contextmenu"];
 
   let count = 0; // lanes that are drawn; none without a race
   let band = [0, 0, 1];
   const hooked = new WeakSet(); // objects of lanes that already move to their window
   let held = null; // the lane in which a drag began
-  let waiting = 0; // timer that looks for viser's scene
 
   const canvas = () => document.querySelector("canvas[data-engine]");
 
@@ -68,13 +66,7 @@ window.packetmeshLanes = (() => {
       });
   }
 
-  function watch() {
-    clearTimeout(waiting);
-    const viewer = window.__viserMutable;
-    if (!viewer?.scene) return void (waiting = setTimeout(watch, POLL_MS));
-    viewer.scene.onBeforeRender = hookAll;
-    viewer.requestRender?.();
-  }
+  window.packetmeshFrames.before(hookAll);
 
   // What is pointed at in a window is where that window's lane has it in the scene.
   function shiftPointer(event) {
@@ -96,6 +88,6 @@ window.packetmeshLanes = (() => {
   return {show(lanes, edges) {
     [count, band] = [lanes, edges];
     held = null;
-    watch();
+    window.packetmeshFrames.draw();
   }};
 })();

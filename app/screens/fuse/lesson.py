@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from app.lesson.files import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, quantity, sets, short
-from app.screens.fuse.labels import DIRECTIONS, MODES, MOST_LANES, RIVALS, STARTS
+from app.lesson.files import LESSONS, NUMBER, SCENE, Kind, Numbers, Setting, choice, quantity, sets, short
+from app.screens.fuse.labels import DIRECTIONS, MODES, MOST_LANES, RIVAL_NAMES, RIVALS, STARTS
 from app.screens.fuse.view import Race, RaceView, Rival, Start
 from app.window.tables import UNKNOWN, number
 
@@ -90,7 +90,7 @@ SETTINGS: dict[str, Setting[RaceLook]] = {
 """The settings of a stop, by their names in the file."""
 
 
-PER_LANE = ("end", "iterations", "time", "rmse", "verdict")
+PER_LANE = ("name", "end", "iterations", "time", "rmse", "verdict")
 NUMBERS = (
     *(f"{name}_{lane}" for name in PER_LANE for lane in range(1, MOST_LANES + 1)),
     *("begin", "turn", "shift", "holes", "bias", "noise", "more", "others"),
@@ -104,6 +104,7 @@ def numbers(scene: str, race: Race, view: RaceView) -> Numbers:
     """Return the fields' values for a race; errors are from the reference position or the other cloud."""
     values = dict.fromkeys(NUMBERS, UNKNOWN)
     for place, lane in enumerate(view.lanes, 1):
+        values[f"name_{place}"] = RIVAL_NAMES[lane.rival].replace(",", "")
         values[f"end_{place}"] = number(lane.steps[-1].off_m, 2, "cm", 100.0)
         values[f"iterations_{place}"] = str(lane.iterations)
         values[f"time_{place}"] = number(lane.elapsed_s, 0, "ms", 1000.0)
@@ -141,3 +142,17 @@ def _which(one_m: float, other_m: float, words: tuple[str, str, str]) -> str:
     if abs(one_m - other_m) <= ALIKE_M:
         return words[1]
     return words[0] if one_m < other_m else words[2]
+
+
+def statement(values: Mapping[str, str]) -> str:
+    """Return where the lanes end, for screen readers."""
+    lanes = [lane for lane in range(1, MOST_LANES + 1) if values[f"name_{lane}"] != UNKNOWN]
+    verdicts = (re.split(r"[:;,]", values[f"verdict_{lane}"])[0] for lane in lanes)
+    ends = (
+        f"{values[f'name_{lane}']} ends {values[f'end_{lane}']} off ({verdict})"
+        for lane, verdict in zip(lanes, verdicts, strict=True)
+    )
+    return f"{values[SCENE]}, from {values['begin']} off: {', '.join(ends)}."
+
+
+KIND = Kind("fuse", SETTINGS, RaceLook(), NUMBERS, statement)

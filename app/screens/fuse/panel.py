@@ -13,8 +13,8 @@ from app.compute.records import DepthView
 from app.compute.state import Spec, Step
 from app.drawing.cameras import Stage, stage_of
 from app.drawing.clouds import clear
-from app.lesson.files import Numbers, read_lesson
-from app.lesson.player import LessonFolder
+from app.lesson.files import Numbers
+from app.lesson.on_screen import ScreenLessons
 from app.screens.fuse.board import Board
 from app.screens.fuse.capture import CaptureFolder
 from app.screens.fuse.charts import RaceCharts
@@ -22,7 +22,7 @@ from app.screens.fuse.draw import ROOM_STAGE, NodesDrawing, RaceDrawing, RaceFra
 from app.screens.fuse.export import race_offers
 from app.screens.fuse.gizmo import StartGizmo
 from app.screens.fuse.labels import ADVANCED, MARKS, RUNNING, SINGLE, TEXT
-from app.screens.fuse.lesson import NUMBERS, SETTINGS, SHIPPED, RaceLook, numbers
+from app.screens.fuse.lesson import KIND, SHIPPED, RaceLook, numbers
 from app.screens.fuse.numbers import places_table, race_table, winner
 from app.screens.fuse.place import moment_of, moment_text, race_of, race_text
 from app.screens.fuse.player import END, RacePlayer
@@ -71,8 +71,8 @@ class FusePanel(Panel):
         with self._shown.group(walk=False):
             gui.add_markdown(TEXT)
             self._single = gui.add_markdown(SINGLE, visible=False)
-            lesson = read_lesson(SHIPPED, SETTINGS, RaceLook(), NUMBERS)
-            self._lesson = LessonFolder(self.ui, lesson, self._take_stop, self._lesson_numbers)
+            shipped = {STOP: SHIPPED}
+            self._lessons = ScreenLessons(self.ui, KIND, shipped, self._take_stop, self._lesson_numbers)
         with self._shown.group(walk=True):
             self._walk.add_lesson()
         self._shown.add()
@@ -81,7 +81,7 @@ class FusePanel(Panel):
         with self._shown.group(walk=True):
             self._walk.add_controls()
         self._shown.expect(walk=isinstance(self.session.spec.source, Recorded))
-        self.in_address |= {STOP: self._lesson, f"{STOP}-walk": self._walk.lesson, "show": self._shown}
+        self.in_address |= self._lessons.in_address | self._walk.lessons.in_address | {"show": self._shown}
         self.in_address["race"] = CallbackState(self._race_text, self._take_race_text)
         self.in_address["t"] = CallbackState(self._moment, self._take_moment)
         self.in_address |= self._walk.in_address
@@ -306,7 +306,7 @@ class FusePanel(Panel):
             self._player.seek_at(self._seek_at)
             self._seek_at = 0.0
             self._arrange()
-            self._lesson.refresh()
+            self._lessons.refresh()
 
     def _show_parts(self) -> None:
         """Show the board and dock of the race, or the dock of the walk, while it is shown."""
@@ -380,9 +380,7 @@ class FusePanel(Panel):
     def _arrange(self) -> None:
         """Show the walk, the race, or the nodes at their poses before or after registration."""
         racing, walking = self._racing, self._shown.walking
-        other = self._lesson if walking else self._walk.lesson
-        if other.place():
-            other.take("")
+        (self._lessons if walking else self._walk.lessons).leave()
         self._show_parts()
         shown = {"/fuse/race": racing, BELOW: walking, "/fuse/result": not (racing or walking)}
         for name, visible in shown.items():

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
-from app.lesson.files import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, sets
+from app.lesson.files import LESSONS, NUMBER, SCENE, Kind, Numbers, Setting, choice, sets
 from app.screens.fuse.walk_numbers import loop_name
 from app.screens.fuse.walk_view import WalkView
 from app.window.tables import UNKNOWN, WAITING, number
@@ -116,3 +117,14 @@ def _surface_numbers(surface: Any) -> dict[str, str]:
         "missed": number(surface.after.quality.no_hit_ray_share, 1, "%", 100.0),
         "missed_before": number(surface.before.quality.no_hit_ray_share, 1, "%", 100.0),
     }
+
+
+def statement(values: Mapping[str, str]) -> str:
+    """Return how tracking went, for screen readers."""
+    return (
+        f"{values[SCENE]}: {values['frames']} frames in {values['seconds']}, {values['lost']} of them lost. "
+        f"Tracking alone drifts by at most {values['drift']}; {values['loops']} loops correct it."
+    )
+
+
+KIND = Kind("walk", SETTINGS, WalkLook(), NUMBERS, statement)

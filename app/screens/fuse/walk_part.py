@@ -12,15 +12,15 @@ import viser
 
 from app.dock.dock import Dock
 from app.drawing.clouds import clear
-from app.lesson.files import Numbers, read_lesson
-from app.lesson.player import LessonFolder
+from app.lesson.files import Numbers
+from app.lesson.on_screen import ScreenLessons
 from app.screens.fuse.walk_draw import COLORS, WalkDrawing, enlarging
 from app.screens.fuse.walk_lane import WalkLane, drift_lane
-from app.screens.fuse.walk_lesson import NUMBERS, SETTINGS, SHIPPED, WalkLook, frame_of, loop_of, numbers
+from app.screens.fuse.walk_lesson import KIND, SHIPPED, WalkLook, frame_of, loop_of, numbers
 from app.screens.fuse.walk_numbers import legend_html, loop_html, loop_name, moment_html, walk_table
 from app.screens.fuse.walk_view import NO_PICTURES, Pictures, WalkView
 from app.web.markup import Markdown, Markup
-from app.window.in_address import CallbackState, InAddress
+from app.window.in_address import STOP, CallbackState, InAddress
 from app.window.panel import PanelSession
 from packetmesh.errors import InputError
 
@@ -63,8 +63,8 @@ class WalkPart:
 
     def add_lesson(self) -> None:
         """Add the lesson and the text."""
-        lesson = read_lesson(SHIPPED, SETTINGS, WalkLook(), NUMBERS)
-        self.lesson = LessonFolder(self._ui, lesson, self._take_look, self._numbers)
+        shipped = {f"{STOP}-walk": SHIPPED}
+        self.lessons = ScreenLessons(self._ui, KIND, shipped, self._take_look, self._numbers)
         self._text = self._ui.gui.add_markdown(TEXT)
 
     def add_controls(self) -> None:
@@ -145,7 +145,7 @@ class WalkPart:
             return
         with self._ui.atomic():
             self._load(view)
-            self.lesson.refresh()
+            self.lessons.refresh()
         if self._visible:
             self._session.frame_view()
         self._read_pictures(view)

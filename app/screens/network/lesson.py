@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from app.dock.dock import time_text
-from app.lesson.files import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, quantity, sets
+from app.lesson.files import LESSONS, NUMBER, SCENE, Kind, Numbers, Setting, choice, quantity, sets
 from app.screens.network.delivery_view import DeliveryView, MomentView
 from app.screens.network.labels import ACCESS, CAUSES, CODINGS, NETWORKS, SCHEMES
 from app.screens.network.numbers import verdict
@@ -138,7 +139,8 @@ NUMBERS = (
         "frame_time",
         "least",
     ),
-    *("tries", "collisions", "lost", "last", "bytes_time", "radio", "energy", "other", "worst", "verdict"),
+    *("tries", "collisions", "lost", "last", "bytes_time", "radio", "energy", "other", "worst_camera"),
+    *("worst_depth", "verdict"),
     *("relayed", "crossings"),
     *SHARES,
     "cost",
@@ -175,7 +177,7 @@ def numbers(scene: str, view: DeliveryView, frames: Frames) -> Numbers:
         "radio": number(end.radio_j, 1, "J"),
         "energy": number(end.energy_j, 1, "J"),
         "other": number(end.energy_j - end.radio_j, 1, "J"),
-        "worst": _worst(view, end),
+        **_worst(view, end),
         "cost": _cost(view, end),
     }
 
@@ -209,12 +211,12 @@ def _frame_numbers(view: DeliveryView, frames: Frames) -> dict[str, str]:
     }
 
 
-def _worst(view: DeliveryView, end: MomentView) -> str:
-    """Return a sentence on the camera with the least depth."""
+def _worst(view: DeliveryView, end: MomentView) -> dict[str, str]:
+    """Return the camera with the least depth, and the share of its depth that arrived."""
     name, node = min(
         zip((one.name for one in view.nodes), end.nodes, strict=True), key=lambda one: one[1].depth_share
     )
-    return f"Of the pixels that {name} measured, {number(node.depth_share, 1, '%', 100.0)} arrived."
+    return {"worst_camera": name, "worst_depth": number(node.depth_share, 1, "%", 100.0)}
 
 
 def _cost(view: DeliveryView, end: MomentView) -> str:
@@ -229,3 +231,18 @@ def _cost(view: DeliveryView, end: MomentView) -> str:
 def street_numbers(scene: str, runs: tuple[NetworkView, ...]) -> Numbers:
     """Return the fields' values for runs on streets."""
     return {**dict.fromkeys(NUMBERS, UNKNOWN), SCENE: scene, "verdict": verdict(runs)}
+
+
+def statement(values: Mapping[str, str]) -> str:
+    """Return what the delivery brought, for screen readers."""
+    if values["arrived"] == UNKNOWN:
+        return "" if values["verdict"] == UNKNOWN else values["verdict"]
+    lossless = f", and {values['missed_lossless']} where nothing is lost"
+    return (
+        f"{values[SCENE]}: {values['arrived']} of {values['megabytes']} arrive, the last after "
+        f"{values['last']}. {values['missed']} of the rays are without a surface"
+        f"{'' if values['missed_lossless'] == UNKNOWN else lossless}."
+    )
+
+
+KIND = Kind("network", SETTINGS, NetworkLook(), NUMBERS, statement)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import time
 from dataclasses import replace
-from functools import partial
 from typing import Any, ClassVar
 
 from app.compute.state import Spec, Step
@@ -13,8 +12,8 @@ from app.dock.dock import Dock
 from app.drawing.cameras import turn
 from app.drawing.clouds import clear
 from app.drawing.timeline import Lane
-from app.lesson.files import Numbers, read_lesson
-from app.lesson.player import LessonFolder
+from app.lesson.files import Numbers
+from app.lesson.on_screen import ScreenLessons
 from app.screens.network.delivery_draw import DeliveryDrawing
 from app.screens.network.delivery_numbers import (
     changes,
@@ -31,16 +30,7 @@ from app.screens.network.export import delivery_offers, network_offers
 from app.screens.network.inspector import Inspector
 from app.screens.network.labels import NETWORKS, ORIGIN, RUNNING, STREET_TEXT, TEXT, WALK_TEXT
 from app.screens.network.lanes import lanes_of, stops_ns
-from app.screens.network.lesson import (
-    CROSSING,
-    LOST_PACKET,
-    NUMBERS,
-    SETTINGS,
-    NetworkLook,
-    find,
-    numbers,
-    street_numbers,
-)
+from app.screens.network.lesson import CROSSING, KIND, LOST_PACKET, NetworkLook, find, numbers, street_numbers
 from app.screens.network.measures import MomentMeasures
 from app.screens.network.numbers import metric_tables, runs_summary, verdict
 from app.screens.network.packets import Frames, legend_html
@@ -92,10 +82,7 @@ class NetworkPanel(Panel):
         """The moment that an address asks for, until its run is there."""
         self._text = gui.add_markdown(TEXT)
         self._difference = gui.add_markdown(Markdown(""))
-        self._lessons = {}
-        for key, path in LESSONS.items():
-            lesson = read_lesson(path, SETTINGS, NetworkLook(), NUMBERS)
-            self._lessons[key] = LessonFolder(ui, lesson, partial(self._take_look, key), self._lesson_numbers)
+        self._lessons = ScreenLessons(ui, KIND, LESSONS, self._take_look, self._lesson_numbers)
         self._setup = NetworkSetup(ui, self._resting.restart)
         self._about = gui.add_markdown(Markdown(""))
         self._status = gui.add_markdown(Markdown("Nothing is sent yet."))
@@ -111,7 +98,7 @@ class NetworkPanel(Panel):
         with gui.add_folder("Advanced", expand_by_default=False):
             self._setup.add_advanced()
         self._dock = Dock(ui, self._moved, self._inspector.pick)
-        self.in_address |= self._lessons | {"measure": self._measures}
+        self.in_address |= self._lessons.in_address | {"measure": self._measures}
         self.in_address["net"] = CallbackState(self._setup.place, self._take_place)
         self.in_address["t"] = CallbackState(self._moment, self._take_moment)
 
@@ -167,8 +154,7 @@ class NetworkPanel(Panel):
             else:
                 self._take_delivery(view)
         self._streaming = False
-        for lesson in self._lessons.values():
-            lesson.refresh()
+        self._lessons.refresh()
         self.session.frame_view()
 
     def on_failure(self, step: Step, sentence: str) -> None:
@@ -310,11 +296,8 @@ class NetworkPanel(Panel):
             self._dock.seek(self._first_ns() if self._requested_ns is None else self._requested_ns)
             self._requested_ns = None
 
-    def _take_look(self, lesson: str, look: NetworkLook) -> None:
+    def _take_look(self, look: NetworkLook) -> None:
         """Send as a stop of a lesson sets; its place is shown when the frames are there."""
-        for key, other in self._lessons.items():
-            if key != lesson and other.place():
-                other.take("")
         with self.ui.atomic():
             self._setup.take(look)
         self._look = look

@@ -12,6 +12,7 @@ from app.compute.records import SceneView
 from app.compute.state import Spec, Step
 from app.drawing.cameras import add_camera
 from app.drawing.clouds import add_sensor_cloud, clear
+from app.looking.folder import LookFolder
 from app.measuring.folder import MeasureFolder
 from app.screens.scene.own import OwnFolder
 from app.screens.scene.recording import ReadRecording
@@ -72,8 +73,9 @@ class ScenePanel(Panel):
         self._measures = MeasureFolder(
             self.session, "/scene/measures", "scene.measure_job:measure_job", without=("Hole", "Box")
         )
-        self.in_address["measure"] = self._measures
-        self.ui.when_clicked(self.drawn_below, self._measures.clicked)
+        self._looking = LookFolder(self.session, self.drawn_below, surface=False)
+        self.in_address |= {"measure": self._measures, "look": self._looking}
+        self.ui.when_clicked(self.drawn_below, self._looking.seen(self._measures.clicked))
         self._notes = gui.add_markdown(Markdown(""))
         self._color = gui.add_image(EMPTY, label="Colour image")
         self._depth = gui.add_image(EMPTY, label="Sensor depth", format="png")
@@ -81,6 +83,7 @@ class ScenePanel(Panel):
 
     def on_spec(self, spec: Spec) -> None:
         """Show the current preset and scene."""
+        self._looking.on_spec()
         self._preset.value = spec.preset
         title = _title(spec)
         if title not in self._demo.options:
@@ -107,6 +110,7 @@ class ScenePanel(Panel):
             if names != self._node.options:
                 self._node.options = names
             self._measures.load()
+            self._looking.redraw()
         self.session.frame_view(anew=True)
         self._show_node()
 

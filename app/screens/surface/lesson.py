@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias, get_args
 
 from app.compute.records import MeshView
-from app.lesson.files import LESSONS, NUMBER, SCENE, Numbers, Setting, choice, sets, short
+from app.lesson.files import LESSONS, NUMBER, SCENE, Kind, Numbers, Setting, choice, sets, short
 from app.screens.surface.labels import AFTER, COLORINGS, RULES, SHOWN
 from app.screens.surface.view import BaselineName, BaselineView, Coloring, SurfaceView
 from app.window.tables import UNKNOWN, number
@@ -109,6 +109,20 @@ def numbers(scene: str, view: SurfaceView, baselines: Mapping[BaselineName, Base
     values |= {name: number(length_m, 0, "mm", 1000.0) for name, length_m in lengths.items()}
     values["better"] = UNKNOWN if poisson is None else _better(view.after, poisson.mesh)
     return {**values, "hole_area": number(view.after.quality.hole_area_m2, 3, "m²")}
+
+
+def statement(values: Mapping[str, str]) -> str:
+    """Return what fusion does to the surface, for screen readers."""
+    if UNKNOWN in (values["missed_before"], values["missed"]):
+        return ""
+    scores = f" The F-score is {values['f_score_before']} before and {values['f_score']} after."
+    return (
+        f"{values[SCENE]}: before fusion {values['missed_before']} of the rays are without a surface, after "
+        f"it {values['missed']}." + ("" if values["f_score"] == UNKNOWN else scores)
+    )
+
+
+KIND = Kind("surface", SETTINGS, SurfaceLook(), NUMBERS, statement)
 
 
 def _better(ball: MeshView, poisson: MeshView) -> str:

@@ -8,21 +8,22 @@ from typing import Any, ClassVar
 from app.compute.records import SceneView
 from app.compute.state import Spec, Step
 from app.drawing.cameras import stage_of
-from app.lesson.files import Numbers, read_lesson
-from app.lesson.player import LessonFolder
+from app.lesson.files import Numbers
+from app.lesson.on_screen import ScreenLessons
+from app.looking.folder import LookFolder
 from app.screens.surface import labels
 from app.screens.surface.advice import AdviceFolder
 from app.screens.surface.baselines import Baselines
 from app.screens.surface.export import measure_offers, surface_offers
 from app.screens.surface.frames import FramesSlider
 from app.screens.surface.holes import HolesFolder
-from app.screens.surface.lesson import NUMBERS, SETTINGS, SHIPPED, SurfaceLook, numbers, surface_of
+from app.screens.surface.lesson import KIND, SHIPPED, SurfaceLook, numbers, surface_of
 from app.screens.surface.measures import SurfaceMeasures
 from app.screens.surface.numbers import quality_table, quick_line
 from app.screens.surface.quick import QuickLook
 from app.screens.surface.rolling import Walks
 from app.screens.surface.settings import ADVANCED, STEP_MM, on_slider_mm, picked, slider_range_mm, with_rule
-from app.screens.surface.stage import ChosenBall, SurfaceStage
+from app.screens.surface.stage import PARTS, ChosenBall, SurfaceStage
 from app.screens.surface.sweep_plot import spacing_figure
 from app.screens.surface.view import (
     BaselineName,
@@ -49,25 +50,23 @@ class SurfacePanel(Panel):
 
     def build(self) -> None:
         """Add radius, rule, drawing choices, histogram and quality."""
-        gui, session = self.gui, self.session
+        gui, session, hints = self.gui, self.session, labels.HINTS
         self._view: SurfaceView | None = None
         self._look: SurfaceLook | None = None
         self._quick_line = Markup("")
         self._by_click = self._quickly_drawn = False
         self._key = session.spec.key("surface")
         gui.add_markdown(labels.TEXT)
-        lesson = read_lesson(SHIPPED, SETTINGS, SurfaceLook(), NUMBERS)
-        self._lesson = LessonFolder(self.ui, lesson, self._take_look, self._lesson_numbers)
-        self._radius = gui.add_slider("Radius (mm)", 1.0, 120.0, STEP_MM, 20.0, hint=labels.HINTS["Radius"])
+        shipped = {STOP: SHIPPED}
+        self._lessons = ScreenLessons(self.ui, KIND, shipped, self._take_look, self._lesson_numbers)
+        self._radius = gui.add_slider("Radius (mm)", 1.0, 120.0, STEP_MM, 20.0, hint=hints["Radius"])
         self.ui.when_changed(self._radius, self._dragged)
         self._frames = FramesSlider(session)
         rule = labels.RULE_NAMES[session.spec.config.surface.radius_rule]
-        self._rule = gui.add_dropdown(
-            "Radii", list(labels.RULES), initial_value=rule, hint=labels.HINTS["Radii"]
-        )
+        self._rule = gui.add_dropdown("Radii", list(labels.RULES), initial_value=rule, hint=hints["Radii"])
         self.ui.when_changed(self._rule, self._picked_rule)
-        self._shown = gui.add_dropdown("Show", list(labels.SHOWN), hint=labels.HINTS["Show"])
-        self._coloring = gui.add_dropdown("Colours", list(labels.COLORINGS), hint=labels.HINTS["Colours"])
+        self._shown = gui.add_dropdown("Show", list(labels.SHOWN), hint=hints["Show"])
+        self._coloring = gui.add_dropdown("Colours", list(labels.COLORINGS), hint=hints["Colours"])
         self._legend = gui.add_html(labels.legend_html("photo", False))
         self._loops = gui.add_checkbox("Hole rims", True, hint="Edges with one triangle only, in red.")
         self._unused = gui.add_checkbox("Points left out", True, hint="Points that the ball never rested on.")
@@ -77,15 +76,17 @@ class SurfacePanel(Panel):
             self.ui.when_changed(shown, self._arrange)
         self._stage = SurfaceStage(self.scene)
         self._measures = SurfaceMeasures(session)
+        self._looking = LookFolder(session, self.drawn_below, PARTS)
         self._quick = gui.add_html(Markup(""))
         self._table = gui.add_html(Markup(""))
         self._histogram = gui.add_plotly(spacing_figure(None), aspect=0.62, config={"displayModeBar": False})
         self._build_folders()
-        self.in_address |= {STOP: self._lesson, "ball": self._walks.folder, "measure": self._measures}
+        self.in_address |= self._lessons.in_address
+        self.in_address |= {"ball": self._walks.folder, "measure": self._measures, "look": self._looking}
         self.in_address |= picked(self._shown, self._picked_shown, self._coloring, self._picked_coloring)
         self._ball = ChosenBall(session, self._stage)
         self._baselines = Baselines(session, self._stage, self._quick, self._made)
-        self.ui.when_clicked(self.drawn_below, self._clicked)
+        self.ui.when_clicked(self.drawn_below, self._looking.seen(self._clicked))
 
     def _build_folders(self) -> None:
         gui, session = self.gui, self.session
@@ -120,6 +121,7 @@ class SurfacePanel(Panel):
         if spec.key("surface") == self._key:
             return
         self._key = spec.key("surface")
+        self._looking.on_spec()
         self._controls.write(spec.config)
         self._frames.write(spec.config)
         self._rule.value = labels.RULE_NAMES[spec.config.surface.radius_rule]
@@ -138,6 +140,7 @@ class SurfacePanel(Panel):
             self._holes.forget()
         if step == "scene":
             self._ball.forget()
+            self._looking.redraw()
             self._frames.show(view.averaged)
         if step == "surface":
             self.on_partial(view)
@@ -209,7 +212,7 @@ class SurfacePanel(Panel):
                 self._holes.parts(view.parts)
                 self._load_holes()
             self._show_look()
-            self._lesson.refresh()
+            self._lessons.refresh()
             if labels.BASELINES.get(self._shown.value) not in (None, *self._baselines.views):
                 self._picked_shown()  # the address asked for a baseline before there was a surface
             self._walks.folder.resume()
@@ -217,7 +220,7 @@ class SurfacePanel(Panel):
     def _show_numbers(self) -> None:
         if self._view is not None:
             self._table.content = quality_table(self._view, self._baselines.views.values(), self._has_truth())
-            self._lesson.refresh()
+            self._lessons.refresh()
 
     def _repaint(self) -> None:
         """Request the surfaces of the settings in the chosen colours."""

@@ -17,6 +17,8 @@ from app.screens.surface.view import PaintedMesh, PaintRequest, Ray, UnusedView,
 from app.window.panel import PanelSession
 from pipeline.types import FloatArray
 
+PARTS = ("/surface/after", "/surface/before", "/surface/baseline")
+"""Nodes of the surfaces, which may stand side by side."""
 BALL_OPACITY = 0.55
 APART = 0.63
 """Distance of each of two surfaces from the middle over the scene's width: perspective widens the parts
@@ -29,11 +31,11 @@ class SurfaceStage:
     def __init__(self, scene: viser.SceneApi) -> None:
         """Draw below "/surface"."""
         self._drawings: dict[Which, SurfaceDrawing] = {
-            "after": SurfaceDrawing(scene, "/surface/after", AFTER),
-            "before": SurfaceDrawing(scene, "/surface/before", BEFORE.partition(" (")[0]),
+            "after": SurfaceDrawing(scene, PARTS[0], AFTER),
+            "before": SurfaceDrawing(scene, PARTS[1], BEFORE.partition(" (")[0]),
         }
         self._drawn: dict[Which, MeshView | PaintedMesh] = {}
-        self._baseline = SurfaceDrawing(scene, "/surface/baseline", "baseline")
+        self._baseline = SurfaceDrawing(scene, PARTS[2], "baseline")
         self._ball = scene.add_icosphere(
             "/surface/ball",
             0.02,

@@ -22,11 +22,11 @@ def unused_view(cloud: PointCloud, surface: Surface, size_m: float, most: int = 
 
     Args:
         cloud: the cloud over which the ball rolled.
-        surface: its vertices are points of the cloud.
+        surface: the surface that the ball made of the cloud.
         size_m: size of a point on the screen.
         most: largest number of points; more are thinned evenly.
     """
-    rows = np.flatnonzero(_unused(cloud.points_m, surface.vertices_m))
+    rows = np.flatnonzero(_unused(cloud.points_m, surface))
     rows = rows[:: max(1, -(-len(rows) // most))]
     points_m = cloud.points_m[rows].astype(np.float32)
     inferred = np.zeros(len(rows), bool)
@@ -35,16 +35,12 @@ def unused_view(cloud: PointCloud, surface: Surface, size_m: float, most: int = 
     return UnusedView(points_m[~inferred], points_m[inferred], size_m)
 
 
-def _unused(points_m: FloatArray, vertices_m: FloatArray) -> BoolArray:
+def _unused(points_m: FloatArray, surface: Surface) -> BoolArray:
     """Return (N,) True for points that are no vertex; True for all if nearly none is one."""
-    if len(vertices_m) < NEARLY_NOTHING * len(points_m):
-        return np.ones(len(points_m), bool)
-    return ~np.isin(_keys(points_m), _keys(vertices_m))
-
-
-def _keys(points_m: FloatArray) -> np.ndarray:
-    """Return (N,) one value per point, equal for equal points only."""
-    return np.ascontiguousarray(points_m, float).view([("x", float), ("y", float), ("z", float)])[:, 0]
+    unused = np.ones(len(points_m), bool)
+    if surface.rows is not None and len(surface.rows) >= NEARLY_NOTHING * len(points_m):
+        unused[surface.rows] = False
+    return unused
 
 
 def resting_ball_m(cloud: PointCloud, ray: Ray, radius_m: float) -> FloatArray | None:

@@ -10,8 +10,10 @@ from markdown_it import MarkdownIt
 
 from app.compute import jobs
 from app.compute.state import CHAIN, Spec
-from app.lesson.files import CLAUSE, FIELD, LESSONS, SCENE, read_lesson, settled
-from app.lesson.player import BEGIN, COMPUTING, FIRST, OFF, SKIP, SKIPPED, LessonFolder, question_paragraphs
+from app.lesson.files import CLAUSE, FIELD, SCENE, Kind, settled
+from app.lesson.languages import PHRASES
+from app.lesson.player import OFF, SKIP, SKIPPED, LessonFolder, question_paragraphs
+from app.lesson.reading import read_lesson
 from app.screens.calibrate import lesson as calibrate
 from app.screens.depth import lesson as depth
 from app.screens.fuse import lesson as fuse
@@ -26,6 +28,9 @@ from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.sources import Demo
 from tests.app.fakes import page_calls, ui_of
+
+ENGLISH = PHRASES["en"]
+BEGIN, COMPUTING, FIRST = ENGLISH.begin, ENGLISH.computing, ENGLISH.first
 
 ASKED = """# A
 ## One
@@ -43,37 +48,39 @@ The sea.
 """
 
 
+def kind_of(*numbers):
+    """A screen that sets what the race sets, and computes these numbers."""
+    return Kind("fuse", SETTINGS, RaceLook(), numbers)
+
+
 def lesson(tmp_path, text):
     path = tmp_path / "lesson.md"
     path.write_text(text)
-    return read_lesson(path, SETTINGS, RaceLook())
+    return read_lesson(path, kind_of())
 
 
 def test_the_stops_of_the_lesson_that_ships_have_different_titles_and_text():
-    shipped = read_lesson(SHIPPED, SETTINGS, RaceLook(), fuse.NUMBERS)
+    shipped = read_lesson(SHIPPED, fuse.KIND)
     assert len({stop.title for stop in shipped.stops}) == len(shipped.stops) > 1
     assert all("set:" not in stop.text and len(stop.text) > 100 for stop in shipped.stops)
     assert {stop.look.race.mode for stop in shipped.stops} == {*get_args(RaceMode)}
     assert any(stop.look.in_ms for stop in shipped.stops)
 
 
-@pytest.mark.parametrize(
-    ("path", "numbers", "settings", "look"),
-    [
-        (calibrate.SHIPPED, calibrate.NUMBERS, calibrate.SETTINGS, calibrate.CalibrateLook()),
-        (depth.SHIPPED, depth.NUMBERS, depth.SETTINGS, depth.DepthLook()),
-        (surface.SHIPPED, surface.NUMBERS, surface.SETTINGS, surface.SurfaceLook()),
-        (network.CROSSING, network.NUMBERS, network.SETTINGS, network.NetworkLook()),
-        (network.LOST_PACKET, network.NUMBERS, network.SETTINGS, network.NetworkLook()),
-        (SHIPPED, fuse.NUMBERS, SETTINGS, RaceLook()),
-        (walk.SHIPPED, walk.NUMBERS, walk.SETTINGS, walk.WalkLook()),
-    ],
-    ids=lambda value: getattr(value, "stem", ""),
-)
-def test_every_stop_that_ships_differs_and_asks_what_cannot_be_guessed_by_its_place(
-    path, numbers, settings, look
-):
-    shipped = read_lesson(path, settings, look, numbers)
+KINDS = {
+    calibrate.SHIPPED: calibrate.KIND,
+    depth.SHIPPED: depth.KIND,
+    surface.SHIPPED: surface.KIND,
+    network.CROSSING: network.KIND,
+    network.LOST_PACKET: network.KIND,
+    SHIPPED: fuse.KIND,
+    walk.SHIPPED: walk.KIND,
+}
+
+
+@pytest.mark.parametrize("path", KINDS, ids=lambda path: path.stem)
+def test_every_stop_that_ships_differs_and_asks_what_cannot_be_guessed_by_its_place(path):
+    shipped = read_lesson(path, KINDS[path])
     assert len({stop.title for stop in shipped.stops}) == len(shipped.stops) >= 5
     assert len({stop.look for stop in shipped.stops}) == len(shipped.stops)
     rights = []
@@ -127,7 +134,7 @@ def test_a_lesson_file_holds_markdown_and_no_tags(tmp_path):
     ui = ui_of()
     numbers = {"number": "<b>*3*</b>", SCENE: ""}
     (tmp_path / "lesson.md").write_text(text)
-    read = read_lesson(tmp_path / "lesson.md", SETTINGS, RaceLook(), ("number",))
+    read = read_lesson(tmp_path / "lesson.md", kind_of("number"))
     LessonFolder(ui, read, lambda look: None, lambda: numbers)
     ui.gui.press("Go", "Next")
     (shown,) = [one.content for one in ui.gui.handles if one.kind == "add_markdown"]
@@ -153,7 +160,7 @@ def test_a_lesson_file_holds_markdown_and_no_tags(tmp_path):
 def test_a_lesson_file_shows_no_images_and_leads_to_the_web_only(tmp_path, text):
     ui = ui_of()
     (tmp_path / "lesson.md").write_text(f"# A\n## One\n{text}\n\n[here](https://a.org/) and *there*\n")
-    read = read_lesson(tmp_path / "lesson.md", SETTINGS, RaceLook(), ("number",))
+    read = read_lesson(tmp_path / "lesson.md", kind_of("number"))
     LessonFolder(ui, read, lambda look: None, lambda: {"number": "", SCENE: ""})
     ui.gui.press("Go", "Next")
     (shown,) = [one.content for one in ui.gui.handles if one.kind == "add_markdown"]
@@ -186,9 +193,9 @@ PLAIN = (
 """Numbers that no scene changes: of formulas, standards and settings."""
 
 
-@pytest.mark.parametrize("path", sorted(LESSONS.glob("*.md")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", KINDS, ids=lambda path: path.stem)
 def test_no_lesson_holds_a_number_that_somebody_measured(path):
-    text = re.sub(r"^(set|open|see):.*$", "", path.read_text(), flags=re.MULTILINE)
+    text = re.sub(r"^(set|open|see|screen|scene):.*$", "", path.read_text(), flags=re.MULTILINE)
     assert FIELD.search(text)
     typed = re.sub(PLAIN, "", FIELD.sub("", CLAUSE.sub(r"\1", text)))
     assert [line for line in typed.splitlines() if re.search(r"\d", line)] == []
@@ -199,7 +206,7 @@ def test_no_lesson_holds_a_number_that_somebody_measured(path):
 def test_a_field_is_the_number_of_now_or_of_another_stop_in_the_same_scene(tmp_path):
     path = tmp_path / "lesson.md"
     path.write_text("# A\n## One\nNow {end}.\n## Two\nNow {end}{{, it was {1:end}}}.\n")
-    shipped, ui, shown = read_lesson(path, SETTINGS, RaceLook(), ("end",)), ui_of(), {}
+    shipped, ui, shown = read_lesson(path, kind_of("end")), ui_of(), {}
     folder = LessonFolder(ui, shipped, lambda look: shown.clear(), lambda: dict(shown))
     ui.gui.press("Go", "Next")
     assert "Now …." in ui.gui.text()
@@ -222,14 +229,14 @@ def test_a_field_that_nobody_computes_is_one_sentence(tmp_path, field):
     path = tmp_path / "lesson.md"
     path.write_text(f"# A\n## One\nx {field}\n## Two\ny")
     with pytest.raises(InputError, match="not a number of its screen; try one of end"):
-        read_lesson(path, SETTINGS, RaceLook(), ("end",))
+        read_lesson(path, kind_of("end"))
 
 
 def test_a_number_of_another_stop_stands_in_a_clause_that_can_be_left_out(tmp_path):
     path = tmp_path / "lesson.md"
     path.write_text("# A\n## One\nx\n## Two\nIt was {1:end}.")
     with pytest.raises(InputError, match="1:end outside of double braces"):
-        read_lesson(path, SETTINGS, RaceLook(), ("end",))
+        read_lesson(path, kind_of("end"))
 
 
 @pytest.mark.parametrize("scene", ["box-on-table", "office"])
@@ -255,9 +262,9 @@ def test_the_numbers_of_a_lesson_are_those_of_the_scene(scene, store):
     assert screen_numbers[fuse]["turn"] == "3°"
 
 
-def right_of(screen, path, look, name, numbers):
+def right_of(screen, path, name, numbers):
     """The choice that is marked right at the stop whose question is settled by that name."""
-    stops = read_lesson(path, screen.SETTINGS, look, screen.NUMBERS).stops
+    stops = read_lesson(path, screen.KIND).stops
     (asked,) = [stop.question for stop in stops if (stop.question.choices[0].when or [""])[0] == name]
     (right,) = [one.text for one in settled(asked, numbers).choices if not one.reason]
     return right
@@ -267,12 +274,12 @@ def right_of(screen, path, look, name, numbers):
 def test_the_choice_that_is_marked_right_is_so_by_the_numbers_of_the_scene(scene, store):
     spec = Spec(Demo(scene))
     views = {step: drain(jobs.run_step(step, store, spec)) for step in CHAIN}
-    stops = read_lesson(SHIPPED, SETTINGS, RaceLook(), fuse.NUMBERS).stops
+    stops = read_lesson(SHIPPED, fuse.KIND).stops
 
     def raced(name, title):
         race = next(stop.look.race for stop in stops if stop.title == title)
         view = drain(jobs.run("fuse.race_job:race_job", store, spec, race))
-        right = right_of(fuse, SHIPPED, RaceLook(), name, fuse.numbers(scene, race, view))
+        right = right_of(fuse, SHIPPED, name, fuse.numbers(scene, race, view))
         return [100.0 * lane.steps[-1].off_m for lane in view.lanes], right
 
     (_, plane_cm, weights_cm, _), right = raced("more", "Plane or point?")
@@ -282,7 +289,7 @@ def test_the_choice_that_is_marked_right_is_so_by_the_numbers_of_the_scene(scene
     assert ("close" in right) == (abs(min(ends_cm[:2]) - min(ends_cm[2:])) <= 0.5)
     poisson = drain(jobs.run("surface.baselines_job:baseline_job", store, spec, "poisson"))
     values = surface.numbers(scene, views["surface"], {"poisson": poisson})
-    right = right_of(surface, surface.SHIPPED, surface.SurfaceLook(), "better", values)
+    right = right_of(surface, surface.SHIPPED, "better", values)
     ball, other = (mesh.truth["f_score_5cm"] for mesh in (views["surface"].after, poisson.mesh))
     assert right.startswith("No" if ball >= other else "Yes")
 
@@ -291,7 +298,7 @@ def test_the_mark_of_a_choice_follows_what_is_computed(tmp_path):
     path = tmp_path / "lesson.md"
     text = ASKED.replace("- [ ] Red", "- [sky=red] Red").replace("- [ ] Grey", "- [sky=grey] Grey")
     path.write_text(text.replace("- [x] Blue.", "- [sky=blue] Blue. | by day."))
-    shipped, ui, shown = read_lesson(path, SETTINGS, RaceLook(), ("sky",)), ui_of(), {}
+    shipped, ui, shown = read_lesson(path, kind_of("sky")), ui_of(), {}
     folder = LessonFolder(ui, shipped, lambda look: None, lambda: dict(shown))
     ui.gui.press("Go", "Next")
     ui.gui.press("Your guess", "1")
@@ -353,12 +360,12 @@ def test_a_start_in_numbers_and_the_end(tmp_path):
     [
         ("## One\nx", "has no title"),
         ("# A\nx", "has no sections"),
-        ("# A\n## One\nset: noise = 1 cm\n", "section 'One', has no text"),
+        ("# A\n## One\nset: noise = 1 cm\n", "section 'One' has no text"),
         ("# A\n## One\nset: colour = red\nx", "cannot set colour = red: try one of mode"),
         ("# A\n## One\nset: methods = icp\nx", "cannot set methods = icp: try one of icp point"),
         ("# A\n## One\nset: methods = icp point, icp point, icp point, icp point, icp point\nx", "at most 4"),
         ("# A\n## One\nset: noise = much\nx", "try 0 to 10 cm"),
-        ("# A\n## One\nopen:\nx", "section 'One', opens nothing"),
+        ("# A\n## One\nopen:\nx", "section 'One' opens nothing"),
         ("# A\n## One\nset: holes = 95 %\nx", "try 0 to 80 %"),
         ("# A\n## One\nset: start = near\nx", "try one of aligned, slightly off, far off or for example"),
         ("# A\n## One\nset: position = -1\nx", "try start, end or the number"),
@@ -378,6 +385,7 @@ def test_a_start_in_numbers_and_the_end(tmp_path):
 def test_a_bad_lesson_is_one_sentence(tmp_path, text, sentence):
     with pytest.raises(InputError, match=sentence) as error:
         lesson(tmp_path, text)
+    assert re.match(r"The lesson lesson\.md, line \d+, ", str(error.value))
     assert "\n" not in str(error.value)
 
 
@@ -438,12 +446,12 @@ def test_a_missing_or_binary_lesson_is_one_sentence(tmp_path):
     (tmp_path / "binary.md").write_bytes(b"\xff\xfe\x00")
     for name in ("none.md", "binary.md"):
         with pytest.raises(InputError, match=f"{name} cannot be read"):
-            read_lesson(tmp_path / name, SETTINGS, RaceLook())
+            read_lesson(tmp_path / name, kind_of())
 
 
 def test_the_folder_begins_with_how_to_begin_and_goes_from_stop_to_stop():
     ui, shown = ui_of(), []
-    shipped = read_lesson(surface.SHIPPED, surface.SETTINGS, surface.SurfaceLook(), surface.NUMBERS)
+    shipped = read_lesson(surface.SHIPPED, surface.KIND)
     LessonFolder(ui, shipped, shown.append)
     stops, gui = shipped.stops, ui.gui
     assert gui.text() == BEGIN

@@ -7,6 +7,7 @@ from urllib.parse import urlsplit
 import cv2
 import numpy as np
 import pytest
+from viser import _messages as messages
 
 from app.lesson.files import Choice, Question
 from app.lesson.player import question_paragraphs, with_votes
@@ -141,6 +142,39 @@ def test_a_student_sees_what_the_teacher_sees_until_a_hand_turns_the_view(teache
     student.set("Seat", "2 follow")
     wait_for(lambda: student.positions[-1:] == [(7.0, 8.0, 9.0)])
     wait_for(lambda: teacher.reads("**1** of them follow"))
+
+
+def trigger(one, label):
+    """Choose an entry of the command palette."""
+    wait_for(lambda: label in one.commands)
+    one.send(messages.CommandTriggerMessage(one.commands[label]))
+
+
+def test_a_students_key_turns_only_the_own_view_which_then_stays(lecture, teacher, student):
+    wait_for(lambda: student.positions)
+    wait_for(lambda: lecture.sessions[-1].results.view("scene") is not None)
+    teacher.positions.clear()
+    trigger(student, "View from above")
+    wait_for(lambda: teacher.reads("**0** of them follow"))
+    wait_for(lambda: any(x * x + y * y < 100.0 and z > 1.0 for x, y, z in student.positions[-1:]))
+    above = student.positions[-1]
+    teacher.stand((4.0, 5.0, 7.0))
+    trigger(student, "Fit the view to the window")
+    wait_for(lambda: len(student.positions) > 1)
+    assert (4.0, 5.0, 7.0) not in student.positions
+    assert teacher.positions == []
+    assert above[2] > 1.0
+
+
+def test_a_student_cannot_choose_in_the_palette_what_is_the_teachers(lecture, teacher, student):
+    trigger(student, "Export")
+    student.set("Seat", "1 roam")  # comes after it
+    wait_for(lambda: teacher.reads("**0** of them follow"))
+    assert lecture.sessions[-1].current.title == "Scene"
+    trigger(teacher, "Export")
+    wait_for(lambda: lecture.sessions[-1].current.title == "Export")
+    trigger(teacher, "Scene")
+    wait_for(lambda: lecture.sessions[-1].current.title == "Scene")
 
 
 def test_what_no_page_says_is_not_heard(teacher, student):

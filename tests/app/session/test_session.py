@@ -101,3 +101,39 @@ def test_what_a_person_cancels_has_failed_until_it_is_asked_for_again(session, p
     session.post(session._act, "Retry")
     settle(session)
     assert len(pool.begun) == 2
+
+
+def commands(server):
+    """Descriptions and handles of the palette's entries, by label; of several the last."""
+    handles = server.gui._command_handle_from_uuid.values()
+    return {one.label: one for one in handles}
+
+
+def test_a_scene_is_opened_and_left_again_by_the_palette(session, server):
+    found = commands(server)
+    for label in ("Office", "Undo", "Redo"):
+        for action in found[label]._impl.trigger_cb:
+            action(None)
+        settle(session)
+        assert session.spec.source.name == {"Undo": START.source.name}.get(label, "office")
+
+
+def test_what_a_link_opens_is_the_first_state_and_cannot_be_undone(session):
+    session.post(session.places._go_to, replace(session.places._now(), spec=OTHER), [])
+    settle(session)
+    assert session.spec.source == OTHER.source
+    session.post(session.places._go_to, replace(session.places._now(), spec=START), [])
+    settle(session)
+    assert [session.palettes._history.undo() for _ in range(2)] == [
+        "Undone: scene.",
+        "There is nothing to undo.",
+    ]
+    assert session.spec.source == OTHER.source
+
+
+def test_controls_can_be_found_where_they_are(session, server):
+    session.palettes._refresh()
+    found = commands(server)
+    assert found["Preset"].description == "Setting on Scene"
+    assert found["Measure"].description == "Part of Scene"
+    assert "Stop" not in found

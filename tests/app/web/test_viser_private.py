@@ -110,3 +110,17 @@ def test_the_app_queues_with_it_to_all_and_to_each_browser(lecture):
             assert all(isinstance(buffer.message_event, AnyThreadEvent) for buffer in buffers)
     finally:
         app.stop()
+
+
+def test_controls_are_found_with_the_titles_around_them_unless_they_are_hidden(server):
+    gui = server.gui
+    with gui.add_folder(None) as screen:
+        gui.add_slider("Radius", 0, 1, 1, 0)
+        with gui.add_folder("Advanced"):
+            with gui.add_tab_group().add_tab("Noise"):
+                gui.add_checkbox("Average", False)
+            gui.add_checkbox("Gone", False, visible=False)
+        with gui.add_folder("Closed", visible=False):
+            gui.add_checkbox("Inside", False)
+    found = [(one.label, titles) for one, titles in viser_private.contents(screen) if hasattr(one, "label")]
+    assert found == [("Radius", ()), ("Advanced", ()), ("Average", ("Advanced", "Noise"))]

@@ -13,6 +13,7 @@ from pipeline.surface.ball_pivoting import reconstruct_surface
 from pipeline.surface.hole_diagnosis import GROWTH, explain_hole
 from pipeline.surface.holes import find_holes
 from pipeline.surface.ray_parts import View
+from pipeline.surface.rims import even_rims
 from pipeline.types import CameraIntrinsics, PointCloud, PointSource
 from tests.pipeline.surface.shapes import perforated_plane
 
@@ -276,6 +277,18 @@ def test_repeated_points_do_not_matter():
         for points in (cloud, PointCloud.concatenate([cloud, cloud]))
     )
     assert (once.reason, once.closing_radius_m) == (twice.reason, twice.closing_radius_m)
+
+
+@pytest.mark.parametrize("hole_radius_m", [0.025, 0.04])
+def test_a_hole_with_an_even_rim_has_the_same_cause(hole_radius_m):
+    """Its vertices have left the points of the cloud, and some of its edges no ball made."""
+    cloud = plane_with(hole_radius_m)
+    surface, (hole, _) = rolled(cloud)
+    even = even_rims(surface, np.full(len(surface.vertices_m), SPACING_M))
+    assert even.moved_m.max() > 0.1 * SPACING_M
+    (even_hole, _) = find_holes(even.surface.vertices_m, even.surface.triangles)
+    expected, found = explain_hole(hole, surface, cloud), explain_hole(even_hole, even.surface, cloud)
+    assert (found.reason, found.closing_radius_m) == (expected.reason, expected.closing_radius_m)
 
 
 def test_another_cloud_gets_its_sentence():

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from app.lesson.files import read_lesson
+from app.lesson.reading import read_lesson
 from app.screens.depth.hide_job import hidden_pixels
 from app.screens.depth.labels import EVERYWHERE
-from app.screens.depth.lesson import NUMBERS, SETTINGS, SHIPPED, DepthLook
+from app.screens.depth.lesson import KIND, SHIPPED, DepthLook
 from app.screens.depth.view import Disc, HideRequest
 from packetmesh.errors import InputError
 from pipeline.config import DepthConfig
@@ -18,7 +18,7 @@ from pipeline.io.demos import load_demo
 def lesson(tmp_path, text):
     path = tmp_path / "lesson.md"
     path.write_text(text)
-    return read_lesson(path, SETTINGS, DepthLook(), NUMBERS)
+    return read_lesson(path, KIND)
 
 
 def test_a_stop_sets_what_it_names_and_leaves_the_rest_as_the_screen_begins(tmp_path):
@@ -65,15 +65,13 @@ def test_to_hide_nothing_takes_back_what_was_to_be_hidden(tmp_path):
 def test_a_bad_setting_is_one_sentence(tmp_path, setting, sentence):
     with pytest.raises(InputError) as error:
         lesson(tmp_path, f"# A\n## One\nset: {setting}\nx")
-    assert str(error.value).startswith("The lesson lesson.md, section 'One', cannot set ")
+    assert str(error.value).startswith("The lesson lesson.md, line 3, section 'One' cannot set ")
     assert sentence in str(error.value)
     assert "\n" not in str(error.value)
 
 
 def look_at(title):
-    (stop,) = (
-        stop for stop in read_lesson(SHIPPED, SETTINGS, DepthLook(), NUMBERS).stops if stop.title == title
-    )
+    (stop,) = (stop for stop in read_lesson(SHIPPED, KIND).stops if stop.title == title)
     return stop.look
 
 

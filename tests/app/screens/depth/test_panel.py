@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.lesson.files import read_lesson
+from app.lesson.reading import read_lesson
 from app.screens.depth.brush import painted
 from app.screens.depth.hide import BUTTON
 from app.screens.depth.labels import COLORINGS, EVERYWHERE, FILLS, HOLES, PICTURES, UNSEEN
-from app.screens.depth.lesson import NUMBERS, SETTINGS, SHIPPED, DepthLook
+from app.screens.depth.lesson import KIND, SHIPPED
 from app.screens.depth.model import SHIPPED as SHIPPED_NETWORK
 from app.screens.depth.panel import DepthPanel
 from app.screens.depth.view import Disc
@@ -213,7 +213,7 @@ def test_discs_of_another_scene_are_cleared_and_those_of_other_settings_stay(ses
 
 def test_every_stop_of_the_lesson_sets_the_screen_as_it_says(session):
     gui = session.gui
-    for stop in read_lesson(SHIPPED, SETTINGS, DepthLook(), NUMBERS).stops:
+    for stop in read_lesson(SHIPPED, KIND).stops:
         look = stop.look
         gui.press("Go", "Next")
         gui.press("Your guess", "Skip")

@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from app.compute.state import Spec
-from app.lesson.files import read_lesson
+from app.lesson.reading import read_lesson
 from app.screens.fuse.board import score
-from app.screens.fuse.lesson import NUMBERS, SETTINGS, SHIPPED, RaceLook
+from app.screens.fuse.lesson import KIND, SHIPPED
 from app.screens.fuse.race_job import race_job
 from app.screens.fuse.rooms import ROOMS
 from app.screens.fuse.view import Start
@@ -20,7 +20,7 @@ from pipeline.sources import Demo
 SPEC = Spec(Demo("box-on-table"))
 RACES = {
     stop.look.race.mode: stop.look.race
-    for stop in read_lesson(SHIPPED, SETTINGS, RaceLook(), NUMBERS).stops
+    for stop in read_lesson(SHIPPED, KIND).stops
     if stop.look.race.mode in ROOMS
 }
 

@@ -14,14 +14,14 @@ import viser
 from app.compute.state import Results, Spec
 from app.dock.dock import time_text
 from app.drawing.colors import COVERAGE_STOPS, linear
-from app.lesson.files import read_lesson
+from app.lesson.reading import read_lesson
 from app.screens.network import setup
 from app.screens.network.delivery_draw import EMPTY, FULL
 from app.screens.network.delivery_numbers import legend, moment_table
 from app.screens.network.delivery_view import DeliveryView
 from app.screens.network.draw import STREET, ground_of
 from app.screens.network.labels import ANSWER, NETWORKS, ORIGIN, PICK
-from app.screens.network.lesson import CROSSING, LOST_PACKET, NUMBERS, SETTINGS, NetworkLook
+from app.screens.network.lesson import CROSSING, KIND, LOST_PACKET
 from app.screens.network.panel import NetworkPanel
 from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import What
@@ -112,7 +112,7 @@ def test_the_first_visit_sends_the_room(screen):
     assert [node.name for node in view.nodes] == ["node_00", "node_01", "node_02"]
     assert view.moments[-1].delivered_bytes == view.total_bytes
     assert {"node_00", "node_01", "node_02", "sink", "cloud", "client", "routes"} <= set(screen.names())
-    assert "3 cameras sent" in screen.gui.text()
+    assert "3 nodes sent" in screen.gui.text()
     assert "Rays without a surface" in screen.gui.text()
 
 
@@ -342,7 +342,7 @@ def test_every_stop_of_the_lessons_asks_for_a_network_that_there_is(path):
     setup.add_advanced()
     setup.what_if.offer(["node_00", "node_01", "node_02"])
     asked = []
-    for stop in read_lesson(path, SETTINGS, NetworkLook(), NUMBERS).stops:
+    for stop in read_lesson(path, KIND).stops:
         setup.take(stop.look)
         asked.append(tuple(setup.runs().values()) if setup.street else setup.sent())
         if stop.look.off:
@@ -372,7 +372,7 @@ def test_a_failed_or_cancelled_delivery_says_why_and_another_runs(screen, seed, 
     assert screen.names() == []
     screen.refuse = ""
     screen.gui.set("Seed", 0)
-    assert "3 cameras sent" in screen.gui.text()
+    assert "3 nodes sent" in screen.gui.text()
 
 
 def test_vehicles_move_and_two_schemes_stand_beside_each_other(screen):

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from app.lesson.files import read_lesson
+from app.lesson.reading import read_lesson
 from app.screens.surface.labels import BEFORE, BOTH, POISSON
-from app.screens.surface.lesson import NUMBERS, SETTINGS, SHIPPED, SurfaceLook
+from app.screens.surface.lesson import KIND, SHIPPED, SurfaceLook
 from packetmesh.errors import InputError
 from packetmesh.progress import drain as end
 from pipeline.config import PRESETS, SurfaceConfig
@@ -32,7 +32,7 @@ CONFIG = PRESETS["packetmesh"]
 def lesson(tmp_path, text):
     path = tmp_path / "lesson.md"
     path.write_text(text)
-    return read_lesson(path, SETTINGS, SurfaceLook(), NUMBERS)
+    return read_lesson(path, KIND)
 
 
 def test_a_stop_sets_what_it_names_and_leaves_the_rest_as_the_screen_begins(tmp_path):
@@ -87,7 +87,7 @@ def test_all_that_can_be_shown_has_a_short_name(tmp_path):
 def test_a_bad_setting_is_one_sentence(tmp_path, setting, sentence):
     with pytest.raises(InputError) as error:
         lesson(tmp_path, f"# A\n## One\nset: {setting}\nx")
-    assert str(error.value).startswith("The lesson lesson.md, section 'One', cannot set ")
+    assert str(error.value).startswith("The lesson lesson.md, line 3, section 'One' cannot set ")
     assert sentence in str(error.value)
     assert "\n" not in str(error.value)
 
@@ -144,7 +144,7 @@ def four_balls(room):
 
 
 def stop_named(title):
-    shipped = read_lesson(SHIPPED, SETTINGS, SurfaceLook(), NUMBERS)
+    shipped = read_lesson(SHIPPED, KIND)
     return next(stop.look for stop in shipped.stops if stop.title == title)
 
 

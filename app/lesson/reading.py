@@ -1,0 +1,328 @@
+"""Reading lesson files, in all their languages, with every fault by file and line (format: ``files.py``)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+from app.lesson.files import CHOICES, CLAUSE, FIELD, Choice, Kind, Lesson, Look, Question, Stop
+from app.lesson.files import choice as one_of
+from app.lesson.languages import NAMES
+from app.window.teaching import ENGLISH
+from packetmesh.errors import InputError
+
+PARTS = ("ask", "choices", "reveal")
+KEYS = ("set", "open", "see")
+"""Keys of a section's lines that change the screen."""
+HEAD = ("screen", "scene", "language")
+MOST_BYTES = 1_000_000
+TRANSLATION = re.compile(r"(.+)\.([a-z]{2})")
+"""Name of a translated lesson's file without its suffix: the original's name and the language."""
+_MARK = re.compile(r"^- \[( |x|[a-z_]+=[a-z]+)\] ", re.MULTILINE)
+Lines = Sequence[tuple[int, str]]
+"""Lines of a file with their numbers, which start at 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """What is wrong in a lesson's file, and what to write instead."""
+
+    file: str
+    line: int
+    """Line in the file; 0 for the file as a whole."""
+    sentence: str
+
+    def __str__(self) -> str:
+        where = f", line {self.line}," if self.line else ""
+        return f"The lesson {self.file}{where} {self.sentence}."
+
+
+class _Faults(list[Fault]):
+    def __init__(self, file: str) -> None:
+        super().__init__()
+        self._file = file
+
+    def add(self, line: int, sentence: str) -> None:
+        self.append(Fault(self._file, line, sentence))
+
+
+def read_lesson(path: Path, kind: Kind[Look]) -> Lesson[Look]:
+    """Read a lesson and its translations, which are next to it.
+
+    Raises:
+        InputError: a file cannot be read, has no title or section, sets something unknown, uses an unknown
+            field, asks without choices or an answer, or is a translation with other parts than the original.
+    """
+    lesson, faults = check_lesson(path, kind)
+    if lesson is None or faults:
+        raise first_of(faults)
+    return lesson
+
+
+def first_of(faults: Sequence[Fault]) -> InputError:
+    """Return the first fault as an error, and how to read the others."""
+    more = "; packetmesh lesson check shows the other faults" if faults[1:] else ""
+    return InputError(f"{str(faults[0]).removesuffix('.')}{more}.")
+
+
+shipped_lesson = cache(read_lesson)
+"""``read_lesson`` for files that do not change while the program runs."""
+
+
+def check_lesson(path: Path, kind: Kind[Look]) -> tuple[Lesson[Look] | None, list[Fault]]:
+    """Read a lesson as ``read_lesson``. Returns None if it cannot be shown, and all faults."""
+    lesson, faults = _parse(path, kind, None)
+    if lesson is None:
+        return None, faults
+    translations = {}
+    for code, other in translations_of(path).items():
+        translated, wrong = _parse(other, kind, lesson)
+        faults += wrong
+        if translated is not None:
+            translations[code] = replace(translated, language=code)
+    return replace(lesson, translations=translations), faults
+
+
+def translations_of(path: Path) -> dict[str, Path]:
+    """Return the files with the translations of a lesson, by language, in the order of the codes."""
+    found = {}
+    for other in sorted(path.parent.glob("*.md")):
+        named = TRANSLATION.fullmatch(other.stem)
+        if named is not None and named[1] == path.stem and named[2] in NAMES:
+            found[named[2]] = other
+    return found
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a lesson's file.
+
+    Raises:
+        InputError: it is missing, too large, empty, or not text in UTF-8.
+    """
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise InputError(
+                f"has more than {MOST_BYTES // 1_000_000} MB; a lesson is a short text in markdown"
+            )
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError("cannot be read as text; save it in the encoding UTF-8") from None
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}") from None
+    if "\0" in text:
+        raise InputError("cannot be read as text; save it in the encoding UTF-8")
+    if not text.strip():
+        raise InputError("is empty; begin it with a line '# title'")
+    return text
+
+
+def head_of(text: str) -> tuple[dict[str, tuple[int, str]], Lines]:
+    """Return the head's values with their lines, by key (``title``, those of ``HEAD``), and other lines."""
+    values, others = dict[str, tuple[int, str]](), []
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.startswith("## "):
+            break
+        key, colon, value = line.partition(":")
+        if line.startswith("# ") and "title" not in values:
+            values["title"] = number, line[2:].strip()
+        elif colon and key in HEAD:
+            values[key] = number, value.strip()
+        elif line.strip():
+            others.append((number, line))
+    return values, others
+
+
+def _parse(
+    path: Path, kind: Kind[Look], original: Lesson[Look] | None
+) -> tuple[Lesson[Look] | None, list[Fault]]:
+    """Read one file; with the original it is a translation."""
+    faults = _Faults(path.name)
+    try:
+        text = read_text(path)
+    except InputError as error:
+        faults.add(0, str(error))
+        return None, faults
+    head, others = head_of(text)
+    title, language = head.get("title", (0, ""))[1], head.get("language", (0, ENGLISH))[1]
+    if not title:
+        faults.add(1, "has no title; begin it with a line '# title'")
+    if language not in NAMES:
+        faults.add(head["language"][0], f"has an unknown language; write one of {', '.join(NAMES)}")
+    if original is not None:
+        for key in HEAD:
+            if key in head:
+                faults.add(head[key][0], f"is a translation; leave out '{key}:', it is in {original.name}.md")
+    sections = _sections(text)
+    for number, line in others if sections else ():
+        faults.add(number, f"has '{line.strip()[:40]}' before the first section; begin one with '## title'")
+    if not sections:
+        faults.add(len(text.splitlines()), "has no sections; begin each with a line '## title'")
+    if original is not None and sections and len(sections) != len(original.stops):
+        count = len(original.stops)
+        faults.add(
+            sections[-1][0][0], f"has {len(sections)} sections; translate all {count} of {original.name}.md"
+        )
+    if faults and (not sections or original is not None):
+        return None, faults
+    _check_fields(sections, kind, faults)
+    same = [None] * len(sections) if original is None else list(original.stops)
+    stops = [_stop(section, kind, one, faults) for section, one in zip(sections, same, strict=True)]
+    if faults:
+        return None, faults
+    scene, kept = head.get("scene", (0, ""))[1], [stop for stop in stops if stop is not None]
+    return Lesson(title, tuple(kept), kind.default, path.stem, scene, language), faults
+
+
+def _sections(text: str) -> list[Lines]:
+    """Return the lines of each section, its title first."""
+    sections: list[list[tuple[int, str]]] = []
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.startswith("## "):
+            sections.append([])
+        if sections:
+            sections[-1].append((number, line))
+    return list(sections)
+
+
+def _check_fields(sections: Sequence[Lines], kind: Kind[Look], faults: _Faults) -> None:
+    """Add a fault for each field that its screen does not compute, or that may be missing."""
+    known = ", ".join(kind.numbers) or "none"
+    for number, line in (one for section in sections for one in section):
+        for stop, name in FIELD.findall(line):
+            if name not in kind.numbers or (stop and not 1 <= int(stop) <= len(sections)):
+                faults.add(
+                    number,
+                    f"has the field {stop and f'{stop}:'}{name}, which is not a number of its screen; try "
+                    f"one of {known}",
+                )
+    for section in sections:
+        whole = "\n".join(line for _, line in section)
+        blank = CLAUSE.sub(lambda found: "\n" * found[0].count("\n"), whole)
+        for (number, _), line in zip(section, blank.split("\n"), strict=True):
+            for stop, name in FIELD.findall(line):
+                if stop:
+                    faults.add(
+                        number,
+                        f"has the field {stop}:{name} outside of double braces; put the whole clause inside, "
+                        f"because a reader may have skipped stop {stop}",
+                    )
+
+
+def _stop(section: Lines, kind: Kind[Look], same: Stop[Look] | None, faults: _Faults) -> Stop[Look] | None:
+    """Return a stop; with the same stop of the original, what it sets is taken from there."""
+    (first, heading), *lines = section
+    title, before = heading[3:].strip(), len(faults)
+    where = f"section '{title}'"
+    changes = [(number, *_parted(line)) for number, line in lines if line.partition(":")[0] in KEYS]
+    look, opens, sees = kind.default, list[str](), list[str]()
+    for number, key, value in changes:
+        if same is not None:
+            faults.add(number, f"is a translation; leave out '{key}:', it is in the original")
+        elif key == "set":
+            name, _, setting = (part.strip() for part in value.partition("="))
+            try:
+                look = one_of(kind.settings)(name)(look, setting)
+            except ValueError as error:
+                faults.add(number, f"{where} cannot set {name} = {setting}: {error}")
+        elif not value:
+            what = (
+                "opens nothing; name a folder or a tab" if key == "open" else "shows nothing; name a control"
+            )
+            faults.add(number, f"{where} {what} after '{key}:'")
+        else:
+            (opens if key == "open" else sees).append(value)
+    parts = _parts([one for one in lines if one[1].partition(":")[0] not in KEYS])
+    text = parts.pop("", (first, ""))[1]
+    if not text:
+        faults.add(first, f"{where} has no text")
+    question = _question(parts, where, kind, first, faults) if parts else None
+    if len(faults) > before:
+        return None
+    if same is None:
+        return Stop(title, text, look, tuple(opens), tuple(sees), question)
+    stop = replace(same, title=title, text=text, question=question)
+    _compare(stop, same, first, faults)
+    return stop
+
+
+def _parted(line: str) -> tuple[str, str]:
+    key, _, value = line.partition(":")
+    return key, value.strip()
+
+
+def _parts(lines: Lines) -> dict[str, tuple[int, str]]:
+    """Return the line and the text of each part of a section in their order; the text's key is empty."""
+    found: dict[str, tuple[int, list[str]]] = {"": (lines[0][0] if lines else 0, [])}
+    key = ""
+    for number, line in lines:
+        name, colon, value = line.partition(":")
+        if colon and name in PARTS:
+            key, line = name, value
+            found[key] = number, []
+        found[key][1].append(line)
+    return {key: (number, "\n".join(texts).strip()) for key, (number, texts) in found.items()}
+
+
+def _question(
+    parts: dict[str, tuple[int, str]], where: str, kind: Kind[Look], first: int, faults: _Faults
+) -> Question | None:
+    line = min(number for number, _ in parts.values())
+    if tuple(parts) != PARTS or not all(text for _, text in parts.values()):
+        faults.add(
+            line, f"{where} must ask with 'ask:', 'choices:' and 'reveal:', in this order, each with text"
+        )
+        return None
+    line, written = parts["choices"]
+    _, *items = _MARK.split(written)
+    marks, texts = items[::2], [" ".join(item.split()) for item in items[1::2]]
+    whens = [(name, word) if word else None for name, _, word in (mark.partition("=") for mark in marks)]
+    computed = [when for when in whens if when is not None]
+    of_one = len(set(computed)) == CHOICES and len({name for name, _ in computed}) == 1
+    if len(texts) != CHOICES or not (of_one or (not computed and marks.count("x") == 1)):
+        faults.add(
+            line,
+            f"{where} needs {CHOICES} choices: '- [x] choice' once, else '- [ ] choice | why it is wrong'; "
+            "or all of them such as '- [name=word] choice | why it is wrong where it is'",
+        )
+        return None
+    for name in {name for name, _ in computed} - set(kind.numbers):
+        faults.add(
+            line,
+            f"{where} has a choice that is right by {name}, which its screen does not compute; try one of "
+            f"{', '.join(kind.numbers) or 'none'}",
+        )
+    parted = (text.partition(" | ") for text in texts)
+    found = tuple(
+        Choice(text.strip(), reason.strip(), when)
+        for (text, _, reason), when in zip(parted, whens, strict=True)
+    )
+    for mark, one in zip(marks, found, strict=True):
+        if (mark == "x") == bool(one.reason):
+            fault = "is right but has a reason why not" if one.reason else "has no reason why it is wrong"
+            remedy = "leave out what follows ' | '" if one.reason else "write a reason after ' | '"
+            faults.add(line, f"{where} choice '{one.text}' {fault}; {remedy}")
+    return Question(parts["ask"][1], found, parts["reveal"][1])
+
+
+def _compare(stop: Stop[Look], same: Stop[Look], line: int, faults: _Faults) -> None:
+    """Add a fault for each part in which a translated stop differs from the original."""
+    where, of = f"section '{stop.title}'", f"'{same.title}' of the original"
+    if (stop.question is None) != (same.question is None):
+        faults.add(line, f"{where} must ask if and only if {of} does")
+    elif stop.question is not None and same.question is not None:
+        marks, others = (
+            [(not one.reason, one.when) for one in question.choices]
+            for question in (stop.question, same.question)
+        )
+        if marks != others:
+            faults.add(line, f"{where} must have the marks of {of} before its choices, in the same order")
+    used, wanted = (
+        {found[0] for text in one.texts for found in FIELD.finditer(text)} for one in (stop, same)
+    )
+    for name in sorted(wanted - used):
+        faults.add(line, f"{where} lacks the field {name}, which {of} has; write it in")
+    for name in sorted(used - wanted):
+        faults.add(line, f"{where} has the field {name}, which {of} does not have; leave it out")

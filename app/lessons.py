@@ -1,0 +1,215 @@
+"""All lessons by their screens, and a teacher's own: found, read and checked before the app starts."""
+
+from __future__ import annotations
+
+import ast
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from app.lesson.files import LESSONS, Kind, Lesson, screen_of
+from app.lesson.languages import NAMES
+from app.lesson.reading import (
+    TRANSLATION,
+    Fault,
+    check_lesson,
+    first_of,
+    head_of,
+    read_text,
+    translations_of,
+)
+from app.screens.calibrate.lesson import KIND as CALIBRATE
+from app.screens.depth.lesson import KIND as DEPTH
+from app.screens.fuse.lesson import KIND as FUSE
+from app.screens.fuse.walk_lesson import KIND as WALK
+from app.screens.network.lesson import KIND as NETWORK
+from app.screens.surface.lesson import KIND as SURFACE
+from app.window.teaching import ENGLISH
+from packetmesh.errors import InputError
+from pipeline.io.demos import DEMO_WALKS, DEMOS
+
+KINDS: dict[str, Kind[Any]] = {kind.name: kind for kind in (CALIBRATE, DEPTH, FUSE, WALK, SURFACE, NETWORK)}
+"""By the names of the screens in lesson files; ``walk`` is Fuse with a recording."""
+SUFFIX = ".md"
+_HERE = Path(__file__).parent
+
+
+@dataclass(frozen=True, slots=True)
+class OwnLesson:
+    """A teacher's own lesson."""
+
+    path: Path
+    kind: str
+    lesson: Lesson[Any]
+
+    @property
+    def place(self) -> str:
+        """Query of an address that opens its scene and screen."""
+        scene = f"scene={self.lesson.scene}&" if self.lesson.scene else ""
+        return f"{scene}screen={screen_of(self.kind)}"
+
+
+def own_lessons(places: Iterable[Path]) -> list[OwnLesson]:
+    """Return the lessons in these files and folders.
+
+    Raises:
+        InputError: a place has no lesson, or a lesson has a fault.
+    """
+    lessons, faults = check_lessons(places)
+    if faults:
+        raise first_of(faults)
+    return lessons
+
+
+def by_kind(lessons: Iterable[OwnLesson]) -> dict[str, list[Lesson[Any]]]:
+    """Return the lessons by the names of their kinds."""
+    found: dict[str, list[Lesson[Any]]] = {}
+    for one in lessons:
+        found.setdefault(one.kind, []).append(one.lesson)
+    return found
+
+
+def languages(lessons: Iterable[OwnLesson] = ()) -> dict[str, str]:
+    """Return the names of all languages that a shipped lesson or one of these has, by their codes."""
+    codes = {ENGLISH}
+    for path in LESSONS.glob(f"*{SUFFIX}"):
+        codes |= translations_of(path).keys()
+    for one in lessons:
+        codes |= {one.lesson.language, *one.lesson.translations}
+    return {code: name for code, name in NAMES.items() if code in codes}
+
+
+def check_lessons(places: Iterable[Path]) -> tuple[list[OwnLesson], list[Fault]]:
+    """Read the lessons in these files and folders. Returns those without a fault, and all faults.
+
+    Raises:
+        InputError: a place does not exist, or is a folder without a lesson.
+    """
+    paths = list(dict.fromkeys(path for place in places for path in _files(place)))
+    lessons, faults = list[OwnLesson](), list[Fault]()
+    for path in paths:
+        one, wrong = _check(path)
+        faults += wrong
+        if one is not None:
+            faults += _twice(one, lessons)
+            lessons.append(one)
+    return lessons, faults
+
+
+def _files(place: Path) -> list[Path]:
+    """Return the file, the original of a translation, or the originals in a folder.
+
+    Raises:
+        InputError: there is none.
+    """
+    if place.is_dir():
+        found = sorted(path for path in place.glob(f"*{SUFFIX}") if _original(path) == path)
+        if not found:
+            raise InputError(f"The folder {place} has no lesson; write one as {place / 'my-lesson.md'}.")
+        return found
+    if not place.exists():
+        raise InputError(
+            f"There is no lesson {place}; give a file such as my-lesson.md, or a folder of them."
+        )
+    return [_original(place)]
+
+
+def _original(path: Path) -> Path:
+    """Return the lesson of which the file is a translation, if that exists; else the file."""
+    named = TRANSLATION.fullmatch(path.stem)
+    original = path if named is None or named[2] not in NAMES else path.with_name(f"{named[1]}{SUFFIX}")
+    return original if original.exists() else path
+
+
+def _check(path: Path) -> tuple[OwnLesson | None, list[Fault]]:
+    named = TRANSLATION.fullmatch(path.stem)
+    if named is not None and named[2] in NAMES:
+        return None, [
+            Fault(path.name, 0, f"translates {named[1]}{SUFFIX}, which does not exist; write that file first")
+        ]
+    try:
+        text = read_text(path)
+    except InputError as error:
+        return None, [Fault(path.name, 0, str(error))]
+    head, _ = head_of(text)
+    line, screen = head.get("screen", (1, ""))
+    kind = KINDS.get(screen)
+    if kind is None:
+        fault = f"has the unknown screen '{screen[:40]}'" if screen else "names no screen"
+        wrong = Fault(path.name, line, f"{fault}; write one such as 'screen: surface': {', '.join(KINDS)}")
+        return None, [wrong]
+    lesson, faults = check_lesson(path, kind)
+    faults += _scene_faults(path, head, kind)
+    faults += _unknown_names(path, text, kind)
+    faults.sort(key=lambda fault: (fault.file, fault.line))
+    return (None if lesson is None or faults else OwnLesson(path, kind.name, lesson)), faults
+
+
+def _scene_faults(path: Path, head: Mapping[str, tuple[int, str]], kind: Kind[Any]) -> Sequence[Fault]:
+    """Return a fault if the head names a scene that is no demo, or none for this screen."""
+    line, scene = head.get("scene", (0, ""))
+    scenes = DEMO_WALKS if kind is WALK else DEMOS
+    if line == 0 or scene in scenes:
+        return ()
+    return (Fault(path.name, line, f"has the scene '{scene[:40]}'; write one of {', '.join(scenes)}"),)
+
+
+def _unknown_names(path: Path, text: str, kind: Kind[Any]) -> list[Fault]:
+    """Return a fault for each folder, tab, control or number to show that the screen does not have."""
+    folders, names = names_on(screen_of(kind.name))
+    faults = []
+    for number, line in enumerate(text.splitlines(), 1):
+        key, colon, value = line.partition(":")
+        known = folders if key == "open" else names
+        name = value.strip()
+        if not colon or key not in ("open", "see") or not name or name in known:
+            continue
+        near = difflib.get_close_matches(name, folders if key == "open" else _labels(names), n=3, cutoff=0.4)
+        what = "folder or tab" if key == "open" else "control or number"
+        advice = f"try {' or '.join(near)}" if near else "write its name as it is on the screen"
+        faults.append(
+            Fault(
+                path.name, number, f"has the {what} '{name[:60]}', which its screen does not have; {advice}"
+            )
+        )
+    return faults
+
+
+@cache
+def names_on(screen: str) -> tuple[frozenset[str], frozenset[str]]:
+    """Return the titles of a screen's folders and tabs, and all texts in its code, its labels among them."""
+    folders, texts = set[str](), set[str]()
+    for path in (*(_HERE / "screens" / screen).glob("*.py"), *(_HERE / "window").glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                texts.add(node.value)
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.args:
+                title = node.args[0]
+                if node.func.attr in ("add_folder", "add_tab") and isinstance(title, ast.Constant):
+                    folders.add(str(title.value))
+    return frozenset(folders), frozenset(texts)
+
+
+def _labels(texts: Iterable[str]) -> list[str]:
+    """Return the texts that can be labels: short, and beginning with a capital letter."""
+    return [text for text in texts if text[:1].isupper() and len(text) <= 40 and "\n" not in text]
+
+
+def _twice(one: OwnLesson, others: Iterable[OwnLesson]) -> list[Fault]:
+    """Return a fault if another lesson, own or shipped, has the name or the title of this one."""
+    for other in others:
+        if other.path.stem == one.path.stem:
+            return [Fault(one.path.name, 0, f"has the name of {other.path}; rename one of the two files")]
+        if other.lesson.title == one.lesson.title:
+            return [Fault(one.path.name, 1, f"has the title of {other.path.name}; give it another title")]
+    shipped = {path.resolve(): head_of(path.read_text("utf-8"))[0]["title"][1] for path in _shipped()}
+    if one.path.resolve() not in shipped and one.lesson.title in shipped.values():
+        return [Fault(one.path.name, 1, "has the title of a lesson that ships; give it another title")]
+    return []
+
+
+def _shipped() -> list[Path]:
+    return [path for path in LESSONS.glob(f"*{SUFFIX}") if _original(path) == path]

@@ -1,0 +1,105 @@
+"""A picture of a browser's 3-D view at twice its size, as a PNG file."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+import viser
+
+from app.drawing.colors import BACKGROUND
+from app.web.markup import Markup
+from app.window.hidden import add_hidden
+from app.window.page import page_call
+from app.window.ui import Ui
+from packetmesh.errors import InputError
+from pipeline.types import ByteArray
+
+TIMES = 2
+"""The picture's size over the size of the view in the window."""
+MOST_PX = 8192
+"""Largest width and height of a picture: what graphics cards draw."""
+WAIT_S = 30.0
+SIZE = re.compile(r"\d{1,9} ([1-9]\d{0,4}) ([1-9]\d{0,4})")
+"""The page's answer: a number that makes equal answers differ, width and height of the view, CSS pixels."""
+
+
+def opaque(rgba: ByteArray) -> ByteArray:
+    """Return (H, W, 3) RGB of an (H, W, 4) RGBA picture before the page's background."""
+    alpha = rgba[..., 3:].astype(np.float32) / 255.0
+    behind = np.array(BACKGROUND, np.float32)
+    return np.asarray(np.round(rgba[..., :3] * alpha + behind * (1.0 - alpha)), dtype=np.uint8)
+
+
+def size_of(text: str) -> tuple[int, int]:
+    """Return width and height of the picture from the page's answer.
+
+    Raises:
+        InputError: the answer is not a size, or the picture would be too large.
+    """
+    found = SIZE.fullmatch(text)
+    if found is None:
+        raise InputError("The browser did not tell the size of its view; reload the page and try again.")
+    width_px, height_px = TIMES * int(found[1]), TIMES * int(found[2])
+    if max(width_px, height_px) > MOST_PX:
+        raise InputError(
+            f"The picture would have {width_px} x {height_px} pixels, more than {MOST_PX}; make the window "
+            "smaller."
+        )
+    return width_px, height_px
+
+
+class ViewPicture:
+    """Takes pictures of the view of one browser, one at a time."""
+
+    def __init__(self, ui: Ui, client: viser.ClientHandle, name: str, file: Callable[[], str]) -> None:
+        """Add the hidden field for the page's answer.
+
+        Args:
+            ui: the browser's own controls.
+            client: the browser.
+            name: name by which the page finds the field.
+            file: returns the name of the file, without its suffix.
+        """
+        self._ui, self._client, self._name, self._file = ui, client, name, file
+        self._taking = threading.Lock()
+        self._count = 0
+        with add_hidden(ui, name):
+            self._field = ui.when_changed(ui.gui.add_text("Size of the view", ""), self._answered)
+            self._html = ui.gui.add_html(Markup(""))
+
+    def take(self) -> None:
+        """Ask the page for the size of its view, then take the picture."""
+        self._count += 1
+        self._html.content = page_call("measureView", self._name, mark=self._count)
+
+    def _answered(self) -> None:
+        """Draw on a thread of its own: the browser may take seconds."""
+        size_px = size_of(self._field.value)
+        if self._taking.acquire(blocking=False):
+            threading.Thread(target=self._draw, args=(*size_px, self._file()), daemon=True).start()
+
+    def _draw(self, width_px: int, height_px: int, file: str) -> None:
+        try:
+            drawn = self._client.get_render(height_px, width_px, transport_format="png", timeout=WAIT_S)
+            if drawn.shape != (height_px, width_px, 4):
+                raise RuntimeError("another size")
+            png = cv2.imencode(".png", cv2.cvtColor(opaque(drawn), cv2.COLOR_RGB2BGR))[1].tobytes()
+        except (RuntimeError, TimeoutError, OSError, ValueError):
+            self._ui.post(_fail)
+        else:
+            self._client.send_file_download(f"{file}.png", png, save_immediately=True)
+        finally:
+            self._taking.release()
+
+
+def _fail() -> None:
+    """Report that no picture came.
+
+    Raises:
+        InputError: always; the session shows it.
+    """
+    raise InputError("The browser delivered no picture of the view; try again, or make the window smaller.")

@@ -1,0 +1,157 @@
+"""packetmesh lesson check, and serve with a lesson that has a fault."""
+
+import json
+import re
+
+import pytest
+
+from app.lesson.files import LESSONS
+from tests.app.commands import run as ran
+
+GOOD = """# My radius
+screen: surface
+scene: office
+
+## One
+set: radii = 2 r_F
+open: Holes
+see: Radius (mm)
+Now {missed}.
+
+ask: Which?
+choices:
+- [ ] Red. | No.
+- [x] Blue.
+- [ ] Grey. | No.
+reveal: So.
+"""
+
+
+def checked(capsys, *files):
+    """Exit code, and the JSON and the lines on stderr."""
+    code, out, err = ran(capsys, "lesson", "check", *map(str, files), "--json")
+    return code, json.loads(out) if out else None, err
+
+
+def test_a_good_lesson_and_all_that_ship_have_no_fault(capsys, tmp_path):
+    (tmp_path / "mine.md").write_text(GOOD)
+    code, found, _ = checked(capsys, tmp_path / "mine.md", LESSONS)
+    assert (code, found["faults"]) == (0, [])
+    assert found["lessons"][0] == {
+        "file": str(tmp_path / "mine.md"),
+        "title": "My radius",
+        "screen": "surface",
+        "scene": "office",
+        "stops": 1,
+        "languages": ["en"],
+    }
+    assert [one["languages"] for one in found["lessons"][1:]] == [["en", "de", "es", "th"]] * 7
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "sentence"),
+    [
+        (
+            "screen: surface",
+            "screen: kitchen",
+            2,
+            "unknown screen 'kitchen'; write one such as 'screen: surface'",
+        ),
+        ("screen: surface\n", "", 1, "names no screen; write one such as"),
+        ("scene: office", "scene: moon", 3, "has the scene 'moon'; write one of"),
+        (
+            "open: Holes",
+            "open: Hole",
+            7,
+            "has the folder or tab 'Hole', which its screen does not have; try Holes",
+        ),
+        (
+            "Radius (mm)",
+            "Radius (cm)",
+            8,
+            "has the control or number 'Radius (cm)', which its screen does not",
+        ),
+        ("set: radii = 2 r_F", "set: radius = 2", 6, "cannot set radius = 2: try one of show, radii"),
+        (
+            "{missed}",
+            "{mised}",
+            9,
+            "has the field mised, which is not a number of its screen; try one of missed",
+        ),
+        (
+            "choices:\n- [ ] Red. | No.\n- [x] Blue.\n- [ ] Grey. | No.\n",
+            "",
+            11,
+            "must ask with 'ask:', 'choices:'",
+        ),
+        ("- [ ] Red. | No.\n", "", 12, "needs 3 choices"),
+        ("# My radius\n", "", 1, "has no title; begin it with a line '# title'"),
+        (
+            "# My radius",
+            "# Which ball radius?",
+            1,
+            "has the title of a lesson that ships; give it another title",
+        ),
+        ("scene: office", "language: xx", 3, "has an unknown language; write one of en"),
+    ],
+)
+def test_a_fault_is_one_sentence_with_file_line_and_remedy(capsys, tmp_path, old, new, line, sentence):
+    (tmp_path / "mine.md").write_text(GOOD.replace(old, new))
+    code, found, err = checked(capsys, tmp_path / "mine.md")
+    assert code == 1
+    assert (found["faults"][0]["file"], found["faults"][0]["line"]) == ("mine.md", line)
+    assert sentence in found["faults"][0]["sentence"]
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (b"", "is empty; begin it with"),
+        (b"\xff\xfe#\x00 \x00", "save it in the encoding UTF-8"),
+        ("# Grüße".encode("latin-1"), "save it in the encoding UTF-8"),
+        (b"\x89PNG\r\n\x1a\n\x00\x00", "save it in the encoding UTF-8"),
+        (b"# A\x00\nx", "save it in the encoding UTF-8"),
+        (b"x" * 50_000_000, "has more than 1 MB"),
+    ],
+    ids=["empty", "utf-16", "latin-1", "binary", "nul", "50 MB"],
+)
+def test_a_file_that_is_no_lesson_is_one_sentence(capsys, tmp_path, content, sentence):
+    (tmp_path / "mine.md").write_bytes(content)
+    code, found, _ = checked(capsys, tmp_path / "mine.md")
+    assert code == 1
+    assert [fault["line"] for fault in found["faults"]] == [0]
+    assert sentence in found["faults"][0]["sentence"]
+
+
+def test_two_lessons_of_one_name_or_title(capsys, tmp_path):
+    for name in ("a/mine.md", "b/mine.md", "a/other.md"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(GOOD)
+    code, found, _ = checked(capsys, tmp_path / "a", tmp_path / "b", tmp_path / "a" / "mine.md")
+    assert code == 1
+    sentences = [fault["sentence"] for fault in found["faults"]]
+    assert sentences == [
+        "has the title of mine.md; give it another title",
+        f"has the name of {tmp_path}/a/mine.md; rename one of the two files",
+    ]
+
+
+def test_a_place_without_lessons_and_wrong_use(capsys, tmp_path):
+    (tmp_path / "notes.txt").write_text("x")
+    code, _, err = ran(capsys, "lesson", "check", str(tmp_path))
+    assert code == 1
+    assert re.search(r"The folder .* has no lesson; write one as .*my-lesson\.md", err)
+    code, _, err = ran(capsys, "lesson", "check", str(tmp_path / "none.md"))
+    assert (code, "There is no lesson" in err) == (1, True)
+    assert ran(capsys, "lesson", "check")[0] == 2
+    assert ran(capsys, "lesson", "mend", "x.md")[0] == 2
+
+
+def test_serve_does_not_start_with_a_lesson_that_has_a_fault(capsys, tmp_path):
+    (tmp_path / "mine.md").write_text(GOOD.replace("{missed}", "{mised} {fo}"))
+    code, _, err = ran(capsys, "serve", "--lesson", str(tmp_path / "mine.md"))
+    assert code == 1
+    assert "mine.md, line 9, has the field mised" in err
+    assert "packetmesh lesson check shows the other faults" in err
+    assert err.count("\n") == 1

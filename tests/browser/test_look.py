@@ -1,0 +1,74 @@
+"""A cut through the demo's surface and a scale bar, in a real browser."""
+
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.hands import afresh, go, pick, press, unfold, visible
+
+PLANE = """() => {
+  let found = null;
+  window.__viserMutable.nodeRefFromName["/surface/after"]?.traverse(({isMesh, material}) => {
+    const [plane] = isMesh && material.isMeshBasicMaterial && material.clippingPlanes || [];
+    if (plane) found = [...plane.normal.toArray(), plane.constant];
+  });
+  return found;
+}"""
+METRES = """() => {
+  const {camera, cameraControl} = window.__viserMutable;
+  const away = camera.position.distanceTo(cameraControl.getTarget(camera.position.clone()));
+  const bar = document.querySelector(".packetmesh-scale i").getBoundingClientRect().width;
+  const height = document.querySelector("canvas[data-engine]").clientHeight;
+  return 2 * away * Math.tan(camera.fov * Math.PI / 360) * bar / height;
+}"""
+"""Length that the scale bar spans at the point about which the view turns, metres."""
+UNITS_M = {"mm": 0.001, "cm": 0.01, "m": 1.0}
+
+
+@pytest.fixture
+def looking(tab):
+    """The Surface step, seen from the side."""
+    afresh(tab, "fixedDpr=1&cam=1,0.8,2,2.6,2.6,0.8&screen=surface")
+    go(tab, "Surface")
+    tab.get_by_text("Up to date").wait_for(timeout=180_000)
+    unfold(tab, "Look")
+    return tab
+
+
+def plane(page):
+    """The plane that cuts the drawn surface: its normal and constant in three.js's world, metres."""
+    return page.wait_for_function(PLANE).json_value()
+
+
+def test_a_plane_cuts_the_surface_and_the_link_shows_it_again(looking):
+    pick(looking, "Leave out", "Behind a plane")
+    first = plane(looking)
+    press(looking, "Flip")
+    looking.wait_for_function(
+        f"sum => {{ const found = ({PLANE})(); return found?.[3] * sum < 0; }}", arg=first[3]
+    )
+    assert plane(looking) == pytest.approx([-number for number in first], abs=1e-3)
+    looking.wait_for_function("() => location.search.includes('look=plane_')")
+    looking.wait_for_timeout(1000)
+    query = looking.evaluate("() => location.search.slice(1)")
+    afresh(looking, query)
+    looking.get_by_text("Up to date").wait_for(timeout=180_000)
+    assert plane(looking) == pytest.approx([-number for number in first], abs=0.003)
+
+
+def test_the_scale_bar_is_a_round_length_where_the_view_turns(looking):
+    visible(looking, "Scale bar and axes").click()
+    bar = looking.locator(".packetmesh-scale")
+    for _ in range(2):
+        expect(bar).to_contain_text(re.compile(r"\d+ (mm|cm|m)"))
+        number, unit = re.match(r"([\d.]+) (mm|cm|m)", bar.locator("b").inner_text()).groups()
+        assert number.rstrip("0") in ("1", "2", "5")
+        assert looking.evaluate(METRES) == pytest.approx(float(number) * UNITS_M[unit], rel=0.02)
+        box = looking.locator("canvas").first.bounding_box()
+        looking.mouse.move(box["x"] + 200, box["y"] + 200)
+        looking.mouse.wheel(0, -1500)
+        looking.wait_for_timeout(1500)
+    assert sorted(bar.locator("text").all_text_contents()) == ["x", "y", "z"]
+    visible(looking, "Scale bar and axes").click()
+    expect(bar).to_have_count(0)
