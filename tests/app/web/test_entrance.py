@@ -181,7 +181,7 @@ def test_the_command_passes_on_who_may_come_in(monkeypatch, words, with_token, n
     asked, pools = [], []
 
     def refuse(*arguments, ahead):
-        *_, token, pool, allow_hosts = arguments
+        *_, token, pool, allow_hosts, _ = arguments
         asked.append((token, allow_hosts))
         pools.append(pool)
         raise InputError("not now")

@@ -16,7 +16,7 @@ from app.screens.fuse.labels import RACES, RESULT, WALK
 from app.screens.fuse.panel import FusePanel
 from app.screens.fuse.walk_draw import WalkDrawing
 from app.screens.fuse.walk_job import view_of
-from app.screens.fuse.walk_lesson import NUMBERS
+from app.screens.fuse.walk_lesson import NUMBERS, WalkLook
 from app.screens.fuse.walk_part import NO_LOOP
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
@@ -198,7 +198,8 @@ def test_the_enlarged_drift_can_be_drawn_at_its_true_size(fuse):
 
 def test_every_stop_of_the_lesson_shows_its_moment(fuse):
     part = fuse.panel._walk
-    for stop in part.lesson._lesson.stops:
+    (folder,) = part.lessons._folders.values()
+    for stop in folder._lesson.stops:
         part._take_look(stop.look)
         moment = stop.look.moment
         assert part._frame == (LOST[0] if moment is None else round(moment * (FRAMES - 1)))
@@ -212,7 +213,7 @@ def test_every_stop_of_the_lesson_shows_its_moment(fuse):
         "0.8 cm",
         "frames 0 and 39",
     ]
-    part.lesson.take("")
+    part.lessons.leave()
 
 
 def test_a_rig_has_no_walk_and_its_lesson_says_so(fuse, recording):
@@ -221,7 +222,7 @@ def test_a_rig_has_no_walk_and_its_lesson_says_so(fuse, recording):
     assert not fuse.gui.find("Loop").seen
     assert fuse.panel._walk._view is None
     with pytest.raises(InputError, match="no recording"):
-        fuse.panel._walk._take_look(fuse.panel._walk.lesson._lesson.default)
+        fuse.panel._walk._take_look(WalkLook())
     with pytest.raises(InputError, match="walk"):
         fuse.panel.in_address["show"].take("walk")
     fuse.want(Spec(recording))
