@@ -31,8 +31,8 @@ def measure(
 ) -> None:
     """Measure on the surface that `reconstruct` wrote; every number with an interval computed for 95 %.
 
-    In 20 rendered rooms 94 to 97 % of the intervals of lengths and angles held the true value. Places are in metres,
-    in the world of the run, as a viewer shows them for surface_after.ply.
+    In 20 rendered rooms 94 to 97 % of the intervals of lengths and angles held the true value. Places are
+    in metres, in the world of the run, as a viewer shows them for surface_after.ply.
 
     Args:
         run: Folder of the reconstruction.
