@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 LOOKING_AROUND = 0.5
 """Cameras whose mean viewing direction is shorter than this look around; it is 1 if all look one way."""
-SLOPE_RAD, HALF_VIEW = np.radians(50.0), 0.9 * np.tan(np.radians(37.5))
+VIEW_FOV_RAD = float(np.radians(75.0))
+"""Vertical field of view of a browser's camera, viser's own."""
+SLOPE_RAD, HALF_VIEW = np.radians(50.0), 0.9 * np.tan(0.5 * VIEW_FOV_RAD)
 """Angle at which one looks down on their scene; tangent of half the vertical field of view, less a margin."""
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from app.compute.records import SceneNode
-from app.drawing.cameras import look, stage_of
+from app.drawing.cameras import VIEW_FOV_RAD, look, stage_of
 from app.session.views import View, Views
 from app.window.panel import PanelSession
 from pipeline.kernels.geometry import apply
@@ -24,11 +24,16 @@ class Framing:
     """Turns a session's view when another object is shown or the window changes its shape."""
 
     def __init__(self, session: PanelSession, views: Views | None) -> None:
-        """Keep the session and its ``views``, which are None in a lecture."""
+        """Keep the session and its ``views``, which are None in a lecture.
+
+        A page that a race of an earlier session had narrowed gets its field of view back.
+        """
         self._session, self._views = session, views
         self._wide = self._by_screen = False
         self._shape = self._seen_shape = 0.0
         self._framed: View | None = None
+        if views is not None:
+            session.target.camera.fov = VIEW_FOV_RAD
 
     @property
     def framed(self) -> View | None:

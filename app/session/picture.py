@@ -42,7 +42,7 @@ def size_of(text: str) -> tuple[int, int]:
     """
     found = SIZE.fullmatch(text)
     if found is None:
-        raise InputError("The browser did not tell the size of its view; reload the page and try again.")
+        raise InputError("The browser did not report the size of its view; reload the page and try again.")
     width_px, height_px = TIMES * int(found[1]), TIMES * int(found[2])
     if max(width_px, height_px) > MOST_PX:
         raise InputError(

@@ -14,7 +14,7 @@ import viser
 from viser import transforms
 
 from app.compute.records import DepthView
-from app.drawing.cameras import Stage, turn
+from app.drawing.cameras import VIEW_FOV_RAD, Stage, turn
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.colors import DISTANCE_STOPS, NEUTRAL, ramp
 from app.drawing.poses import move, place
@@ -221,7 +221,7 @@ class RaceFraming:
 
     def __init__(self) -> None:
         self._shapes: tuple[tuple[int, float, int], ...] = ()
-        self._fov_rad: float | None = None
+        self._narrowed = False
 
     def anew(self) -> None:
         """Frame again at the next call, because another drawing is shown."""
@@ -235,17 +235,15 @@ class RaceFraming:
             for client in clients
         )
         if shapes != self._shapes and clients:
-            if self._fov_rad is None:
-                self._fov_rad = clients[0].camera.fov
-            self._shapes = shapes
+            self._shapes, self._narrowed = shapes, True
             drawing.look(clients)
 
     def widen(self, clients: Iterable[viser.ClientHandle]) -> None:
         """Restore the field of view that the race had narrowed."""
-        if self._fov_rad is not None:
+        if self._narrowed:
             for client in clients:
-                client.camera.fov = self._fov_rad
-            self._fov_rad, self._shapes = None, ()
+                client.camera.fov = VIEW_FOV_RAD
+            self._narrowed, self._shapes = False, ()
 
 
 class NodesDrawing:

@@ -77,8 +77,16 @@ window.packetmeshLanes = (() => {
     Object.defineProperties(event, {offsetX: {value: x - 0.5 * right * width}, offsetY: {value: y + 0.5 * up * height}});
   }
 
+  // Whether the race is in the picture, not another screen's drawing.
+  function isShown() {
+    let node = window.__viserMutable?.nodeRefFromName?.[`${NODE}0`];
+    if (!node) return false;
+    for (; node; node = node.parent) if (!node.visible) return false;
+    return true;
+  }
+
   function point(event) {
-    if (count > 0 && window.__viserMutable && event.target === canvas()) shiftPointer(event);
+    if (count > 0 && event.target === canvas() && isShown()) shiftPointer(event);
     if (["pointerup", "pointercancel"].includes(event.type)) held = null; // also where a drag ends outside the picture
   }
   for (const kind of POINTED) window.addEventListener(kind, point, true);

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from app.drawing.cameras import turn
+from app.session.framing import Framing
 from app.session.views import ECHO_S, Views
 from packetmesh.errors import InputError
 
@@ -112,3 +113,9 @@ def test_what_is_no_view_gets_a_sentence(eye, text):
     with pytest.raises(InputError, match="an invalid camera"):
         eye.views.take(text)
     assert eye.view == SCENE
+
+
+def test_a_page_that_an_earlier_session_had_narrowed_gets_its_field_of_view_back(eye):
+    eye.camera.fov = np.radians(25.0)  # of a race, when the server went away
+    Framing(SimpleNamespace(target=eye), eye.views)
+    assert eye.camera.fov == pytest.approx(np.radians(75.0))
