@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from app.lesson.files import LESSONS, Lesson, screen_of
-from app.lesson.languages import NAMES
-from app.lesson.reading import head_of, translations_of
+from app.lesson.reading import head_of, languages, titles_of
 from app.web.entrance import WELCOME
 from app.web.markup import Markup
 from app.web.page import Page
@@ -72,7 +71,8 @@ def app_page(lecture: bool, own: OwnCards = ()) -> Page:
 def landing_html(lecture: bool = False, own: OwnCards = ()) -> Markup:
     """Return the landing's HTML; its style and script are among the page's files."""
     lessons = Markup("").join(
-        _card(name, _titles(name)[ENGLISH], _place(name), _titles(name)) for name in SHIPPED
+        _card(name, titles[ENGLISH], _place(name), titles)
+        for name, titles in ((name, titles_of(LESSONS / f"{name}.md")) for name in SHIPPED)
     )
     teachers = Markup("").join(_own_card(lesson, place) for lesson, place in own)
     if teachers:
@@ -95,13 +95,6 @@ def landing_html(lecture: bool = False, own: OwnCards = ()) -> Markup:
     ).format(shared, _languages(own), teachers, lessons, "" if lecture else others)
 
 
-def _titles(lesson: str) -> dict[str, str]:
-    """Return the titles of a lesson that ships, by language, English first."""
-    path = LESSONS / f"{lesson}.md"
-    paths = {ENGLISH: path, **translations_of(path)}
-    return {code: head_of(one.read_text(encoding="utf-8"))[0]["title"][1] for code, one in paths.items()}
-
-
 def _place(lesson: str) -> str:
     """Return the query of an address that opens the scene and screen of a lesson that ships."""
     head, _ = head_of((LESSONS / f"{lesson}.md").read_text(encoding="utf-8"))
@@ -110,10 +103,7 @@ def _place(lesson: str) -> str:
 
 def _languages(own: OwnCards) -> Markup:
     """Return the options of the language in which the lessons are shown."""
-    codes = {code for name in SHIPPED for code in _titles(name)}
-    for lesson, _ in own:
-        codes |= {lesson.language, *lesson.translations}
-    options = ((code, code, name) for code, name in NAMES.items() if code in codes)
+    options = ((code, code, name) for code, name in languages(lesson for lesson, _ in own).items())
     return Markup("").join(Markup('<option value="{}" lang="{}">{}</option>').format(*one) for one in options)
 
 

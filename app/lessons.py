@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import difflib
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -19,7 +20,7 @@ from app.lesson.reading import (
     first_of,
     head_of,
     read_text,
-    translations_of,
+    titles_of,
 )
 from app.screens.calibrate.lesson import KIND as CALIBRATE
 from app.screens.depth.lesson import KIND as DEPTH
@@ -27,7 +28,6 @@ from app.screens.fuse.lesson import KIND as FUSE
 from app.screens.fuse.walk_lesson import KIND as WALK
 from app.screens.network.lesson import KIND as NETWORK
 from app.screens.surface.lesson import KIND as SURFACE
-from app.window.teaching import ENGLISH
 from packetmesh.errors import InputError
 from pipeline.io.demos import DEMO_WALKS, DEMOS
 
@@ -35,6 +35,8 @@ KINDS: dict[str, Kind[Any]] = {kind.name: kind for kind in (CALIBRATE, DEPTH, FU
 """By the names of the screens in lesson files; ``walk`` is Fuse with a recording."""
 SUFFIX = ".md"
 _HERE = Path(__file__).parent
+_SHARED = ("window", "looking", "measuring", "dock")
+"""Folders with controls that several screens have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,16 +72,6 @@ def by_kind(lessons: Iterable[OwnLesson]) -> dict[str, list[Lesson[Any]]]:
     for one in lessons:
         found.setdefault(one.kind, []).append(one.lesson)
     return found
-
-
-def languages(lessons: Iterable[OwnLesson] = ()) -> dict[str, str]:
-    """Return the names of all languages that a shipped lesson or one of these has, by their codes."""
-    codes = {ENGLISH}
-    for path in LESSONS.glob(f"*{SUFFIX}"):
-        codes |= translations_of(path).keys()
-    for one in lessons:
-        codes |= {one.lesson.language, *one.lesson.translations}
-    return {code: name for code, name in NAMES.items() if code in codes}
 
 
 def check_lessons(places: Iterable[Path]) -> tuple[list[OwnLesson], list[Fault]]:
@@ -127,24 +119,26 @@ def _original(path: Path) -> Path:
 def _check(path: Path) -> tuple[OwnLesson | None, list[Fault]]:
     named = TRANSLATION.fullmatch(path.stem)
     if named is not None and named[2] in NAMES:
-        return None, [
-            Fault(path.name, 0, f"translates {named[1]}{SUFFIX}, which does not exist; write that file first")
-        ]
+        sentence = f"translates {named[1]}{SUFFIX}, which does not exist; write that file first"
+        return None, [Fault(path, 0, sentence)]
+    if named is not None and path.with_name(f"{named[1]}{SUFFIX}").exists():
+        sentence = f"has the unknown language '{named[2]}' in its name; write one of {', '.join(NAMES)}"
+        return None, [Fault(path, 0, sentence)]
     try:
         text = read_text(path)
     except InputError as error:
-        return None, [Fault(path.name, 0, str(error))]
+        return None, [Fault(path, 0, str(error))]
     head, _ = head_of(text)
     line, screen = head.get("screen", (1, ""))
     kind = KINDS.get(screen)
     if kind is None:
         fault = f"has the unknown screen '{screen[:40]}'" if screen else "names no screen"
-        wrong = Fault(path.name, line, f"{fault}; write one such as 'screen: surface': {', '.join(KINDS)}")
+        wrong = Fault(path, line, f"{fault}; write one such as 'screen: surface': {', '.join(KINDS)}")
         return None, [wrong]
     lesson, faults = check_lesson(path, kind)
     faults += _scene_faults(path, head, kind)
     faults += _unknown_names(path, text, kind)
-    faults.sort(key=lambda fault: (fault.file, fault.line))
+    faults.sort(key=lambda fault: (fault.path, fault.line))
     return (None if lesson is None or faults else OwnLesson(path, kind.name, lesson)), faults
 
 
@@ -154,7 +148,7 @@ def _scene_faults(path: Path, head: Mapping[str, tuple[int, str]], kind: Kind[An
     scenes = DEMO_WALKS if kind is WALK else DEMOS
     if line == 0 or scene in scenes:
         return ()
-    return (Fault(path.name, line, f"has the scene '{scene[:40]}'; write one of {', '.join(scenes)}"),)
+    return (Fault(path, line, f"has the scene '{scene[:40]}'; write one of {', '.join(scenes)}"),)
 
 
 def _unknown_names(path: Path, text: str, kind: Kind[Any]) -> list[Fault]:
@@ -170,11 +164,8 @@ def _unknown_names(path: Path, text: str, kind: Kind[Any]) -> list[Fault]:
         near = difflib.get_close_matches(name, folders if key == "open" else _labels(names), n=3, cutoff=0.4)
         what = "folder or tab" if key == "open" else "control or number"
         advice = f"try {' or '.join(near)}" if near else "write its name as it is on the screen"
-        faults.append(
-            Fault(
-                path.name, number, f"has the {what} '{name[:60]}', which its screen does not have; {advice}"
-            )
-        )
+        sentence = f"has the {what} '{name[:60]}', which its screen does not have; {advice}"
+        faults.append(Fault(path, number, sentence))
     return faults
 
 
@@ -182,34 +173,47 @@ def _unknown_names(path: Path, text: str, kind: Kind[Any]) -> list[Fault]:
 def names_on(screen: str) -> tuple[frozenset[str], frozenset[str]]:
     """Return the titles of a screen's folders and tabs, and all texts in its code, its labels among them."""
     folders, texts = set[str](), set[str]()
-    for path in (*(_HERE / "screens" / screen).glob("*.py"), *(_HERE / "window").glob("*.py")):
+    for path in (path for place in (f"screens/{screen}", *_SHARED) for path in (_HERE / place).glob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Constant) and isinstance(node.value, str):
                 texts.add(node.value)
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.args:
                 title = node.args[0]
-                if node.func.attr in ("add_folder", "add_tab") and isinstance(title, ast.Constant):
-                    folders.add(str(title.value))
+                if node.func.attr not in ("add_folder", "add_tab") or not isinstance(title, ast.Constant):
+                    continue
+                if isinstance(title.value, str):
+                    folders.add(title.value)
     return frozenset(folders), frozenset(texts)
 
 
 def _labels(texts: Iterable[str]) -> list[str]:
-    """Return the texts that can be labels: short, and beginning with a capital letter."""
-    return [text for text in texts if text[:1].isupper() and len(text) <= 40 and "\n" not in text]
+    """Return the texts that can be labels: short, no sentences, and beginning with a capital letter."""
+    return [text for text in texts if re.fullmatch(r"[A-Z].{0,38}[^.]", text)]
 
 
 def _twice(one: OwnLesson, others: Iterable[OwnLesson]) -> list[Fault]:
-    """Return a fault if another lesson, own or shipped, has the name or the title of this one."""
+    """Return a fault if another lesson, own or shipped, has the name or a title of this one.
+
+    A title is compared in all languages, because the start page opens a lesson by any of its titles.
+    """
+    taken = dict[str, str]()
     for other in others:
         if other.path.stem == one.path.stem:
-            return [Fault(one.path.name, 0, f"has the name of {other.path}; rename one of the two files")]
-        if other.lesson.title == one.lesson.title:
-            return [Fault(one.path.name, 1, f"has the title of {other.path.name}; give it another title")]
-    shipped = {path.resolve(): head_of(path.read_text("utf-8"))[0]["title"][1] for path in _shipped()}
-    if one.path.resolve() not in shipped and one.lesson.title in shipped.values():
-        return [Fault(one.path.name, 1, "has the title of a lesson that ships; give it another title")]
-    return []
+            return [Fault(one.path, 0, f"has the name of {other.path}; rename one of the two files")]
+        taken |= dict.fromkeys(_titles(other).values(), other.path.name)
+    shipped = [path for path in LESSONS.glob(f"*{SUFFIX}") if _original(path) == path]
+    if one.path.resolve() not in shipped:
+        taken |= {title: "a lesson that ships" for path in shipped for title in titles_of(path).values()}
+    return [
+        Fault(path, 1, f"has the title of {taken[title]}; give it another title")
+        for path, title in _titles(one).items()
+        if title in taken
+    ]
 
 
-def _shipped() -> list[Path]:
-    return [path for path in LESSONS.glob(f"*{SUFFIX}") if _original(path) == path]
+def _titles(one: OwnLesson) -> dict[Path, str]:
+    """Return the titles of a lesson by the files in which they are."""
+    titles = {one.path: one.lesson.title}
+    for code, other in one.lesson.translations.items():
+        titles[one.path.with_name(f"{one.path.stem}.{code}{SUFFIX}")] = other.title
+    return titles

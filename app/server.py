@@ -24,7 +24,8 @@ from app.compute.store import Store
 from app.drawing.colors import BRAND
 from app.landing import app_page
 from app.lesson.languages import preferred
-from app.lessons import OwnLesson, by_kind, languages
+from app.lesson.reading import languages
+from app.lessons import OwnLesson, by_kind
 from app.screens.calibrate.panel import CalibratePanel
 from app.screens.depth.panel import DepthPanel
 from app.screens.export.panel import ExportPanel
@@ -182,7 +183,7 @@ def build_server(
         app.ahead = _working_ahead(pool, store, shared)
     compute_ahead(pool, store, shared, spec, app)
 
-    known = languages(lessons)
+    known = languages(one.lesson for one in lessons)
 
     def begin(target: Target, number: int, lecture: Lecture | None = None) -> Session:
         language = preferred(private.languages(server, number), known)

@@ -98,7 +98,7 @@ def merge_fused(
     joint = partial(_joint, nodes, keep)
     voxel_m = _voxel_m(nodes, joint(), T_world_camera, max_points)
     if mode != "fill":
-        fused = merge(joint(), T_world_camera, voxel_m, smoothing_passes)
+        fused = replace(merge(joint(), T_world_camera, voxel_m, smoothing_passes), sigma_m=None)
         return FusedCloud(fused, voxel_m, *spacing(fused.points_m), None)
     own = beside.submit(thinned, (node.sensor for node in nodes), T_world_camera, voxel_m)
     whole = thinned(joint(), T_world_camera, voxel_m)

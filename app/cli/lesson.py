@@ -45,7 +45,8 @@ def lesson(
                     for one in lessons
                 ],
                 "faults": [
-                    {"file": fault.file, "line": fault.line, "sentence": fault.sentence} for fault in faults
+                    {"file": str(fault.path), "line": fault.line, "sentence": fault.sentence}
+                    for fault in faults
                 ],
             }
         )

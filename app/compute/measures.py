@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
+from app.compute.cuts import Cut
 from pipeline.types import FloatArray
 
 if TYPE_CHECKING:
@@ -60,6 +61,8 @@ class Click:
 
     origin_m: Place
     direction: Place
+    cut: Cut = None
+    """What is left out of the picture and cannot be clicked, in the same frame."""
 
 
 @dataclass(frozen=True, slots=True)

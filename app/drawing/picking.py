@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from app.compute.cuts import Cut, kept
 from pipeline.types import FloatArray
 
 REACH_DEG = 1.5
@@ -28,7 +29,9 @@ class Loop(Protocol):
         ...
 
 
-def picked_hole(holes: Sequence[Loop], origin_m: FloatArray, direction: FloatArray) -> int | None:
+def picked_hole(
+    holes: Sequence[Loop], origin_m: FloatArray, direction: FloatArray, cut: Cut = None
+) -> int | None:
     """Return the hole that a ray selects.
 
     This is the nearest hole that the ray passes through; else the one whose edges it passes at the smallest
@@ -40,6 +43,7 @@ def picked_hole(holes: Sequence[Loop], origin_m: FloatArray, direction: FloatArr
         holes: holes of one surface.
         origin_m: (3,) origin in the frame of the holes.
         direction: (3,) of any length.
+        cut: what is left out of the picture, in the frame of the holes; holes in it cannot be selected.
 
     Returns:
         The index in ``holes``; None if there is none near.
@@ -48,6 +52,8 @@ def picked_hole(holes: Sequence[Loop], origin_m: FloatArray, direction: FloatArr
     best: tuple[bool, float, float] | None = None
     picked = None
     for index, hole in enumerate(holes):
+        if not kept(cut, hole.loop_m).any():
+            continue
         loop = (hole.loop_m - origin_m) @ axes.T
         turns = _turns(loop)
         through = turns > 0 if hole.rim else turns != 0

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from app.compute.records import ColorBar, Picture
-from app.drawing.colors import CONFIDENCE_STOPS, HOLE, ramp
+from app.drawing.colors import BACKGROUND, CONFIDENCE_STOPS, HOLE, ramp
 from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 
 UNKNOWN = (90, 90, 90)
@@ -14,6 +14,18 @@ NEARER, EQUAL, FARTHER = (0, 90, 181), (250, 250, 250), (230, 120, 0)
 FARTHEST_OFF_M = 0.3
 """Difference at which the colour scale stops."""
 BAR_STOPS = 9
+
+
+def opaque(rgba: ByteArray) -> ByteArray:
+    """Return (H, W, 3) a browser's (H, W, 4) picture of its view on the app's background.
+
+    Rows are mixed one by one: all at once, a large picture would take gigabytes.
+    """
+    rgb: ByteArray = np.empty((*rgba.shape[:2], 3), np.uint8)
+    for row, drawn in zip(rgb, rgba, strict=True):
+        share = drawn[:, 3:] / 255.0
+        row[:] = np.round(drawn[:, :3] * share + np.array(BACKGROUND) * (1.0 - share))
+    return rgb
 
 
 def depth_range_m(depth: DepthMap) -> tuple[float, float]:

@@ -152,6 +152,8 @@ class Kind(Generic[Look]):
     """Names of the fields that the texts may use."""
     statement: Callable[[Numbers], str] = lambda numbers: ""
     """Returns a sentence on what the picture shows, from its numbers, for screen readers."""
+    words: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
+    """The words that a number can be, if it is one of three that decide a question, by the number's name."""
 
 
 def screen_of(kind: str) -> str:

@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
-from app.lesson.files import CHOICES, CLAUSE, FIELD, Choice, Kind, Lesson, Look, Question, Stop
+from app.lesson.files import CHOICES, CLAUSE, FIELD, LESSONS, Choice, Kind, Lesson, Look, Question, Stop
 from app.lesson.files import choice as one_of
 from app.lesson.languages import NAMES
 from app.window.teaching import ENGLISH
 from packetmesh.errors import InputError
+from packetmesh.files import text_in
 
 PARTS = ("ask", "choices", "reveal")
 KEYS = ("set", "open", "see")
 """Keys of a section's lines that change the screen."""
 HEAD = ("screen", "scene", "language")
 MOST_BYTES = 1_000_000
-TRANSLATION = re.compile(r"(.+)\.([a-z]{2})")
+TRANSLATION = re.compile(r"(.+)\.([A-Za-z]{2,3}(?:[-_]\w+)?)")
 """Name of a translated lesson's file without its suffix: the original's name and the language."""
 _MARK = re.compile(r"^- \[( |x|[a-z_]+=[a-z]+)\] ", re.MULTILINE)
+_NEARLY = re.compile(rf"\s*({'|'.join((*KEYS, *PARTS))})\s*:", re.IGNORECASE)
+"""Beginning of a line that is a key, or nearly one."""
 Lines = Sequence[tuple[int, str]]
 """Lines of a file with their numbers, which start at 1."""
 
@@ -30,23 +34,23 @@ Lines = Sequence[tuple[int, str]]
 class Fault:
     """What is wrong in a lesson's file, and what to write instead."""
 
-    file: str
+    path: Path
     line: int
     """Line in the file; 0 for the file as a whole."""
     sentence: str
 
     def __str__(self) -> str:
         where = f", line {self.line}," if self.line else ""
-        return f"The lesson {self.file}{where} {self.sentence}."
+        return f"The lesson {self.path.name}{where} {self.sentence}."
 
 
 class _Faults(list[Fault]):
-    def __init__(self, file: str) -> None:
+    def __init__(self, path: Path) -> None:
         super().__init__()
-        self._file = file
+        self._path = path
 
     def add(self, line: int, sentence: str) -> None:
-        self.append(Fault(self._file, line, sentence))
+        self.append(Fault(self._path, line, sentence))
 
 
 def read_lesson(path: Path, kind: Kind[Look]) -> Lesson[Look]:
@@ -81,6 +85,9 @@ def check_lesson(path: Path, kind: Kind[Look]) -> tuple[Lesson[Look] | None, lis
     for code, other in translations_of(path).items():
         translated, wrong = _parse(other, kind, lesson)
         faults += wrong
+        if code == lesson.language:
+            sentence = f"is in the language of {path.name}; rename it, or write 'language:' in {path.name}"
+            faults.append(Fault(other, 0, sentence))
         if translated is not None:
             translations[code] = replace(translated, language=code)
     return replace(lesson, translations=translations), faults
@@ -96,22 +103,43 @@ def translations_of(path: Path) -> dict[str, Path]:
     return found
 
 
+def titles_of(path: Path) -> dict[str, str]:
+    """Return the titles of a lesson that ships, by language, English first."""
+    paths = {ENGLISH: path, **translations_of(path)}
+    return {code: head_of(read_text(one))[0]["title"][1] for code, one in paths.items()}
+
+
+def languages(lessons: Iterable[Lesson[Any]] = ()) -> dict[str, str]:
+    """Return the names of all languages that a shipped lesson or one of these has, by their codes."""
+    codes = {ENGLISH}
+    for path in LESSONS.glob("*.md"):
+        codes |= translations_of(path).keys()
+    for lesson in lessons:
+        codes |= {lesson.language, *lesson.translations}
+    return {code: name for code, name in NAMES.items() if code in codes}
+
+
 def read_text(path: Path) -> str:
     """Return the text of a lesson's file.
 
     Raises:
-        InputError: it is missing, too large, empty, or not text in UTF-8.
+        InputError: it is missing, no file, too large, empty, or no text.
     """
     try:
-        if path.stat().st_size > MOST_BYTES:
+        size_bytes = path.stat().st_size
+        if not path.is_file():  # a pipe or a device could be endless
+            raise InputError("is no file; write the lesson in a text file")
+        if size_bytes > MOST_BYTES:
             raise InputError(
-                f"has more than {MOST_BYTES // 1_000_000} MB; a lesson is a short text in markdown"
+                f"has more than {MOST_BYTES // 1_000_000} MB; write a shorter text, without pictures in it"
             )
-        text = path.read_text(encoding="utf-8-sig")
+        text = text_in(path.read_bytes())
     except UnicodeDecodeError:
         raise InputError("cannot be read as text; save it in the encoding UTF-8") from None
     except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}") from None
+        raise InputError(
+            f"cannot be read ({error.strerror}); give a file that a text editor can open"
+        ) from None
     if "\0" in text:
         raise InputError("cannot be read as text; save it in the encoding UTF-8")
     if not text.strip():
@@ -128,7 +156,7 @@ def head_of(text: str) -> tuple[dict[str, tuple[int, str]], Lines]:
         key, colon, value = line.partition(":")
         if line.startswith("# ") and "title" not in values:
             values["title"] = number, line[2:].strip()
-        elif colon and key in HEAD:
+        elif colon and key in HEAD and key not in values:
             values[key] = number, value.strip()
         elif line.strip():
             others.append((number, line))
@@ -139,7 +167,7 @@ def _parse(
     path: Path, kind: Kind[Look], original: Lesson[Look] | None
 ) -> tuple[Lesson[Look] | None, list[Fault]]:
     """Read one file; with the original it is a translation."""
-    faults = _Faults(path.name)
+    faults = _Faults(path)
     try:
         text = read_text(path)
     except InputError as error:
@@ -154,16 +182,22 @@ def _parse(
     if original is not None:
         for key in HEAD:
             if key in head:
-                faults.add(head[key][0], f"is a translation; leave out '{key}:', it is in {original.name}.md")
+                source = "this file's name" if key == "language" else f"{original.name}.md"
+                faults.add(head[key][0], f"is a translation; leave out '{key}:', it is in {source}")
     sections = _sections(text)
     for number, line in others if sections else ():
-        faults.add(number, f"has '{line.strip()[:40]}' before the first section; begin one with '## title'")
+        faults.add(
+            number,
+            f"has '{line.strip()[:40]}' before the first section, where only the title and one line each of "
+            f"{', '.join(HEAD)} can be; leave it out, or begin a section above it with '## title'",
+        )
     if not sections:
         faults.add(len(text.splitlines()), "has no sections; begin each with a line '## title'")
     if original is not None and sections and len(sections) != len(original.stops):
         count = len(original.stops)
         faults.add(
-            sections[-1][0][0], f"has {len(sections)} sections; translate all {count} of {original.name}.md"
+            sections[-1][0][0],
+            f"ends with section {len(sections)}, and {original.name}.md has {count}; translate each once",
         )
     if faults and (not sections or original is not None):
         return None, faults
@@ -192,7 +226,9 @@ def _check_fields(sections: Sequence[Lines], kind: Kind[Look], faults: _Faults) 
     known = ", ".join(kind.numbers) or "none"
     for number, line in (one for section in sections for one in section):
         for stop, name in FIELD.findall(line):
-            if name not in kind.numbers or (stop and not 1 <= int(stop) <= len(sections)):
+            if stop and not 1 <= int(stop) <= len(sections):
+                faults.add(number, f"has the field {stop}:{name}; number the stop from 1 to {len(sections)}")
+            elif name not in kind.numbers:
                 faults.add(
                     number,
                     f"has the field {stop and f'{stop}:'}{name}, which is not a number of its screen; try "
@@ -209,6 +245,15 @@ def _check_fields(sections: Sequence[Lines], kind: Kind[Look], faults: _Faults) 
                         f"has the field {stop}:{name} outside of double braces; put the whole clause inside, "
                         f"because a reader may have skipped stop {stop}",
                     )
+        plain = FIELD.sub("", CLAUSE.sub(lambda found: found[1], whole))
+        for (number, _), line in zip(section, plain.split("\n"), strict=True):
+            if {"{", "}"} & set(line) and all(fault.line != number for fault in faults):
+                example = kind.numbers[0] if kind.numbers else "name"
+                faults.add(
+                    number,
+                    f"has a brace that belongs to no field; write a number as {{{example}}}, a clause with a "
+                    f"number of another stop as {{{{… {{1:{example}}} …}}}}, and no other braces",
+                )
 
 
 def _stop(section: Lines, kind: Kind[Look], same: Stop[Look] | None, faults: _Faults) -> Stop[Look] | None:
@@ -216,6 +261,13 @@ def _stop(section: Lines, kind: Kind[Look], same: Stop[Look] | None, faults: _Fa
     (first, heading), *lines = section
     title, before = heading[3:].strip(), len(faults)
     where = f"section '{title}'"
+    for number, line in lines:
+        nearly = _NEARLY.match(line)
+        if nearly is not None and nearly[0] != f"{nearly[1].lower()}:":
+            key = nearly[1].lower()
+            faults.add(
+                number, f"begins with '{nearly[0]}'; write '{key}:', without a space and in small letters"
+            )
     changes = [(number, *_parted(line)) for number, line in lines if line.partition(":")[0] in KEYS]
     look, opens, sees = kind.default, list[str](), list[str]()
     for number, key, value in changes:
@@ -260,7 +312,7 @@ def _parts(lines: Lines) -> dict[str, tuple[int, str]]:
     for number, line in lines:
         name, colon, value = line.partition(":")
         if colon and name in PARTS:
-            key, line = name, value
+            key, line = f"{name} again" if name in found else name, value
             found[key] = number, []
         found[key][1].append(line)
     return {key: (number, "\n".join(texts).strip()) for key, (number, texts) in found.items()}
@@ -272,7 +324,8 @@ def _question(
     line = min(number for number, _ in parts.values())
     if tuple(parts) != PARTS or not all(text for _, text in parts.values()):
         faults.add(
-            line, f"{where} must ask with 'ask:', 'choices:' and 'reveal:', in this order, each with text"
+            line,
+            f"{where} must ask with 'ask:', 'choices:' and 'reveal:', in this order, each once and with text",
         )
         return None
     line, written = parts["choices"]
@@ -288,11 +341,12 @@ def _question(
             "or all of them such as '- [name=word] choice | why it is wrong where it is'",
         )
         return None
-    for name in {name for name, _ in computed} - set(kind.numbers):
+    if computed and {word for _, word in computed} != set(kind.words.get(computed[0][0], ())):
+        known = "; ".join(f"{name}: {', '.join(words)}" for name, words in kind.words.items())
         faults.add(
             line,
-            f"{where} has a choice that is right by {name}, which its screen does not compute; try one of "
-            f"{', '.join(kind.numbers) or 'none'}",
+            f"{where} has choices right by words that its screen does not compute; take "
+            f"{f'the three words of one name ({known}), or ' if known else ''}'- [x] choice' once",
         )
     parted = (text.partition(" | ") for text in texts)
     found = tuple(

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from app.compute.cuts import Box, Cut, Place, Plane, Top, planes_of
 from app.looking import labels
 from app.looking.handles import CutHandles
-from app.looking.look import MOST_POINT_MM, Box, Cut, Look, Place, Plane, Top, look_of, planes_of, text_of
-from app.looking.rays import entering
+from app.looking.look import MOST_POINT_MM, Look, look_of, text_of
 from app.looking.room import Room, room_of
 from app.web.markup import Markdown, Markup
 from app.window.page import page_call
@@ -82,6 +82,11 @@ class LookFolder:
         self._ruler = ui.gui.add_checkbox("Scale bar and axes", False, hint=hints["ruler"])
         for handle in (self._drawn, self._light, self._size, self._ruler):
             ui.when_changed(handle, self._set)
+
+    @property
+    def cut(self) -> Cut:
+        """What is left out now; each of the ``parts`` is cut as if it stood in its place in the scene."""
+        return self._look.cut
 
     # The room.
 
@@ -230,18 +235,6 @@ class LookFolder:
         }
         self._sent += 1
         self._mark.content = page_call("look", self._below, list(self._parts), state, mark=self._sent)
-
-    # Clicks.
-
-    def seen(self, action: Callable[[FloatArray, FloatArray], object]) -> Callable[..., None]:
-        """Return ``action`` for clicks, whose rays begin at what is kept and not in what is left out."""
-
-        def clicked(origin_m: FloatArray, direction: FloatArray) -> None:
-            start_m = entering(self._look.cut, origin_m, direction)
-            if start_m is not None:
-                action(start_m, direction)
-
-        return clicked
 
     # The address.
 

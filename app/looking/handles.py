@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import viser
 
+from app.compute.cuts import Box, Cut, Place, Plane, Top, box_axes
 from app.drawing.colors import BRAND
 from app.drawing.poses import wxyz_of
-from app.looking.look import Box, Cut, Place, Plane, Top, box_axes
 from app.looking.room import Room
 from pipeline.kernels.geometry import rigid
 from pipeline.types import FloatArray

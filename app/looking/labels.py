@@ -10,7 +10,9 @@ CUTS = (NOTHING, TOP, PLANE, BOX)
 USUAL, WIRE, LIT = "As usual", "Wireframe", "Light by hand"
 DRAWN = (USUAL, WIRE, LIT)
 X, Y, LEVEL, VIEW, FLIP = "x", "y", "Level", "View", "Flip"
-TEXT = Markdown("This changes only what you see: measures and files always have everything.")
+TEXT = Markdown(
+    "This changes only the view and pictures of it: what is measured, and all other files, have everything."
+)
 HINTS = {
     "cut": "What is left out of the picture. Drag the arrows and rings in the picture to move the cut.",
     "height": "What is above this height is left out.",
@@ -34,8 +36,8 @@ def top_text(room: Room | None) -> Markdown:
         return Markdown("There is nothing to look at yet.")
     if not room.upright:
         return Markdown(
-            "Nobody knows which way is up: this camera's pose is unknown, and its picture is taken to be "
-            "upright. Lower the height, or take **{}** and turn it."
+            "Which way is up is not known: this camera's pose is unknown, and its picture is taken to be "
+            "upright. Lower the height, or choose **{}** and turn the plane."
         ).format(PLANE)
     if room.ceiling_m is None:
         return Markdown(

@@ -32,7 +32,7 @@ window.packetmeshLook = (() => {
     });
   }
 
-  function isCut(planes, inside, x, y, z) {
+  function isCut(planes, inside, {x, y, z}) {
     const behind = plane => plane.normal.x * x + plane.normal.y * y + plane.normal.z * z + plane.constant < 0;
     return planes.length > 0 && (inside ? planes.every(behind) : planes.some(behind));
   }
@@ -103,16 +103,39 @@ window.packetmeshLook = (() => {
     for (const child of object.children) dress(child, found, own, given);
   }
 
+  const placeKey = ({x, y, z}) => [x, y, z].map(Math.fround).join();
+
+  // Return, by place, the planes for labels of a part, which is cut where it stands; none for the part's own name.
+  function planesOfLabels(names, root, look) {
+    const found = new Map();
+    const {nodePoseData, nodeRefFromName} = window.__viserMutable;
+    for (const name of names) {
+      const part = nodeRefFromName[name];
+      if (!part) continue;
+      const planes = planesOf(look, root, part);
+      for (const [label, {position}] of Object.entries(nodePoseData)) {
+        const parent = label.startsWith(`${name}/`) && nodeRefFromName[label.slice(0, label.lastIndexOf("/"))];
+        if (!parent) continue;
+        const place = new root.position.constructor(...position ?? [0, 0, 0]).applyMatrix4(parent.matrixWorld);
+        found.set(placeKey(place), label === `${name}/label` ? [] : planes);
+      }
+    }
+    return found;
+  }
+
   // Labels are drawn all at once; those in the part that is cut off get no visibility.
-  function hideLabels(scene, planes, inside) {
+  function hideLabels(scene, planes, inside, ofParts) {
     const labels = new Set();
     scene.traverse(object => {
       const texture = object.material?.uniforms?.uLabelData?.value;
       if (texture) labels.add(texture);
     });
     for (const {image: {data}} of labels)
-      for (let at = 0; at < data.length; at += 4)
-        if (data[at + 3] > 0 && isCut(planes, inside, data[at], data[at + 1], data[at + 2])) data[at + 3] = 0;
+      for (let at = 0; at < data.length; at += 4) {
+        if (data[at + 3] === 0) continue;
+        const place = {x: data[at], y: data[at + 1], z: data[at + 2]};
+        if (isCut(ofParts.get(placeKey(place)) ?? planes, inside, place)) data[at + 3] = 0;
+      }
   }
 
   function beforeFrame(renderer, scene, camera) {
@@ -126,7 +149,7 @@ window.packetmeshLook = (() => {
       const parts = names.map(name => nodes()[name]).filter(Boolean);
       if (look.light) turnLight(look, root);
       dress(root, {root, parts, look, handles}, planes, [renderer, camera]);
-      if (planes.length > 0) hideLabels(scene, planes, look.inside);
+      if (planes.length > 0) hideLabels(scene, planes, look.inside, planesOfLabels(names, root, look));
     }
   }
 

@@ -8,48 +8,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
+from app.compute.cuts import Box, Cut, Plane, Top
 from packetmesh.errors import InputError
-from pipeline.types import FloatArray
 
-Place: TypeAlias = tuple[float, float, float]
-LEAST_MM, MOST_MM = -9_999_999, 9_999_999
 MOST_POINT_MM = 40
 EXAMPLE = "plane_2500_1800_900_0_1000_0~ruler"
-
-
-@dataclass(frozen=True, slots=True)
-class Top:
-    """Cut off what is above a height."""
-
-    height_m: float
-
-
-@dataclass(frozen=True, slots=True)
-class Plane:
-    """Cut off what is behind a plane."""
-
-    point_m: Place
-    normal: Place
-    """Unit vector to the side that is kept."""
-
-
-@dataclass(frozen=True, slots=True)
-class Box:
-    """Cut off what is outside a box, or inside."""
-
-    centre_m: Place
-    size_m: Place
-    turn_deg: float = 0.0
-    """Turn about the vertical through its centre."""
-    inside: bool = False
-    """Whether the inside is cut off instead of the outside."""
-
-
-Cut: TypeAlias = Top | Plane | Box | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,37 +31,6 @@ class Look:
     """Where the light comes from: azimuth from +x towards +y, and height; None for the light as drawn."""
     ruler: bool = False
     """Whether scale bar and axes are drawn."""
-
-
-def planes_of(cut: Cut) -> list[tuple[FloatArray, FloatArray]]:
-    """Return the planes of a cut, each (3,) a point and (3,) its normal towards the kept side; of a box whose
-    inside is cut off, towards the inside.
-    """
-    if isinstance(cut, Top):
-        return [(np.array([0.0, 0.0, cut.height_m]), np.array([0.0, 0.0, -1.0]))]
-    if isinstance(cut, Plane):
-        return [(np.array(cut.point_m), np.array(cut.normal))]
-    if isinstance(cut, Box):
-        centre_m, axes = np.array(cut.centre_m), box_axes(cut)
-        return [
-            (centre_m + 0.5 * side * cut.size_m[row] * axes[row], -side * axes[row])
-            for row in range(3)
-            for side in (-1.0, 1.0)
-        ]
-    return []
-
-
-def box_axes(box: Box) -> FloatArray:
-    """Return (3, 3): each row is the direction of one of the box's edges."""
-    turn = np.radians(box.turn_deg)
-    return np.array([[np.cos(turn), np.sin(turn), 0.0], [-np.sin(turn), np.cos(turn), 0.0], [0.0, 0.0, 1.0]])
-
-
-def kept(cut: Cut, points_m: FloatArray) -> FloatArray:
-    """Return (N,) whether each of (N, 3) points is kept."""
-    sides = [(points_m - point_m) @ normal >= 0.0 for point_m, normal in planes_of(cut)]
-    within = np.logical_and.reduce(sides) if sides else np.ones(len(points_m), bool)
-    return ~within if isinstance(cut, Box) and cut.inside else within
 
 
 def text_of(look: Look) -> str:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.compute.cuts import Cut
 from app.compute.measures import (
     Click,
     Clicked,
@@ -124,8 +125,14 @@ class MeasureFolder:
 
     # Clicks.
 
-    def clicked(self, origin_m: FloatArray, direction: FloatArray) -> bool:
-        """Take a click, a ray in the world frame; False if clicks do not measure now."""
+    def clicked(self, origin_m: FloatArray, direction: FloatArray, cut: Cut = None) -> bool:
+        """Take a click on what a cut leaves in the picture; False if clicks do not measure now.
+
+        Args:
+            origin_m: (3,) origin of the click's ray, world frame.
+            direction: (3,) direction of the ray.
+            cut: what is left out of the picture, in the frame of the surface.
+        """
         if not self._on.value:
             return False
         ui = self._session.ui
@@ -135,7 +142,7 @@ class MeasureFolder:
         elif self._arguments is not None:
             offset_m = np.asarray(ui.scene.get_handle_by_name(self._node).position)
             ray = [tuple(one.tolist()) for one in (np.asarray(origin_m) - offset_m, np.asarray(direction))]
-            self._clicks = (*self._clicks, Click(*ray))
+            self._clicks = (*self._clicks, Click(ray[0], ray[1], cut))
             self._ask()
         return True
 

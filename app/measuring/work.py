@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from app.compute.cuts import Cut, kept, kept_on_ray
 from app.compute.measures import (
     Click,
     Clicked,
@@ -42,6 +43,7 @@ from pipeline.measuring.planes import Plane, rectangle
 from pipeline.measuring.surface import MeasuredSurface
 from pipeline.types import FloatArray
 
+CUT_OFF = "Only what Look leaves out is under the pointer; click on the surface, or set Leave out to Nothing"
 NO_HOLE = "There is no hole at the click; click a red rim, or into a hole"
 EXTENT = (2.0, 98.0)
 """Percentiles of a plane's vertices between which it is drawn."""
@@ -115,7 +117,7 @@ def _hit(surveys: Sequence[Survey], pending: Clicked, step: Step, click: Click) 
     hits, trouble = list[tuple[float, int, FloatArray]](), InputError("There is nothing to measure")
     for part in parts:
         try:
-            point_m = found(surveys[part].surface, origin_m, direction)
+            point_m = found(surveys[part].surface, origin_m, direction, click.cut)
             hits.append((float(np.linalg.norm(point_m - origin_m)), part, point_m))
         except InputError as error:
             trouble = error
@@ -126,20 +128,32 @@ def _hit(surveys: Sequence[Survey], pending: Clicked, step: Step, click: Click) 
     return part, (x_m, y_m, z_m)
 
 
-def _point_on_ray(surface: MeasuredSurface, origin_m: FloatArray, direction: FloatArray) -> FloatArray:
-    return mark_on_ray(surface, origin_m, direction, "surface").point_m
+def _point_on_ray(
+    surface: MeasuredSurface, origin_m: FloatArray, direction: FloatArray, cut: Cut
+) -> FloatArray:
+    """Return the first point that a ray meets in what is kept."""
+    mark_on_ray(surface, origin_m, direction)  # raises if nothing is there at all
+    for begin, end in kept_on_ray(cut, origin_m, direction):
+        spot = lookup_of(surface).first_on(origin_m + begin * direction, direction)
+        if spot is not None and (spot.point_m - origin_m) @ direction <= end * (direction @ direction):
+            return spot.point_m
+    raise InputError(CUT_OFF)
 
 
-def _rim_on_ray(surface: MeasuredSurface, origin_m: FloatArray, direction: FloatArray) -> FloatArray:
-    """Return the vertex of the rim that a ray means, the one that it passes at the smallest angle."""
+def _rim_on_ray(
+    surface: MeasuredSurface, origin_m: FloatArray, direction: FloatArray, cut: Cut
+) -> FloatArray:
+    """Return the kept vertex of the rim that a ray means, the one that it passes at the smallest angle."""
     loops = [_Loop(surface.vertices_m[hole.loop]) for hole in lookup_of(surface).open_holes]
-    picked = picked_hole(loops, origin_m, direction)
+    picked = picked_hole(loops, origin_m, direction, cut)
     if picked is None:
         raise InputError(NO_HOLE)
-    towards = loops[picked].loop_m - origin_m
+    rim_m = loops[picked].loop_m
+    rim_m = rim_m[kept(cut, rim_m)]
+    towards = rim_m - origin_m
     cosine = towards @ direction / np.linalg.norm(towards, axis=1)
-    rim_m: FloatArray = loops[picked].loop_m[int(cosine.argmax())]
-    return rim_m
+    nearest_m: FloatArray = rim_m[int(cosine.argmax())]
+    return nearest_m
 
 
 def _scaled(surveys: Sequence[Survey], scale: Scale) -> tuple[Sequence[Survey], ScaleView]:

@@ -22,6 +22,7 @@ from app.session.history import History
 from app.session.looking import Looking
 from app.session.picture import ViewPicture
 from app.web.markup import Markup
+from app.web.uploads import plain
 from app.web.viser_private import contents
 from app.window.in_address import STOP, InAddress
 from app.window.page import page_call
@@ -29,11 +30,14 @@ from app.window.palette import KEYS, Entry, Palette
 from app.window.panel import PanelSession
 from app.window.tools import Tools
 from app.window.ui import Ui
+from packetmesh.errors import InputError
 from pipeline.io.demos import DEMOS
 from pipeline.sources import demo_of
 
 REST_S = 0.5
 """Time that nothing has been computed before new entries are looked for, seconds."""
+FAILED, SHOWN_S = "That did not work", 15.0
+"""Title of a notification of an error, and time for which it is shown, seconds."""
 LESSON_FOLDER = "Lesson: "
 """Begin of the title of a lesson's folder: its controls are not offered as settings."""
 TERM = re.compile(r'class="packetmesh-term" data-hint="([^"]+)">([^<]+)<')
@@ -69,6 +73,7 @@ class Palettes:
         self, ui: Ui, client: viser.ClientHandle, on_turned: Callable[[], None] = lambda: None
     ) -> Callable[[], None]:
         """Offer a browser its own entries. Returns the function that is called when it has left."""
+        ui = replace(ui, post=partial(self._session.post, _run_for, client))
         own = OwnPalette(ui, client, Looking(client, self._framing, on_turned), self._file_name)
         self._own.append(own)
         own.offer({})
@@ -210,3 +215,11 @@ class OwnPalette:
     def _call(self, function: str, *arguments: object) -> None:
         self._calls += 1
         self._html.content = page_call(function, *arguments, mark=self._calls)
+
+
+def _run_for(client: viser.ClientHandle, function: Callable[..., object], *arguments: object) -> None:
+    """Run what one browser has requested for itself; only this browser gets the error's sentence."""
+    try:
+        function(*arguments)
+    except InputError as error:
+        client.add_notification(FAILED, plain(str(error)), color="red", auto_close_seconds=SHOWN_S)

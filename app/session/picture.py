@@ -7,31 +7,21 @@ import threading
 from collections.abc import Callable
 
 import cv2
-import numpy as np
 import viser
 
-from app.drawing.colors import BACKGROUND
+from app.drawing.pictures import opaque
+from app.web.gate import MOST_VIEW_PX
 from app.web.markup import Markup
 from app.window.hidden import add_hidden
 from app.window.page import page_call
 from app.window.ui import Ui
 from packetmesh.errors import InputError
-from pipeline.types import ByteArray
 
 TIMES = 2
 """The picture's size over the size of the view in the window."""
-MOST_PX = 8192
-"""Largest width and height of a picture: what graphics cards draw."""
 WAIT_S = 30.0
 SIZE = re.compile(r"\d{1,9} ([1-9]\d{0,4}) ([1-9]\d{0,4})")
 """The page's answer: a number that makes equal answers differ, width and height of the view, CSS pixels."""
-
-
-def opaque(rgba: ByteArray) -> ByteArray:
-    """Return (H, W, 3) RGB of an (H, W, 4) RGBA picture before the page's background."""
-    alpha = rgba[..., 3:].astype(np.float32) / 255.0
-    behind = np.array(BACKGROUND, np.float32)
-    return np.asarray(np.round(rgba[..., :3] * alpha + behind * (1.0 - alpha)), dtype=np.uint8)
 
 
 def size_of(text: str) -> tuple[int, int]:
@@ -44,10 +34,10 @@ def size_of(text: str) -> tuple[int, int]:
     if found is None:
         raise InputError("The browser did not report the size of its view; reload the page and try again.")
     width_px, height_px = TIMES * int(found[1]), TIMES * int(found[2])
-    if max(width_px, height_px) > MOST_PX:
+    if max(width_px, height_px) > MOST_VIEW_PX:
         raise InputError(
-            f"The picture would have {width_px} x {height_px} pixels, more than {MOST_PX}; make the window "
-            "smaller."
+            f"The picture would have {width_px} x {height_px} pixels, more than {MOST_VIEW_PX}; make the "
+            "window smaller."
         )
     return width_px, height_px
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import math
+import struct
 import time
 from collections import Counter
 from collections.abc import Awaitable, Callable, Mapping
@@ -30,6 +31,9 @@ MOST_NAME = 1024
 FARTHEST = 1e7
 """Largest coordinate in the scene, metres."""
 MOST_PIXELS = 100_000
+MOST_VIEW_PX = 8192
+"""Largest width and height of a picture of the view, pixels: what graphics cards draw."""
+PNG = b"\x89PNG\r\n\x1a\n"
 MOST_FORGED = 60
 """Number of messages that no page sends after which the connection is closed."""
 MOST_AT_ONCE, MOST_A_SECOND = 1000.0, 200.0
@@ -236,7 +240,7 @@ class Gate:
 
     def render(self, number: int, message: messages.GetRenderResponseMessage) -> Verdict:
         """Check a picture of the view that the server requested."""
-        if not _is_name(message.render_uuid) or not isinstance(message.payload, bytes):
+        if not _is_name(message.render_uuid) or not _is_picture(message.payload):
             return Verdict.FORGED
         awaited = private.awaits_render(self._server, number)
         return Verdict.PASSES if awaited else Verdict.LATE
@@ -341,6 +345,15 @@ def _within_rate(guest: _Guest) -> bool:
 
 def _is_name(text: object) -> bool:
     return isinstance(text, str) and len(text) <= MOST_NAME
+
+
+def _is_picture(payload: object) -> bool:
+    """Whether this is empty, because the page could not draw, or a PNG file of a size that can be decoded."""
+    if payload == b"":
+        return True
+    if not isinstance(payload, bytes) or not payload.startswith(PNG) or len(payload) < 24:
+        return False
+    return all(1 <= size <= MOST_VIEW_PX for size in struct.unpack(">2I", payload[16:24]))
 
 
 def _is_number(value: object) -> bool:

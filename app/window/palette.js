@@ -1,7 +1,6 @@
 // The keys that work on every screen, the buttons that press them, the command palette, and the stage alone.
 // The server's part is palette.py: each key belongs to an entry of viser's palette, which hears it.
 (() => {
-  const LETTERS = "tfblrcovp"; // keys of the palette's entries; palette.py lists them
   const TEXT = "input:not([type=checkbox], [type=radio], [type=button]), textarea, select, [contenteditable=true]";
   const CLOSED_LIST = "[aria-haspopup=listbox]:not([data-expanded])"; // still has the keyboard after a choice
   const HIDDEN = "Say that all is drawn"; // an entry for the page itself
@@ -35,7 +34,8 @@
     if (mod && key === "z") return event.shiftKey ? "mod+shift+z" : "mod+z";
     if (mod && !event.shiftKey && key === "y") return "mod+shift+z";
     if (!mod && key === "?") return "mod+k";
-    return !mod && !event.shiftKey && (key === "m" || (key.length === 1 && LETTERS.includes(key))) ? key : "";
+    const letters = document.querySelector(".packetmesh-tools")?.dataset.letters ?? ""; // tools.py
+    return !mod && !event.shiftKey && key.length === 1 && letters.includes(key) ? key : "";
   }
 
   function types(target, name) {

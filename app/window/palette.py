@@ -24,6 +24,12 @@ class Key:
     letter: Any
     modifier: Any = None
 
+    @property
+    def name(self) -> str:
+        """Name of the key in ``palette.js``, such as "mod+shift+z"."""
+        held = "" if self.modifier is None else f"{self.modifier}+"
+        return held.replace("cmd/ctrl", "mod") + str(self.letter).lower()
+
 
 KEYS: Mapping[Name, Key] = {
     "above": Key("T"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from app.web.markup import Markup
 from app.window.gui import Gui
+from app.window.palette import KEYS, Name
 
 _PATHS = {
     "find": "M3 10a7 7 0 1 0 14 0a7 7 0 1 0 -14 0M21 21l-6 -6",
@@ -50,15 +51,16 @@ class Tools:
 def row_html(undo: bool, redo: bool) -> Markup:
     """Return HTML of the row."""
     buttons = [
-        _button("undo", "mod+z", "Undo the last change of a setting (Ctrl-Z)", undo),
-        _button("redo", "mod+shift+z", "Redo (Ctrl-Shift-Z or Ctrl-Y)", redo),
+        _button("undo", "Undo the last change of a setting (Ctrl-Z)", undo),
+        _button("redo", "Redo (Ctrl-Shift-Z or Ctrl-Y)", redo),
         _VIEWS.format(_icon("views")),
-        _button("fit", "v", "Fit the view to the window (V)"),
-        _button("picture", "p", "Picture of the view, at twice its size, as a PNG file (P)"),
-        _button("alone", "m", "Full screen: the stage alone (M); Escape comes back"),
+        _button("fit", "Fit the view to the window (V)"),
+        _button("picture", "Picture of the view, at twice its size, as a PNG file (P)"),
+        _button("alone", "Full screen: the stage alone (M); Escape comes back"),
     ]
-    return Markup('<div class="packetmesh-tools">{}{}</div>').format(
-        _FIND.format(_icon("find")), Markup("").join(buttons)
+    letters = "".join(key.name for key in KEYS.values() if key.modifier is None)
+    return Markup('<div class="packetmesh-tools" data-letters="{}">{}{}</div>').format(
+        letters, _FIND.format(_icon("find")), Markup("").join(buttons)
     )
 
 
@@ -66,5 +68,6 @@ def _icon(name: str) -> Markup:
     return _ICON.format(_PATHS[name])
 
 
-def _button(name: str, key: str, title: str, enabled: bool = True) -> Markup:
+def _button(name: Name, title: str, enabled: bool = True) -> Markup:
+    key = KEYS[name].name
     return _BUTTON.format(key, title, title, Markup("") if enabled else Markup(" disabled"), _icon(name))

@@ -55,7 +55,7 @@ def _mapped(frames: FramesInMemory) -> WalkAnswer:
 
 
 def _rolled(points: PointCloud) -> Mesh:
-    """Roll the ball over a map with the default settings."""
+    """Roll the ball over a map with the default radii; the rims stay as they are."""
     cloud = replace(points, source=np.full(len(points), PointSource.SENSOR, np.uint8))
     found = roll_or_nothing(cloud, radii(PRESETS["packetmesh"].surface, *spacing(cloud.points_m)))
     return Mesh(found.vertices_m, found.triangles)

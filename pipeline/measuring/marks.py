@@ -26,7 +26,8 @@ EDGE_SPACINGS = 5.0
 NEAREST = 200
 """Most vertices from which its planes are grown."""
 BESIDE_LINE, GAP = 2.0, 3.0
-"""Vertices within this many spacings of a line show how far it goes; farther apart, it is interrupted."""
+"""Vertices within this many spacings of a line show how far it goes; farther apart, it is interrupted, and a
+plane whose vertices all are farther from a corner ends before it."""
 LEAST_VOLUME = 0.2
 """Least volume that the unit normals of three planes span; flatter corners are open along a line."""
 
@@ -194,19 +195,18 @@ def _on_corner(surface: MeasuredSurface, own: Mark) -> Mark | None:
     planes' rounded border before it: their line is taken to go on by half of that border.
     """
     planes = _faces_near(surface, own, 3)
-    if len(planes) == 3:
-        return _where_meeting(surface, own, planes)
-    if len(planes) < 2:
-        return None
+    corner = _where_meeting(surface, own, planes) if len(planes) == 3 else None
+    if corner is not None or len(planes) < 2:
+        return corner
+    planes = planes[:2]
     line, rounded_m = _line_of(planes), BORDER * lookup_of(surface).spacing_m
     end_m = _end_m(surface, planes, line, float(line @ own.point_m), 0.5 * rounded_m)
     return _where_meeting(surface, own, planes, line, end_m, rounded_m / np.sqrt(12.0))
 
 
 def _line_of(planes: list[Plane]) -> FloatArray:
-    """Return the (3,) unit direction of the line in which two planes meet."""
-    line = np.cross(planes[0].normal, planes[1].normal)
-    return line / np.linalg.norm(line)
+    """Return the (3,) unit direction of the line in which two planes meet; 0 for parallel ones."""
+    return _unit(np.cross(planes[0].normal, planes[1].normal), np.zeros(3))
 
 
 def _end_m(
@@ -257,7 +257,7 @@ def _where_meeting(
     along_m: float = 0.0,
     along_sd_m: float = 0.0,
 ) -> Mark | None:
-    """Return the mark where planes meet; None if that is too far away, or open.
+    """Return the mark where planes meet; None if that is too far away, open, or beyond the end of one.
 
     Args:
         surface: the surface.
@@ -275,7 +275,11 @@ def _where_meeting(
         return None
     back = np.linalg.inv(across)
     point_m = back @ np.array(heights_m)
-    if np.linalg.norm(point_m - own.point_m) > EDGE_SPACINGS * lookup_of(surface).spacing_m:
+    spacing_m = lookup_of(surface).spacing_m
+    if np.linalg.norm(point_m - own.point_m) > EDGE_SPACINGS * spacing_m:
+        return None
+    parts_m = [surface.vertices_m[plane.rows] for plane in planes]
+    if any(np.linalg.norm(part_m - point_m, axis=1).min() > GAP * spacing_m for part_m in parts_m):
         return None
     variances_m2 = [plane.offset_variance_m2(point_m) for plane in planes]
     if line is not None:

@@ -28,6 +28,8 @@ LEAST_WITHIN = 0.1
 BORDER = 2
 """Edges from a part's border within which its vertices are not fitted: smoothing (over 20 neighbours) and the
 rolling ball round what meets it there."""
+LEAST_SPREAD = 1.0
+"""The others are fitted if they spread this many spacings across: those of a narrow part are on a line."""
 FLAT = 0.35
 """Largest ratio of the seed's thickness to its width; a corner or an edge is thicker."""
 MOST_PASSES = 15
@@ -52,7 +54,7 @@ class Plane:
     rows: IntArray
     """Vertices of the part."""
     rms_m: float
-    """Root mean square distance of these vertices from the plane."""
+    """Root mean square distance of the fitted vertices from the plane."""
     guessed: bool
     node: int
     """Node that measured most of it; -1 if several or unknown."""
@@ -84,11 +86,11 @@ def plane_at(surface: MeasuredSurface, point_m: FloatArray) -> Plane:
             f"The surface has no plane at {where} m; try a point in the middle of a flat part, or a "
             "surface of more points"
         )
-    return fitted(surface, rows, _inner(lookup, rows))
+    return fitted(surface, rows, _inner(surface, lookup, rows))
 
 
-def _inner(lookup: Lookup, rows: IntArray) -> IntArray:
-    """Return the vertices of a part that are not next to its border; all if too few are left."""
+def _inner(surface: MeasuredSurface, lookup: Lookup, rows: IntArray) -> IntArray:
+    """Return the vertices of a part that are not next to its border; all if those are few or on a line."""
     inside = np.zeros(len(lookup.rim), bool)
     inside[rows] = True
     for _ in range(BORDER):
@@ -97,7 +99,10 @@ def _inner(lookup: Lookup, rows: IntArray) -> IntArray:
         fewer[ends.ravel()] = False
         inside = fewer
     found = np.flatnonzero(inside)
-    return found if len(found) >= LEAST_POINTS else rows
+    if len(found) < LEAST_POINTS:
+        return rows
+    across_m = _principal(surface.vertices_m[found], np.ones(len(found)))[2][1]
+    return found if across_m >= LEAST_SPREAD * lookup.spacing_m else rows
 
 
 def _grown(surface: MeasuredSurface, lookup: Lookup, seed: int) -> IntArray | None:

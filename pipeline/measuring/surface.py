@@ -128,7 +128,8 @@ def surface_of_rig(
 def measured_cloud(cloud: PointCloud, scale_sd: float = poses.ASSUMED_SCALE_SD) -> MeasuredSurface:
     """Return a cloud, ready to be measured; missing normals and noise are estimated.
 
-    Without ``sigma_m`` the noise is the distance of each point from the plane of its neighbours.
+    Without ``sigma_m``, and where it is NaN, the noise of a point is the distance of its neighbours from its
+    plane.
 
     Args:
         cloud: (N, 3) points; with labels of their source, inferred ones count as guessed.
@@ -148,7 +149,9 @@ def measured_cloud(cloud: PointCloud, scale_sd: float = poses.ASSUMED_SCALE_SD) 
     if cloud.normals is None:
         cloud = estimate_normals(cloud, cloud.points_m.mean(axis=0))
     normals, count = np.asarray(cloud.normals, float), len(cloud)
-    sigma_m = _scatter_m(cloud.points_m, normals) if cloud.sigma_m is None else np.asarray(cloud.sigma_m)
+    sigma_m = np.full(count, np.nan) if cloud.sigma_m is None else np.asarray(cloud.sigma_m, float)
+    if np.isnan(sigma_m).any():
+        sigma_m = np.where(np.isnan(sigma_m), _scatter_m(cloud.points_m, normals), sigma_m)
     guessed = np.zeros(count, bool) if cloud.source is None else cloud.source == PointSource.INFERRED
     return MeasuredSurface(
         np.asarray(cloud.points_m, float),

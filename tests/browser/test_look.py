@@ -15,6 +15,16 @@ PLANE = """() => {
   });
   return found;
 }"""
+SHOWN_LABELS = """() => {
+  const {scene} = window.__viserMutable;
+  const shown = new Set();
+  scene.traverse(({material}) => {
+    const data = material?.uniforms?.uLabelData?.value.image.data ?? [];
+    for (let at = 0; at < data.length; at += 4)
+      if (data[at + 3] > 0) shown.add(data.slice(at, at + 3).join());
+  });
+  return shown.size;
+}"""
 METRES = """() => {
   const {camera, cameraControl} = window.__viserMutable;
   const away = camera.position.distanceTo(cameraControl.getTarget(camera.position.clone()));
@@ -55,6 +65,15 @@ def test_a_plane_cuts_the_surface_and_the_link_shows_it_again(looking):
     afresh(looking, query)
     looking.get_by_text("Up to date").wait_for(timeout=180_000)
     assert plane(looking) == pytest.approx([-number for number in first], abs=0.003)
+
+
+def test_two_surfaces_side_by_side_keep_their_names_above_a_cut(looking):
+    pick(looking, "Show", "side by side")
+    looking.wait_for_function(f"() => ({SHOWN_LABELS})() === 2")
+    pick(looking, "Leave out", "Around a box")
+    plane(looking)
+    looking.wait_for_timeout(1000)
+    assert looking.evaluate(SHOWN_LABELS) == 2
 
 
 def test_the_scale_bar_is_a_round_length_where_the_view_turns(looking):

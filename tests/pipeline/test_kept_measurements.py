@@ -13,6 +13,7 @@ from packetmesh.progress import drain
 from pipeline.config import PRESETS, AcquisitionConfig
 from pipeline.io.demos import DEMO_SCENES
 from pipeline.kernels.rays import Camera, hit_depths
+from pipeline.merging import merge_fused
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction, reconstruct
 from pipeline.sources import Demo, LoadedRig
 from pipeline.spec import Spec
@@ -68,6 +69,15 @@ def test_no_measured_point_is_averaged_with_a_guess(pair):
     fused, sensor = pair[1].clouds.fused, pair[1].clouds.sensor
     np.testing.assert_array_equal(fused.points_m[: len(sensor)], sensor.points_m)
     np.testing.assert_array_equal(fused.source, np.arange(len(fused)) >= len(sensor))
+
+
+def test_only_what_is_measured_alone_has_the_sensors_noise(pair):
+    """Averages of both kinds, and guesses, have none, and so no rim of theirs is moved by it."""
+    rig, result = pair
+    fused = result.clouds.fused
+    np.testing.assert_array_equal(np.isnan(fused.sigma_m), fused.source == PointSource.INFERRED)
+    nodes = drain(run(Spec(LoadedRig(rig)), stages=("nodes",)))["nodes"].value
+    assert merge_fused(rig.frames, nodes, [np.eye(4)], "union", 3000, 0).fused.sigma_m is None
 
 
 def test_the_shares_are_those_of_rays_near_their_measurement(pair):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import numpy as np
@@ -59,9 +60,10 @@ class ExportPanel(Panel):
 
     def on_spec(self, spec: Spec) -> None:
         """Show which surface is exported, and the files that are available."""
-        self._surface.content = Markdown("Surface and page contain **{}**, as on the Surface screen.").format(
-            SURFACES[spec.shown]
-        )
+        self._surface.content = Markdown(
+            "Surface and page contain **{}**, as on the Surface screen, and all of it: a cut under **Look** "
+            "is only in pictures of the view."
+        ).format(SURFACES[spec.shown])
         self._arrange()
 
     def on_view(self, step: Step, view: Any) -> None:
@@ -117,15 +119,20 @@ class ExportPanel(Panel):
                     command.content = command_html(plain(offers.command))
 
     def _clicked(self, kind: str, label: str, client: viser.ClientHandle | None) -> None:
-        """Export a file. Runs on the server's own thread, because a picture waits for the browser to draw."""
+        """Export a file; one with a picture of the view has its own thread, which waits for the browser."""
         offers = self._offers.get(kind)
         offer = next((one for one in offers.files if one.label == label), None) if offers else None
         if offer is None or client is None:
             return
-        picture = self._photograph(client) if offer.photographs else None
-        if offer.photographs and picture is None:
-            return
-        self.ui.post(self._export, offer, () if picture is None else (picture,), client)
+        if offer.photographs:
+            threading.Thread(target=self._export_with_picture, args=(offer, client), daemon=True).start()
+        else:
+            self.ui.post(self._export, offer, (), client)
+
+    def _export_with_picture(self, offer: Offer, client: viser.ClientHandle) -> None:
+        picture = self._photograph(client)
+        if picture is not None:
+            self.ui.post(self._export, offer, (picture,), client)
 
     def _export(self, offer: Offer, seen: tuple[Any, ...], client: viser.ClientHandle) -> None:
         session = self.session

@@ -100,6 +100,10 @@ ALIKE_M = 0.005
 """Final errors that differ by no more than this count as equal."""
 
 
+WORDS = {"more": ("weights", "alike", "plane"), "others": ("far", "close", "nearer")}
+"""Words that decide a question: which of two errors is less; the middle one if they are alike."""
+
+
 def numbers(scene: str, race: Race, view: RaceView) -> Numbers:
     """Return the fields' values for a race; errors are from the reference position or the other cloud."""
     values = dict.fromkeys(NUMBERS, UNKNOWN)
@@ -127,13 +131,13 @@ def _verdicts(ends_m: Mapping[Rival, float]) -> dict[str, str]:
     words = {}
     plane_m, weights_m = ends_m.get(("icp", "plane")), ends_m.get(("ceicp-a", "point"))
     if plane_m is not None and weights_m is not None:
-        words["more"] = _which(weights_m, plane_m, ("weights", "alike", "plane"))
+        words["more"] = _which(weights_m, plane_m, WORDS["more"])
     own_m, others_m = (
         min((end_m for (method, _), end_m in ends_m.items() if method in methods), default=None)
         for methods in (("ceicp-n", "ceicp-a"), ("trimmed-icp", "ficp"))
     )
     if own_m is not None and others_m is not None:
-        words["others"] = _which(own_m, others_m, ("far", "close", "nearer"))
+        words["others"] = _which(own_m, others_m, WORDS["others"])
     return words
 
 
@@ -155,4 +159,4 @@ def statement(values: Mapping[str, str]) -> str:
     return f"{values[SCENE]}, from {values['begin']} off: {', '.join(ends)}."
 
 
-KIND = Kind("fuse", SETTINGS, RaceLook(), NUMBERS, statement)
+KIND = Kind("fuse", SETTINGS, RaceLook(), NUMBERS, statement, WORDS)

@@ -245,4 +245,5 @@ def statement(values: Mapping[str, str]) -> str:
     )
 
 
-KIND = Kind("network", SETTINGS, NetworkLook(), NUMBERS, statement)
+WORDS = {"cost": ("camera", "spread", "nothing")}
+KIND = Kind("network", SETTINGS, NetworkLook(), NUMBERS, statement, WORDS)

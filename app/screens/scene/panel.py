@@ -22,6 +22,7 @@ from app.window.tables import number, table
 from pipeline.config import PRESETS
 from pipeline.io.demos import DEMOS
 from pipeline.sources import ImagePair, Recorded, RigFolder, demo_of
+from pipeline.types import FloatArray
 
 TEXT = Markdown(
     """**What you see.** Each camera node delivers a colour image and a depth image. The points are the
@@ -75,7 +76,7 @@ class ScenePanel(Panel):
         )
         self._looking = LookFolder(self.session, self.drawn_below, surface=False)
         self.in_address |= {"measure": self._measures, "look": self._looking}
-        self.ui.when_clicked(self.drawn_below, self._looking.seen(self._measures.clicked))
+        self.ui.when_clicked(self.drawn_below, self._clicked)
         self._notes = gui.add_markdown(Markdown(""))
         self._color = gui.add_image(EMPTY, label="Colour image")
         self._depth = gui.add_image(EMPTY, label="Sensor depth", format="png")
@@ -113,6 +114,9 @@ class ScenePanel(Panel):
             self._looking.redraw()
         self.session.frame_view(anew=True)
         self._show_node()
+
+    def _clicked(self, origin_m: FloatArray, direction: FloatArray) -> None:
+        self._measures.clicked(origin_m, direction, self._looking.cut)
 
     def _show_node(self) -> None:
         view = self.session.results.view("scene")

@@ -13,8 +13,9 @@ from scipy.spatial.transform import Rotation, Slerp
 from app.compute.records import Shown
 from app.compute.state import Spec
 from app.compute.store import Store
-from app.drawing.colors import BACKGROUND, LOSS
+from app.drawing.colors import LOSS
 from app.drawing.meshes import VIOLET
+from app.drawing.pictures import opaque
 from app.measuring.results import measures_of
 from app.reports.captioned import captioned, gif, on_background, png
 from app.reports.hand_out import viewpoint_of
@@ -90,12 +91,10 @@ def view_job(
 ) -> Generator[Progress, None, bytes]:
     """Return the browser's picture (H, W, 4) on the app's background, with title and legend, as PNG."""
     (rig,) = yield from store.stages(spec, "rig")
-    share = rgba[..., 3:] / 255.0
-    rgb = (rgba[..., :3] * share + np.array(BACKGROUND) * (1.0 - share)).astype(np.uint8)
     legend = legend_of(coloring, rig.truth is not None)
     if rims and legend.bar is None:
         legend = replace(legend, swatches=(*legend.swatches, ("rims of holes", LOSS)))
-    return png(captioned(rgb, rig.name, NAMES[spec.shown], legend))
+    return png(captioned(opaque(rgba), rig.name, NAMES[spec.shown], legend))
 
 
 def _pair(shown: Shown) -> tuple[Shown, Shown]:

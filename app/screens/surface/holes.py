@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from app.compute.cuts import Cut
 from app.drawing.picking import picked_hole
 from app.screens.surface.draw_holes import HoleDrawing
 from app.screens.surface.view import ExplainView, FilledView, HoleView, Which
@@ -108,7 +109,12 @@ class HolesFolder:
         self._parts.content = Markdown("") if parts is None else parts_sentence(parts)
 
     def picked(
-        self, ray_origin_m: FloatArray, ray_direction: FloatArray, which: Which, offset_m: FloatArray
+        self,
+        ray_origin_m: FloatArray,
+        ray_direction: FloatArray,
+        which: Which,
+        offset_m: FloatArray,
+        cut: Cut = None,
     ) -> bool:
         """Choose the hole that was clicked in the scene.
 
@@ -117,12 +123,13 @@ class HolesFolder:
             ray_direction: (3,) world frame.
             which: the surface whose holes are searched.
             offset_m: (3,) offset of that surface in the scene.
+            cut: what is left out of the picture, in the frame of the surface.
 
         Returns:
             Whether the click selected a hole.
         """
         holes = self._holes.get(which, NOTHING)
-        index = picked_hole(holes, np.asarray(ray_origin_m) - offset_m, np.asarray(ray_direction))
+        index = picked_hole(holes, np.asarray(ray_origin_m) - offset_m, np.asarray(ray_direction), cut)
         if index is None:
             return False
         self._which, self._offset_m = which, np.asarray(offset_m)

@@ -122,7 +122,8 @@ def statement(values: Mapping[str, str]) -> str:
     )
 
 
-KIND = Kind("surface", SETTINGS, SurfaceLook(), NUMBERS, statement)
+WORDS = {"better": ("ball", "poisson", "untold")}
+KIND = Kind("surface", SETTINGS, SurfaceLook(), NUMBERS, statement, WORDS)
 
 
 def _better(ball: MeshView, poisson: MeshView) -> str:

@@ -86,7 +86,7 @@ class SurfacePanel(Panel):
         self.in_address |= picked(self._shown, self._picked_shown, self._coloring, self._picked_coloring)
         self._ball = ChosenBall(session, self._stage)
         self._baselines = Baselines(session, self._stage, self._quick, self._made)
-        self.ui.when_clicked(self.drawn_below, self._looking.seen(self._clicked))
+        self.ui.when_clicked(self.drawn_below, self._clicked)
 
     def _build_folders(self) -> None:
         gui, session = self.gui, self.session
@@ -313,12 +313,13 @@ class SurfacePanel(Panel):
 
     def _clicked(self, origin_m: FloatArray, direction: FloatArray) -> None:
         """Measure at the click, or explain the hole that was clicked."""
-        measures = self._measures.clicked(origin_m, direction)
+        cut = self._looking.cut
+        measures = self._measures.clicked(origin_m, direction, cut)
         if measures or self._rolling.showing or self._shown.value in labels.BASELINES:
             return
-        self._ball.clicked(origin_m, direction)
+        self._ball.clicked(origin_m, direction, cut)
         for which in self._stage.which:
-            if self._holes.picked(origin_m, direction, which, self._stage.offset_m(which)):
+            if self._holes.picked(origin_m, direction, which, self._stage.offset_m(which), cut):
                 self._by_click = True
                 return
 

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 import viser
 
+from app.compute.cuts import Cut, kept_on_ray
 from app.compute.records import MeshView
 from app.drawing.cameras import Stage
 from app.drawing.colors import SOURCE
@@ -131,9 +132,17 @@ class ChosenBall:
         self._clicked: tuple[FloatArray, FloatArray] | None = None
         self._request: PaintRequest | None = None
 
-    def clicked(self, origin_m: FloatArray, direction: FloatArray) -> None:
-        """Put the ball where this ray meets the cloud; world frame."""
-        self._clicked = origin_m, direction
+    def clicked(self, origin_m: FloatArray, direction: FloatArray, cut: Cut) -> None:
+        """Put the ball where this ray first meets the cloud in what a cut keeps.
+
+        Args:
+            origin_m: (3,) origin of the ray, world frame.
+            direction: (3,) direction of the ray.
+            cut: what is left out of the picture, in the frame of the surface.
+        """
+        offset_m = self._stage.offset_m(self._stage.which[0])
+        for begin, _ in kept_on_ray(cut, origin_m - offset_m, direction)[:1]:
+            self._clicked = origin_m + begin * direction, direction
 
     def forget(self) -> None:
         """Forget the clicked place, which belongs to another scene."""

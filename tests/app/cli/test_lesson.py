@@ -1,30 +1,14 @@
 """packetmesh lesson check, and serve with a lesson that has a fault."""
 
 import json
+import os
 import re
 
 import pytest
 
 from app.lesson.files import LESSONS
 from tests.app.commands import run as ran
-
-GOOD = """# My radius
-screen: surface
-scene: office
-
-## One
-set: radii = 2 r_F
-open: Holes
-see: Radius (mm)
-Now {missed}.
-
-ask: Which?
-choices:
-- [ ] Red. | No.
-- [x] Blue.
-- [ ] Grey. | No.
-reveal: So.
-"""
+from tests.app.lesson.written import LESSON, TRANSLATION
 
 
 def checked(capsys, *files):
@@ -34,7 +18,7 @@ def checked(capsys, *files):
 
 
 def test_a_good_lesson_and_all_that_ship_have_no_fault(capsys, tmp_path):
-    (tmp_path / "mine.md").write_text(GOOD)
+    (tmp_path / "mine.md").write_text(LESSON)
     code, found, _ = checked(capsys, tmp_path / "mine.md", LESSONS)
     assert (code, found["faults"]) == (0, [])
     assert found["lessons"][0] == {
@@ -72,6 +56,26 @@ def test_a_good_lesson_and_all_that_ship_have_no_fault(capsys, tmp_path):
             "has the control or number 'Radius (cm)', which its screen does not",
         ),
         ("set: radii = 2 r_F", "set: radius = 2", 6, "cannot set radius = 2: try one of show, radii"),
+        ("open: Holes", "open: Look\nopen: Measure\nopen: None", 9, "the folder or tab 'None'"),
+        ("open: Holes", "Open: Holes", 7, "begins with 'Open:'; write 'open:', without a space and in small"),
+        ("set: radii", " set: radii", 6, "begins with ' set:'; write 'set:', without a space"),
+        (
+            "- [ ] Red. | No.\n- [x] Blue.\n- [ ] Grey",
+            "- [better=ball] Red. | No.\n- [better=poisson] Blue. | No.\n- [better=none] Grey",
+            12,
+            "take the three words of one name (better: ball, poisson, untold), or '- [x] choice' once",
+        ),
+        ("{missed}", "{missed", 9, "has a brace that belongs to no field; write a number as {missed}"),
+        ("{missed}", "{Missed}", 9, "has a brace that belongs to no field"),
+        ("{missed}", "{{as {missed}", 9, "has a brace that belongs to no field"),
+        ("{missed}", "{{as {2:missed}}}", 9, "has the field 2:missed; number the stop from 1 to 1"),
+        ("reveal: So.", "reveal: So.\nask: Or?", 11, "in this order, each once and with text"),
+        (
+            "scene: office",
+            "scene: office\nscene: workshop",
+            4,
+            "one line each of screen, scene, language can be",
+        ),
         (
             "{missed}",
             "{mised}",
@@ -92,14 +96,15 @@ def test_a_good_lesson_and_all_that_ship_have_no_fault(capsys, tmp_path):
             1,
             "has the title of a lesson that ships; give it another title",
         ),
+        ("# My radius", "# Welcher Kugelradius?", 1, "has the title of a lesson that ships"),
         ("scene: office", "language: xx", 3, "has an unknown language; write one of en"),
     ],
 )
 def test_a_fault_is_one_sentence_with_file_line_and_remedy(capsys, tmp_path, old, new, line, sentence):
-    (tmp_path / "mine.md").write_text(GOOD.replace(old, new))
+    (tmp_path / "mine.md").write_text(LESSON.replace(old, new))
     code, found, err = checked(capsys, tmp_path / "mine.md")
     assert code == 1
-    assert (found["faults"][0]["file"], found["faults"][0]["line"]) == ("mine.md", line)
+    assert (found["faults"][0]["file"], found["faults"][0]["line"]) == (str(tmp_path / "mine.md"), line)
     assert sentence in found["faults"][0]["sentence"]
     assert "Traceback" not in err
 
@@ -108,13 +113,12 @@ def test_a_fault_is_one_sentence_with_file_line_and_remedy(capsys, tmp_path, old
     ("content", "sentence"),
     [
         (b"", "is empty; begin it with"),
-        (b"\xff\xfe#\x00 \x00", "save it in the encoding UTF-8"),
         ("# Grüße".encode("latin-1"), "save it in the encoding UTF-8"),
         (b"\x89PNG\r\n\x1a\n\x00\x00", "save it in the encoding UTF-8"),
         (b"# A\x00\nx", "save it in the encoding UTF-8"),
         (b"x" * 50_000_000, "has more than 1 MB"),
     ],
-    ids=["empty", "utf-16", "latin-1", "binary", "nul", "50 MB"],
+    ids=["empty", "latin-1", "binary", "nul", "50 MB"],
 )
 def test_a_file_that_is_no_lesson_is_one_sentence(capsys, tmp_path, content, sentence):
     (tmp_path / "mine.md").write_bytes(content)
@@ -124,10 +128,54 @@ def test_a_file_that_is_no_lesson_is_one_sentence(capsys, tmp_path, content, sen
     assert sentence in found["faults"][0]["sentence"]
 
 
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_lesson_as_windows_writes_it_has_no_fault(capsys, tmp_path, encoding):
+    (tmp_path / "mine.md").write_bytes(LESSON.replace("\n", "\r\n").encode(encoding))
+    assert checked(capsys, tmp_path / "mine.md")[1]["faults"] == []
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes with names")
+def test_what_is_no_readable_file_is_one_sentence_and_never_waited_for(capsys, tmp_path):
+    os.mkfifo(tmp_path / "a.md")
+    (tmp_path / "b.md").mkdir()
+    (tmp_path / "c.md").symlink_to(tmp_path / "c.md")
+    code, found, _ = checked(capsys, tmp_path)
+    assert code == 1
+    sentences = [fault["sentence"] for fault in found["faults"]]
+    assert sentences[:2] == ["is no file; write the lesson in a text file"] * 2
+    assert re.fullmatch(r"cannot be read \(.+\); give a file that a text editor can open", sentences[2])
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("mine.xx.md", "has the unknown language 'xx' in its name; write one of en"),
+        ("mine.pt-BR.md", "has the unknown language 'pt-BR' in its name"),
+        ("mine.en.md", "is in the language of mine.md; rename it, or write 'language:' in mine.md"),
+    ],
+)
+def test_a_translation_into_no_other_language_says_how_to_name_it(capsys, tmp_path, name, sentence):
+    (tmp_path / "mine.md").write_text(LESSON)
+    (tmp_path / name).write_text(TRANSLATION)
+    code, found, _ = checked(capsys, tmp_path)
+    assert code == 1
+    assert [fault["file"] for fault in found["faults"]] == [str(tmp_path / name)]
+    assert sentence in found["faults"][0]["sentence"]
+
+
+def test_the_title_of_a_translation_is_compared_with_all_titles(capsys, tmp_path):
+    (tmp_path / "mine.md").write_text(LESSON)
+    (tmp_path / "mine.de.md").write_text(TRANSLATION.replace("Mein Radius", "Welcher Kugelradius?"))
+    _, found, _ = checked(capsys, tmp_path)
+    assert [(fault["file"], fault["sentence"]) for fault in found["faults"]] == [
+        (str(tmp_path / "mine.de.md"), "has the title of a lesson that ships; give it another title")
+    ]
+
+
 def test_two_lessons_of_one_name_or_title(capsys, tmp_path):
     for name in ("a/mine.md", "b/mine.md", "a/other.md"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text(GOOD)
+        (tmp_path / name).write_text(LESSON)
     code, found, _ = checked(capsys, tmp_path / "a", tmp_path / "b", tmp_path / "a" / "mine.md")
     assert code == 1
     sentences = [fault["sentence"] for fault in found["faults"]]
@@ -149,7 +197,7 @@ def test_a_place_without_lessons_and_wrong_use(capsys, tmp_path):
 
 
 def test_serve_does_not_start_with_a_lesson_that_has_a_fault(capsys, tmp_path):
-    (tmp_path / "mine.md").write_text(GOOD.replace("{missed}", "{mised} {fo}"))
+    (tmp_path / "mine.md").write_text(LESSON.replace("{missed}", "{mised} {fo}"))
     code, _, err = ran(capsys, "serve", "--lesson", str(tmp_path / "mine.md"))
     assert code == 1
     assert "mine.md, line 9, has the field mised" in err

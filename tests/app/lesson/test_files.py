@@ -50,7 +50,7 @@ The sea.
 
 def kind_of(*numbers):
     """A screen that sets what the race sets, and computes these numbers."""
-    return Kind("fuse", SETTINGS, RaceLook(), numbers)
+    return Kind("fuse", SETTINGS, RaceLook(), numbers, words={"sky": ("red", "blue", "grey")})
 
 
 def lesson(tmp_path, text):
@@ -224,11 +224,18 @@ def test_a_field_is_the_number_of_now_or_of_another_stop_in_the_same_scene(tmp_p
     assert ui.gui.text() == BEGIN
 
 
-@pytest.mark.parametrize("field", ["{begun}", "{3:end}", "{0:end}"])
-def test_a_field_that_nobody_computes_is_one_sentence(tmp_path, field):
+@pytest.mark.parametrize(
+    ("field", "sentence"),
+    [
+        ("{begun}", "not a number of its screen; try one of end"),
+        ("{{was {3:end}}}", "the field 3:end; number the stop from 1 to 2"),
+        ("{{was {0:end}}}", "the field 0:end; number the stop from 1 to 2"),
+    ],
+)
+def test_a_field_that_nobody_computes_is_one_sentence(tmp_path, field, sentence):
     path = tmp_path / "lesson.md"
     path.write_text(f"# A\n## One\nx {field}\n## Two\ny")
-    with pytest.raises(InputError, match="not a number of its screen; try one of end"):
+    with pytest.raises(InputError, match=sentence):
         read_lesson(path, kind_of("end"))
 
 

@@ -5,11 +5,13 @@ from collections import Counter
 
 import pytest
 
-from app.lesson.files import CLAUSE, FIELD, LESSONS
+from app.lesson.files import CLAUSE, FIELD, LESSONS, screen_of
 from app.lesson.languages import NAMES, PHRASES
-from app.lesson.reading import check_lesson, read_lesson, translations_of
-from app.lessons import check_lessons, languages, names_on
+from app.lesson.reading import check_lesson, languages, read_lesson, translations_of
+from app.lessons import check_lessons, names_on
+from app.screens.surface import lesson as surface
 from tests.app.lesson.test_files import KINDS
+from tests.app.lesson.written import LESSON, TRANSLATION
 
 SHIPPED = ("de", "es", "th")
 EMPHASIZED = re.compile(r"\*+([^*]+)\*+")
@@ -25,6 +27,7 @@ ENGLISH = re.compile(
     r"\b(the|of|and|is|are|with|from|this|that|which|what|why|how|not|all|when|where|depth|surface|point|points)\b",
     re.IGNORECASE,
 )
+QUESTION = TRANSLATION[TRANSLATION.index("ask:") :]
 CASES = [(path, code) for path in KINDS for code in SHIPPED]
 
 
@@ -68,8 +71,7 @@ def test_a_translation_has_the_stops_the_choices_and_the_numbers_of_the_original
 
 @pytest.mark.parametrize(("path", "code"), CASES, ids=lambda value: getattr(value, "stem", value))
 def test_a_translation_names_the_controls_as_the_screen_does(path, code):
-    screen = {"walk": "fuse"}.get(KINDS[path].name, KINDS[path].name)
-    names = names_on(screen)[1] | names_on("surface")[0]
+    names = names_on(screen_of(KINDS[path].name))[1] | names_on("surface")[0]
     other = path.with_name(f"{path.stem}.{code}.md")
     for one, same in zip(bodies(path), bodies(other), strict=True):
         missing = {name for name in emphasized_labels(one, names) if name not in " ".join(same.split())}
@@ -106,59 +108,35 @@ def test_a_language_has_all_phrases_with_the_same_places():
     )
 
 
-ORIGINAL = """# A
-screen: fuse
-
-## One
-set: lane = 2
-Now {end_1}.
-
-ask: Which?
-choices:
-- [ ] Red. | No.
-- [x] Blue.
-- [ ] Grey. | No.
-reveal: So.
-"""
-
-
 @pytest.mark.parametrize(
-    ("text", "line", "sentence"),
+    ("old", "new", "line", "sentence"),
     [
-        (ORIGINAL.replace("screen: fuse\n", ""), 4, "leave out 'set:'"),
-        (ORIGINAL.replace("set: lane = 2\n", ""), 2, "leave out 'screen:'"),
-        ("# B\n\n## Eins\nJetzt.\n\n## Zwei\nDort {end_1}.\n", 6, "has 2 sections; translate all 1 of"),
-        ("# B\n\n## Eins\nJetzt {end_1}.\n", 3, "must ask if and only if 'One' of the original does"),
+        ("## Eins\n", "## Eins\nset: radii = 2 r_F\n", 4, "leave out 'set:'"),
+        ("# Mein Radius\n", "# Mein Radius\nscreen: surface\n", 2, "leave out 'screen:', it is in mine.md"),
+        ("# Mein Radius\n", "# Mein Radius\nlanguage: de\n", 2, "it is in this file's name"),
+        ("reveal: So.", "reveal: So.\n\n## Zwei\nDort.", 13, "ends with section 2, and mine.md has 1"),
+        (TRANSLATION.partition("ask:")[2], "", 6, "must ask with 'ask:', 'choices:' and 'reveal:'"),
+        (QUESTION, "", 3, "must ask if and only if 'One' of the original does"),
+        ("{missed}", "", 3, "lacks the field {missed}"),
+        ("{missed}", "{missed} {unused}", 3, "field {unused}, which 'One' of the original does not have"),
         (
-            "# B\n\n## Eins\nJetzt.\n" + ORIGINAL.partition("\n\n")[2].partition("\n\n")[2],
-            3,
-            "lacks the field {end_1}",
-        ),
-        (
-            ORIGINAL.replace("screen: fuse\n", "").replace("set: lane = 2\n", "{end_2} "),
-            3,
-            "has the field {end_2}, which 'One' of the original does not have",
-        ),
-        (
-            ORIGINAL.replace("screen: fuse\n", "")
-            .replace("set: lane = 2\n", "")
-            .replace("[x] Blue.", "[ ] Blue. | No.")
-            .replace("[ ] Red. | No.", "[x] Red."),
+            "- [ ] Rot. | Nein.\n- [x] Blau.",
+            "- [x] Rot.\n- [ ] Blau. | Nein.",
             3,
             "must have the marks of 'One' of the original",
         ),
     ],
 )
-def test_a_translation_that_differs_is_told_by_file_and_line(tmp_path, text, line, sentence):
-    (tmp_path / "mine.md").write_text(ORIGINAL)
-    (tmp_path / "mine.de.md").write_text(text)
-    _, faults = check_lesson(tmp_path / "mine.md", KINDS[next(one for one in KINDS if "icp" in one.stem)])
-    assert [(fault.file, fault.line) for fault in faults][:1] == [("mine.de.md", line)]
+def test_a_translation_that_differs_is_told_by_file_and_line(tmp_path, old, new, line, sentence):
+    (tmp_path / "mine.md").write_text(LESSON)
+    (tmp_path / "mine.de.md").write_text(TRANSLATION.replace(old, new))
+    _, faults = check_lesson(tmp_path / "mine.md", surface.KIND)
+    assert [(fault.path.name, fault.line) for fault in faults][:1] == [("mine.de.md", line)]
     assert sentence in faults[0].sentence
 
 
 def test_a_translation_of_a_lesson_that_does_not_exist_names_the_file_to_write(tmp_path):
-    (tmp_path / "mine.de.md").write_text("# B\n\n## Eins\nJetzt.\n")
+    (tmp_path / "mine.de.md").write_text(TRANSLATION)
     lessons, faults = check_lessons([tmp_path / "mine.de.md"])
     assert lessons == []
     assert "mine.md, which does not exist; write that file first" in str(faults[0])

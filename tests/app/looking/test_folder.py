@@ -6,9 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from app.compute.cuts import Box, Plane, Top
 from app.looking import labels
 from app.looking.folder import LookFolder
-from app.looking.look import Box, Plane, Top, look_of
+from app.looking.look import look_of
 from packetmesh.errors import InputError
 from pipeline.kernels.geometry import look_at
 from tests.app.fakes import page_calls, ui_of
@@ -168,13 +169,3 @@ def test_another_scene_drops_the_cut_but_not_the_rest(session):
     session.spec = SimpleNamespace(source="two")
     session.folder.on_spec()
     assert session.folder.place() == "wire"
-
-
-def test_clicks_pass_through_what_is_left_out(session):
-    rays = []
-    click = session.folder.seen(lambda *ray: rays.append(ray))
-    session.folder.take("top_1500")
-    click(np.array([1.0, 1.0, 3.0]), np.array([0.0, 0.0, -1.0]))
-    assert rays[0][0] == pytest.approx([1.0, 1.0, 1.5])
-    click(np.array([1.0, 1.0, 3.0]), np.array([1.0, 0.0, 0.0]))
-    assert len(rays) == 1

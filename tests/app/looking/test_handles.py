@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from app.compute.cuts import Box, Plane, Top, kept, planes_of
 from app.looking.handles import CutHandles, facing, turned, with_face
-from app.looking.look import Box, Plane, Top, kept, planes_of
 from app.looking.room import Room
 
 ROOM = Room(np.array([0.0, 0.0, 0.0]), np.array([4.0, 3.0, 2.5]), 2.4, True)

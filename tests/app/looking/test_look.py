@@ -1,10 +1,9 @@
-"""The look as text, and which side of its cuts is kept."""
+"""The look as text."""
 
-import numpy as np
 import pytest
 
-from app.looking.look import Box, Look, Plane, Top, kept, look_of, planes_of, text_of
-from app.looking.rays import entering
+from app.compute.cuts import Box, Plane, Top
+from app.looking.look import Look, look_of, text_of
 from packetmesh.errors import InputError
 
 LOOKS = {
@@ -51,45 +50,3 @@ def test_other_texts_are_refused_with_an_example(text):
     with pytest.raises(InputError, match="try one such as") as caught:
         look_of(text)
     look_of(str(caught.value).rpartition(" ")[2])  # which works
-
-
-def test_what_is_above_a_height_behind_a_plane_or_outside_a_box_is_left_out():
-    points_m = np.array([[0.0, 0.0, 0.1], [0.0, 0.0, 0.3], [0.9, 0.0, 0.1]])
-    assert kept(Top(0.2), points_m).tolist() == [True, False, True]
-    assert kept(Plane((0.5, 0.0, 0.0), (1.0, 0.0, 0.0)), points_m).tolist() == [False, False, True]
-    box = Box((0.0, 0.0, 0.1), (2.0, 0.2, 0.2))
-    assert kept(box, points_m).tolist() == [True, False, True]
-    assert kept(Box(box.centre_m, box.size_m, inside=True), points_m).tolist() == [False, True, False]
-    assert kept(Box(box.centre_m, box.size_m, 90.0), points_m).tolist() == [True, False, False]
-    assert kept(None, points_m).all()
-
-
-def test_a_box_turns_from_x_towards_y():
-    box = Box((1.0, 1.0, 0.0), (2.0, 0.2, 0.2), 30.0)
-    tip_m = np.array([1.0, 1.0, 0.0]) + 0.99 * np.array([np.cos(np.pi / 6), np.sin(np.pi / 6), 0.0])
-    assert kept(box, tip_m[None]).all()
-    assert not kept(box, (tip_m * [1.0, -1.0, 1.0] + [0.0, 2.0, 0.0])[None]).any()
-    for point_m, normal in planes_of(box):
-        assert (np.array(box.centre_m) - point_m) @ normal > 0.0
-
-
-RAY = np.array([0.0, -5.0, 0.5]), np.array([0.0, 2.0, 0.0])
-
-
-def test_a_ray_begins_where_it_enters_what_is_kept():
-    front = Plane((0.0, -1.0, 0.0), (0.0, 1.0, 0.0))
-    assert entering(front, *RAY) == pytest.approx([0.0, -1.0, 0.5])
-    assert entering(Plane((0.0, -1.0, 0.0), (0.0, -1.0, 0.0)), *RAY) == pytest.approx(RAY[0])
-    assert entering(Top(0.4), *RAY) is None
-    assert entering(Top(0.6), *RAY) == pytest.approx(RAY[0])
-    box = Box((0.0, 1.0, 0.5), (1.0, 1.0, 1.0))
-    assert entering(box, *RAY) == pytest.approx([0.0, 0.5, 0.5])
-    assert entering(Box((3.0, 1.0, 0.5), (1.0, 1.0, 1.0)), *RAY) is None
-    assert entering(Box((0.0, -8.0, 0.5), (1.0, 1.0, 1.0)), *RAY) is None  # behind the viewer
-    assert entering(None, *RAY) == pytest.approx(RAY[0])
-
-
-def test_a_ray_out_of_a_cut_off_inside_begins_at_its_far_side():
-    around = Box((0.0, -5.0, 0.5), (1.0, 1.0, 1.0), inside=True)
-    assert entering(around, *RAY) == pytest.approx([0.0, -4.5, 0.5])
-    assert entering(Box((0.0, 0.0, 0.5), (1.0, 1.0, 1.0), inside=True), *RAY) == pytest.approx(RAY[0])

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.compute.cuts import Box
 from app.compute.measures import Scale, Tape
 from app.measuring import labels
 from app.measuring.address import tape_of
 from app.measuring.folder import DELETE, DELETE_ALL, NONE, SET, UNDO, MeasureFolder
-from app.measuring.work import answer
+from app.measuring.work import CUT_OFF, answer
 from packetmesh.errors import InputError
 from tests.app.fakes import ui_of
 from tests.app.measuring.surfaces import EYE, steps
@@ -42,9 +43,9 @@ class Session:
         if not self.late:
             on_end(answer([self.surface], request))
 
-    def click(self, *point_m):
+    def click(self, *point_m, cut=None):
         """Click at a point of the surface, which may be drawn elsewhere."""
-        return self.folder.clicked(EYE + self.frame.position, np.array(point_m) - EYE)
+        return self.folder.clicked(EYE + self.frame.position, np.array(point_m) - EYE, cut)
 
     def texts(self):
         found = self.ui.scene._handle_from_node_name
@@ -66,6 +67,16 @@ def test_nothing_is_measured_before_it_is_turned_on(session):
     session.gui.set("Clicks measure", True)
     assert len(session.asked) == 1  # which prepares the surface
     assert "Click the first end." in session.gui.text()
+
+
+def test_a_cut_is_where_the_surface_is_drawn(session):
+    session.frame.position = (3.0, 0.0, 0.0)  # one of two surfaces side by side
+    session.gui.set("Clicks measure", True)
+    session.click(*ON_TOP, cut=Box((0.1, 0.1, 0.5), (0.2, 0.2, 0.2)))
+    assert "Click the second end." in session.gui.text()
+    session.click(*ALSO_ON_TOP, cut=Box((0.1, 0.1, 0.5), (0.2, 0.2, 0.2)))
+    assert CUT_OFF in session.gui.text()
+    assert session.folder.place() == ""
 
 
 def test_two_clicks_are_a_length_in_list_picture_and_address(session):

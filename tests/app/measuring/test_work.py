@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.compute.measures import Clicked, MeasureRequest, Scale, Taken
-from app.measuring.work import NO_HOLE, NO_PART, answer
+from app.compute.cuts import Box, Plane, Top
+from app.compute.measures import Click, Clicked, MeasureRequest, Scale, Taken
+from app.measuring.work import CUT_OFF, NO_HOLE, NO_PART, answer
 from tests.app.measuring.surfaces import steps, towards
 
 SURFACE = steps()
@@ -15,8 +16,8 @@ ON_FLOOR, ON_WALL = (-0.3, -0.3, 0.0), (0.4, 1.0, 1.0)
 LENGTH = Taken("distance", "surface", (ON_TOP, ALSO_ON_TOP))
 
 
-def clicked(kind, *points_m, snap="surface", surfaces=(SURFACE,)):
-    clicks = tuple(towards(*point_m) for point_m in points_m)
+def clicked(kind, *points_m, snap="surface", surfaces=(SURFACE,), cut=None):
+    clicks = tuple(replace(towards(*point_m), cut=cut) for point_m in points_m)
     return answer(surfaces, MeasureRequest((), Clicked(kind, snap), clicks))
 
 
@@ -100,6 +101,44 @@ def test_a_click_without_a_hole_says_so_and_one_into_a_hole_means_it():
     holed = replace(SURFACE, triangles=SURFACE.triangles[~gone])
     made = only(clicked("hole", (0.4, 0.4, 0.5), surfaces=(holed,)))
     assert value(made) == pytest.approx(gone.sum() * 0.5 * 0.02**2, rel=1e-6)
+
+
+TABLE = Box((0.4, 0.4, 0.5), (0.9, 0.9, 0.1))
+
+
+@pytest.mark.parametrize(
+    "cut", [Top(0.3), replace(TABLE, inside=True), Plane((0.0, 0.0, 0.4), (0.0, 0.0, -1.0))]
+)
+def test_a_click_through_what_is_cut_off_meets_what_is_behind_it(cut):
+    ((x_m, y_m, z_m),) = clicked("distance", ON_TOP, cut=cut).pending.points_m
+    assert z_m == pytest.approx(0.0, abs=1e-3)
+    assert (x_m, y_m) == pytest.approx((0.025, 0.625), abs=2e-3)  # on the same line of sight
+
+
+@pytest.mark.parametrize(
+    ("click", "cut"),
+    [
+        (towards(*ON_FLOOR), TABLE),  # behind the far side of a kept box
+        (towards(*ON_FLOOR), Plane((0.0, 0.0, 0.2), (0.0, 0.0, 1.0))),
+        (Click((0.1, 0.1, 0.2), (0.0, 0.0, 1.0)), Top(0.4)),  # up at a ceiling that is cut off
+        (Click((0.1, 0.1, 0.7), (0.0, 0.0, 2.0)), None),
+    ],
+)
+def test_what_is_cut_off_cannot_be_clicked(click, cut):
+    request = MeasureRequest((), Clicked("distance", "surface"), (replace(click, cut=cut),))
+    answered = answer([SURFACE], request)
+    assert answered.pending.points_m == ()
+    assert answered.missed == CUT_OFF if cut is not None else "no surface" in answered.missed
+
+
+def test_a_hole_that_is_cut_off_cannot_be_clicked():
+    away_m = np.linalg.norm(SURFACE.vertices_m - np.array([0.4, 0.4, 0.5]), axis=1)
+    gone = np.isin(SURFACE.triangles, np.flatnonzero(away_m < 0.05)).any(axis=1)
+    holed = replace(SURFACE, triangles=SURFACE.triangles[~gone])
+    up = Click((0.4, 0.4, 0.1), (0.0, 0.05, 1.0))
+    for cut, points in ((Top(0.6), 1), (Top(0.45), 0)):
+        request = MeasureRequest((), Clicked("hole", "surface"), (replace(up, cut=cut),))
+        assert len(answer([holed], request).completed) == points
 
 
 def test_what_is_no_longer_on_a_surface_has_a_reason_and_no_number():

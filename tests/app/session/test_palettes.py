@@ -7,10 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from app.drawing.pictures import opaque
 from app.session.framing import Framing
 from app.session.looking import Looking
 from app.session.palettes import TERM
-from app.session.picture import opaque, size_of
+from app.session.picture import size_of
 from app.window.palette import KEYS, Entry, Palette
 from app.window.tables import term
 from app.window.tools import Tools, row_html
@@ -54,6 +55,14 @@ def test_no_key_has_two_meanings_and_none_belongs_to_the_view_a_lesson_or_a_dock
     keys = [(key.letter, key.modifier) for key in KEYS.values()]
     assert len(set(keys)) == len(keys)
     assert not {letter for letter, modifier in keys if modifier is None} & set("WASDQEK123 +-")
+
+
+def test_the_page_knows_the_keys_by_the_names_that_the_buttons_have():
+    row = row_html(True, True)
+    named = ["mod+k", "mod+z", "mod+shift+z", "v", "p", "m"]
+    assert re.findall('data-packetmesh-key="(.*?)"', row) == named
+    (letters,) = re.findall('data-letters="(.*?)"', row)
+    assert sorted(letters) == sorted(key.letter.lower() for key in KEYS.values() if key.modifier is None)
 
 
 def test_undo_and_redo_can_be_pressed_only_while_they_have_something_to_do():

@@ -11,6 +11,8 @@ from pipeline.measuring.lookup import lookup_of
 from pipeline.measuring.marks import mark, mark_on_ray
 from pipeline.measuring.planes import plane_at
 from pipeline.measuring.propagation import Z95
+from pipeline.measuring.surface import measured_cloud
+from pipeline.types import PointCloud
 from tests.pipeline.measuring.scenes import BOX_M, box_on_table, joined, measured, sheet
 
 SIGMA_M = 0.002
@@ -135,6 +137,47 @@ def test_a_corner_whose_third_face_was_not_seen_ends_its_edge():
     assert abs(end.point_m[1]) < 2.0 * along_sd_m
     far = mark(surface, np.array([0.15, 0.1, 0.15]), "vertex")
     assert far.point_m == pytest.approx([0.15, 0.1, 0.15])
+
+
+@pytest.mark.parametrize("gap_m", [0.03, 0.04])
+def test_a_wall_behind_a_box_makes_no_corner_of_it(gap_m):
+    """The box's back was not seen; its top would meet the wall behind it in the air."""
+    w, d, h = BOX_M
+    x, y, z = np.eye(3)
+    box = (
+        sheet(30, 20, 0.01, (0, 0, h), x, y),
+        sheet(20, 15, 0.01, (0, d, 0), -y, z),
+        sheet(20, 15, 0.01, (w, 0, 0), y, z),
+    )
+    surface = measured(joined(*box, sheet(60, 40, 0.01, (-0.1, d + gap_m, 0.0), x, z)), SIGMA_M)
+    end = mark(surface, np.array([0.003, d - 0.004, h]), "vertex")
+    assert end.point_m[[0, 2]] == pytest.approx([0.0, h], abs=1e-3)
+    assert abs(end.point_m[1] - d) < 2.0 * np.sqrt(end.covariance_m2[1, 1])
+    with pytest.raises(InputError, match="No edge is near"):
+        mark(surface, np.array([0.1, d - 0.004, h]), "edge")
+
+
+def test_faces_of_a_thin_board_meet_nowhere():
+    sheets = sheet(20, 20, 0.01), sheet(20, 20, 0.01, (0.2, 0.0, -0.01), (-1, 0, 0))
+    board = measured(joined(*sheets), SIGMA_M)
+    place_m = np.array([0.1, 0.1, 0.0])
+    assert mark(board, place_m, "vertex").point_m == pytest.approx(place_m)
+    with pytest.raises(InputError, match="No edge is near"):
+        mark(board, place_m, "edge")
+
+
+def test_points_of_unknown_noise_are_as_noisy_as_their_neighbours_show():
+    """A merged cloud has no noise for inferred points."""
+    vertices_m, _, normals = sheet(20, 20, 0.01)
+    rough_m = 0.001
+    vertices_m[:, 2] += np.random.default_rng(5).normal(0.0, rough_m, len(vertices_m))
+    inferred = vertices_m[:, 0] > 0.105
+    sigma_m = np.where(inferred, np.nan, SIGMA_M)
+    cloud = PointCloud(vertices_m, normals=normals, sigma_m=sigma_m, source=inferred.astype(np.uint8))
+    surface = measured_cloud(cloud)
+    assert np.all(surface.sigma_m[~inferred] == SIGMA_M)
+    assert np.median(surface.sigma_m[inferred]) == pytest.approx(rough_m, rel=0.25)
+    assert plane_at(surface, np.array([0.1, 0.1, 0.0])).normal == pytest.approx([0.0, 0.0, 1.0], abs=0.02)
 
 
 def test_what_several_nodes_saw_is_where_one_of_them_saw_it():

@@ -105,3 +105,13 @@ def test_a_rounded_border_does_not_tilt_the_plane():
     assert len(plane.rows) == len(vertices_m)
     assert plane.normal == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
     assert np.degrees(np.arccos(fitted(surface, plane.rows).normal[2])) > 0.5
+
+
+@pytest.mark.parametrize("columns", [4, 5, 6])
+def test_a_narrow_part_is_fitted_whole(columns):
+    """Without its border it would be a line of vertices, around which a plane turns freely."""
+    vertices_m, triangles, normals = sheet(columns, 30, 0.01)
+    rough_m = vertices_m + np.random.default_rng(4).normal(0.0, 0.0003, vertices_m.shape)
+    plane = plane_at(measured((rough_m, triangles, normals), 0.001), np.array([0.02, 0.15, 0.0]))
+    assert plane.normal == pytest.approx([0.0, 0.0, 1.0], abs=0.01)
+    assert np.degrees(np.sqrt(np.diag(plane.covariance)[1:].max())) < 1.0

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import threading
 from types import SimpleNamespace
 
 from app.screens.export.panel import ExportPanel
 from app.screens.fuse.export import race_offers
 from app.screens.fuse.view import Race
 from app.screens.network.export import network_offers
+from app.screens.surface.export import surface_offers
+from app.screens.surface.labels import AFTER
 from tests.app.fakes import Bench, ui_of
 
 
@@ -46,3 +49,22 @@ def test_a_file_goes_to_who_asked_for_it(server, store):
     assert b"box-on-table" in content
     bench.panel._clicked("Numbers", "no such label", client)
     assert len(sent) == 1
+
+
+def test_no_other_control_waits_while_a_browser_draws_a_picture(server, store):
+    """Controls are handled one after the other: in a lecture all would wait for one hidden tab."""
+    bench, drawn = Screens(ExportPanel, ui_of(server.scene), store), threading.Event()
+
+    def get_render(*_, **__):
+        assert drawn.wait(20.0)
+        raise TimeoutError
+
+    camera = SimpleNamespace(image_height=400, image_width=600)
+    client = SimpleNamespace(camera=camera, get_render=get_render)
+    bench.others = (surface_offers(AFTER, "photographs", True),)
+    bench.panel.on_show()
+    before = set(threading.enumerate())
+    bench.panel._clicked("To show", "This view, PNG", client)
+    (drawing,) = set(threading.enumerate()) - before
+    drawn.set()
+    drawing.join()

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.compute.cuts import Plane, Top
 from app.compute.records import MeshView
 from app.drawing.picking import picked_hole
 from app.screens.surface.draw_holes import tape
@@ -74,6 +75,12 @@ def test_the_edge_that_is_passed_nearest_in_angle_wins(seed):
 def test_of_two_holes_behind_each_other_the_nearer_is_meant():
     holes = (square((0.0, 0.0, 3.0)), square((0.0, 0.0, 2.0)), square((0.0, 0.0, 4.0)))
     assert picked_hole(holes, EYE, AHEAD) == 1
+
+
+def test_a_hole_that_is_cut_off_is_not_meant():
+    holes = (square((0.0, 0.0, 2.0)), square((0.0, 0.0, 3.0)))
+    assert picked_hole(holes, EYE, AHEAD, Plane((0.0, 0.0, 2.5), (0.0, 0.0, 1.0))) == 1
+    assert picked_hole(holes, EYE, AHEAD, Top(1.0)) is None
 
 
 def test_what_lies_behind_the_viewer_is_not_meant():

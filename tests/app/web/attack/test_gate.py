@@ -2,6 +2,7 @@
 
 import contextlib
 import logging
+import struct
 import sys
 import time
 from pathlib import Path
@@ -17,7 +18,7 @@ import app.web.gate as gates
 from app.load.connection import Connection, wait_for
 from app.server import build_server
 from app.web import viser_private as private
-from app.web.gate import FLOOD, MOST_FORGED, VALUES, Gate
+from app.web.gate import FLOOD, MOST_FORGED, PNG, VALUES, Gate
 
 pytestmark = pytest.mark.xdist_group("attack")  # one worker starts the server once
 PROPERTIES = (
@@ -196,6 +197,30 @@ def test_a_message_that_nobody_awaits_is_dropped_and_counted(server, browser, me
     browser.send(message)
     wait_for(lambda: server.gate.dropped.total() == before + 1)
     assert not server.heard
+
+
+def png_begin(width_px, height_px):
+    """Begin of a PNG file of this size."""
+    return PNG + b"\0\0\0\rIHDR" + struct.pack(">2I", width_px, height_px)
+
+
+@pytest.mark.parametrize(
+    ("payload", "verdict"),
+    [
+        (b"", "late"),  # the page could not draw
+        (png_begin(1440, 8192), "late"),
+        (png_begin(100_000, 100_000), "forged"),
+        (png_begin(8193, 1), "forged"),
+        (png_begin(1, 0), "forged"),
+        (png_begin(1440, 900)[:20], "forged"),
+        (b"II*\0" + png_begin(1440, 900), "forged"),
+    ],
+)
+def test_only_pictures_that_can_be_decoded_without_harm_are_decoded(server, browser, payload, verdict):
+    before = server.gate.dropped.copy()
+    browser.send(messages.GetRenderResponseMessage(payload, "x"))
+    wait_for(lambda: server.gate.dropped.total() == before.total() + 1)
+    assert server.gate.dropped - before == {f"{verdict} GetRenderResponseMessage": 1}
 
 
 def test_a_connection_that_keeps_sending_what_no_page_sends_is_closed(server, browser, caplog):
