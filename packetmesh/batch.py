@@ -28,10 +28,11 @@ def run_batch(
     processes: int | None = None,
     killed: Callable[[Task], Answer] | None = None,
 ) -> Iterator[tuple[int, Answer]]:
-    """Call ``function`` with each task; yields each task's index and answer, in the order of completion.
+    """Call ``function`` with each task; yield each task's index and answer in the order of completion.
 
-    Only a few more tasks are submitted than can run. When the iterator is closed or a task raises an error,
-    waiting tasks are dropped and running ones are completed; Ctrl-C in the terminal stops these too.
+    At most about twice as many tasks are submitted as can run. When the iterator is closed or a task raises
+    an error, waiting tasks are dropped and running ones are completed; Ctrl-C stops these, too, and a cluster
+    drops them.
 
     Args:
         function: importable by name, because other processes call it.
@@ -39,11 +40,11 @@ def run_batch(
         scheduler: address of a Dask scheduler; None uses processes on this machine.
         processes: largest number of processes, by default one per core; 1 runs the tasks in this process.
         killed: returns the answer for a task whose process was killed even when it ran alone; the other
-            tasks continue. Without it a killed process is an error.
+            tasks continue. None raises an error instead.
 
     Raises:
         InputError: the scheduler cannot be reached, or ``distributed`` is not installed.
-        PacketMeshError: a process was killed, or the cluster was lost.
+        PacketMeshError: a process was killed and ``killed`` is None, or the cluster was lost.
     """
     if scheduler is not None:
         yield from _on_cluster(function, tasks, scheduler, killed)

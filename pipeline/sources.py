@@ -98,7 +98,7 @@ class ImagePair:
         return self.load_with(None)
 
     def load_with(self, calibration: str | None) -> Rig:
-        """Load the pair, with files from node_00 of a calibration's folder instead of its own."""
+        """Load the pair; a calibration's folder replaces its camera files with those of node_00."""
         from pipeline.io.calibrations import calibration_files
         from pipeline.io.rigs import load_frame
 

@@ -140,7 +140,7 @@ def _fill_holes(
     network: DepthNetwork,
     completion: Path | None,
 ) -> tuple[DepthMap, dict[str, Any]]:
-    """Fill the holes of measured depth: by completion, or by the user's own network (SPEC 3.6)."""
+    """Fill the holes of measured depth by completion, or with the user's own network (SPEC 3.6)."""
     import numpy as np
 
     from pipeline.config import DepthConfig

@@ -157,8 +157,8 @@ def iterate_rigs(
 ) -> Generator[Progress, None, tuple[RigOutcome, ...]]:
     """Reconstruct all tasks, on every core or on a Dask cluster that sees the same folders.
 
-    A failed task gives a sentence, and the others continue. In every case ``out`` gets a table of the
-    completed tasks.
+    When a task fails, its outcome holds the error, and the others continue. Even if an error or Ctrl-C stops
+    the batch, ``out`` gets a table of the outcomes so far.
 
     Returns:
         The outcomes in the order of the tasks.

@@ -44,8 +44,8 @@ Cut: TypeAlias = Top | Plane | Box | None
 
 
 def planes_of(cut: Cut) -> list[tuple[FloatArray, FloatArray]]:
-    """Return the planes of a cut, each (3,) a point and (3,) its normal towards the kept side; of a box whose
-    inside is cut off, towards the inside.
+    """Return the planes of a cut, each as (3,) a point and (3,) the normal. Normals point to the kept side,
+    but those of a box always to its inside.
     """
     if isinstance(cut, Top):
         return [(np.array([0.0, 0.0, cut.height_m]), np.array([0.0, 0.0, -1.0]))]

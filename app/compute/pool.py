@@ -39,7 +39,7 @@ class Outcome:
 
     kind: Literal["result", "error", "stopped"]
     value: Any = None
-    """The result, or the error as a sentence."""
+    """The result, or the error as a sentence; None if the job was stopped."""
 
 
 @dataclass(slots=True, eq=False)
@@ -57,8 +57,8 @@ class Ticket:
     urgent: bool = False
     """Whether the job starts before waiting jobs that are not urgent."""
     ahead: bool = False
-    """Whether nobody waits for the job: it starts only while no other runs or waits and a further process is
-    free, and is asked to stop when another is submitted, unless both have the same key."""
+    """Whether nobody waits for the job yet: it starts only while all other jobs are ahead, too, and a second
+    process is free. It is asked to stop when a job that is not ahead and has another key is submitted."""
     stopping: bool = False
 
 
@@ -135,7 +135,7 @@ class ComputePool:
         return ticket
 
     def idle_s(self) -> float:
-        """Return for how long no job has run or waited, seconds, apart from work ahead."""
+        """Return the time since a job last ran or waited, seconds; jobs ahead do not count."""
         with self._lock:
             return 0.0 if self._in_use() else time.monotonic() - self._last_used_s
 
@@ -221,12 +221,12 @@ class ComputePool:
         return [one for one in free if not one.ahead or (idle > 1 and not self._in_use())]
 
     def _in_use(self) -> bool:
-        """Return whether a job that is not work ahead runs or waits. The caller holds the lock."""
+        """Return whether a job that is not ahead runs or waits. The caller holds the lock."""
         running = [slot.ticket for slot in self._slots if slot.ticket is not None]
         return not all(one.ahead for one in (*running, *self._waiting))
 
     def _make_way(self) -> None:
-        """Ask the work ahead to stop that no waiting job needs. The caller holds the lock."""
+        """Stop the jobs ahead whose result no waiting job needs. The caller holds the lock."""
         needed = {one.key for one in self._waiting if not one.ahead} - {None}
         for slot in self._slots:
             if slot.ticket is not None and slot.ticket.ahead and slot.ticket.key not in needed:
@@ -234,7 +234,7 @@ class ComputePool:
                 _send(slot, ("stop", None))
 
     def _attend(self, slot: _Slot, before: _Slot | None) -> None:
-        """Keep one process alive and handle its messages until the pool closes; wait for the slot before."""
+        """Keep one process alive and handle its messages until the pool closes; ``before`` starts first."""
         if before is not None:
             before.next_may_start.wait()
         while not self._closed:

@@ -16,14 +16,14 @@ LONGEST_S = 5.0
 
 
 class Turns:
-    """A queue of sessions that draw; a session that waits in it still answers clicks."""
+    """A queue in which sessions wait to draw; a waiting session still answers clicks."""
 
     def __init__(self) -> None:
         self._drawing = threading.Lock()
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="turns")
 
     def give(self, begin: Callable[[], Future[None] | None]) -> None:
-        """Call ``begin`` when the drawings before it are done, and wait for the future that it returns."""
+        """Queue ``begin``; the next one is called when its future is done, or after ``LONGEST_S``."""
         with contextlib.suppress(RuntimeError):  # the program is ending
             self._thread.submit(self._wait, begin)
 

@@ -28,7 +28,7 @@ MOST_ARROWS = 1500
 def views_figure(
     fitted: Sequence[FittedView], unseen: Sequence[FittedView] = (), outliers: Sequence[str] = ()
 ) -> go.Figure:
-    """Draw each view's error as bars, in the fit and, next to it, held out; outliers are red."""
+    """Draw two bars per view: its error in the fit, red for an outlier, and its held-out error."""
     figure = titled_figure("Error of each view", "", "RMS, px")
     names = [escape(view.name) for view in fitted]
     colors = [css(LOSS) if view.name in outliers else css(TARGET) for view in fitted]
@@ -46,7 +46,7 @@ def views_figure(
 
 
 def distortion_figure(curve: RadialCurve) -> go.Figure:
-    """Plot the lens's radial distortion over the distance from the principal point, with its 95 % band."""
+    """Plot the lens's radial distortion against the distance from the principal point, with a 95 % band."""
     figure = titled_figure(
         "Distortion of the lens", "distance from the principal point, px", "moved outward, px"
     )

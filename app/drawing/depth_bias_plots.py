@@ -36,7 +36,7 @@ class BiasCurve:
     noise_m: FloatArray | None
     """(K,) standard deviation of the depth of a board that faces the sensor; None if unknown."""
     far_m: float
-    """Distance of the farthest view; beyond it the curve is an extrapolation."""
+    """Largest measured depth in the fit; beyond it the curve is an extrapolation."""
     view_z_m: FloatArray
     """(V,) mean depth of each view."""
     before_m: FloatArray
@@ -50,7 +50,7 @@ def bias_curve(fit: DepthFit, to_m: float | None = None) -> BiasCurve:
 
     Args:
         fit: result of the depth calibration.
-        to_m: end of the curve; None extrapolates a little beyond the farthest view.
+        to_m: end of the curve; None extrapolates to 1.25 times the largest measured depth.
     """
     near_m, far_m = fit.correction.range_m
     z_m = np.linspace(min(near_m, 0.4), to_m or 1.25 * far_m, STEPS)

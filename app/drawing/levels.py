@@ -1,4 +1,4 @@
-"""Radio frames by row and time, with running sums, so that any time window is counted exactly at any zoom."""
+"""Radio frames by row and time, with running sums that give exact counts in any time window."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True)
 class Sums:
-    """Times at which frames start, or end, in each row, with the running sums of the frames before each.
+    """Start times, or end times, of the frames in each row, with running sums over the frames before each.
 
     Sums of times may overflow int64; wrap-around leaves their differences exact.
     """
@@ -21,7 +21,7 @@ class Sums:
     """(F + 1, 4) running sums: number of frames and sum of their times, then both for the lost frames."""
 
     def until(self, first: int, last: int, t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return (T, 4) the sums over a row's frames, from ``first`` on, before each ascending time."""
+        """Return (T, 4) the sums over frames ``first`` to ``last`` before each time; times ascend."""
         # Most of the row is outside a narrow window: find the window first, then the pixels within it.
         low, high = first + np.searchsorted(self.t_ns[first:last], (t_ns[0], t_ns[-1]))
         at = low + np.searchsorted(self.t_ns[low:high], t_ns)
@@ -30,7 +30,7 @@ class Sums:
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """Frames by row and time."""
+    """Frames sorted by row and time, with their running sums."""
 
     row_at: NDArray[np.int64]
     """(R + 1,) index at which each row starts in the other arrays."""
@@ -53,7 +53,7 @@ class Levels:
         return int(self.row_at[index]), int(self.row_at[index + 1])
 
     def near(self, row: int, start_ns: int, end_ns: int) -> tuple[int, int]:
-        """Return the index of a row's first frame in a time span, and of its first frame after the span."""
+        """Return the indices of a row's first frame that starts in a time span, and of the first after it."""
         first, last = self.row(row)
         begin, end = np.searchsorted(self.start_ns[first:last], (start_ns, end_ns))
         return first + int(begin), first + int(end)
@@ -107,7 +107,7 @@ class Counts:
     taken_ns: NDArray[np.int64]
     """(R, W) air time in the part, including that of frames that started earlier."""
     lost_ns: NDArray[np.int64]
-    """(R, W) air time of lost frames."""
+    """(R, W) air time of lost frames in the part."""
 
 
 def counts_of(levels: Levels, start_ns: int, end_ns: int, parts: int) -> Counts:

@@ -252,7 +252,7 @@ class Curve:
 
 
 class CurvesLane:
-    """Curves, each on its own scale, with their values at the clock next to them."""
+    """Curves, each on its own scale, with their values at the clock's time as labels."""
 
     def __init__(
         self,
@@ -262,7 +262,7 @@ class CurvesLane:
         veil: float = FAINT_VEIL,
         titled: bool = False,
     ) -> None:
-        """Show curves at this height, with this veil after the clock; ``titled`` also writes the title."""
+        """Add curves; ``veil`` is as in ``Lane``, and ``titled`` writes the title above the labels."""
         self.title, self.height_px, self.veil, self._curves = title, height_px, veil, tuple(curves)
         self._titled = titled
         self.legend: Sequence[tuple[str, Color]] = tuple((curve.name, curve.color) for curve in curves)
@@ -294,7 +294,7 @@ class CurvesLane:
             _draw_curve(picture, np.clip(share, 0.0, 1.0), curve.color)
 
     def labels(self, now_ns: int) -> Sequence[Label]:
-        """Return the name and value of each curve."""
+        """Return the name and value of each curve, below the title if it is written."""
         title_px = NAME_PX if self._titled else 0
         gap_px = (self.height_px - title_px) / (len(self._curves) + 1)
         curves = [

@@ -165,7 +165,7 @@ class LessonFolder(Generic[Look]):
         return "" if self._index() < 0 else str(self._index() + 1)
 
     def take(self, place: str) -> None:
-        """Go to the stop with this number; leave the lesson if it is empty.
+        """Go to the stop with this number; an empty ``place`` leaves the lesson.
 
         Raises:
             InputError: there is no such stop.

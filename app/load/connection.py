@@ -41,7 +41,7 @@ def wait_for(happened: Callable[[], bool], patience_s: float = PATIENCE_S) -> No
 
 
 class Connection:
-    """One browser's connection: its controls by their labels, and the state that the server sent."""
+    """One simulated browser's connection: its controls by label, and the state that the server sent."""
 
     def __init__(self, url: str, cookie: str = "") -> None:
         self._socket = connect(
@@ -52,7 +52,7 @@ class Connection:
         )
         self.uuids: dict[str, list[str]] = {}
         self.commands: dict[str, str] = {}
-        """Entries of the command palette: uuids by label, of several the last."""
+        """Uuids of the command palette's entries by label; of equal labels, the last."""
         self.values: dict[str, object] = {}
         """The server's last values by the controls' uuids."""
         self.texts: dict[str, str] = {}
@@ -67,7 +67,7 @@ class Connection:
         self.shown_s: dict[str, float] = {}
         """Time when each step was last shown, and when ``surface`` was last up to date."""
         self._dimmed: set[str] = set()
-        """Texts that dim what belongs to other settings than the current ones, by their uuids."""
+        """Uuids of HTML that dims outdated numbers or pictures."""
         self.lost = False
         """Whether the server closed the connection."""
         self._drawn: set[str] = set()
@@ -85,7 +85,7 @@ class Connection:
         self._socket.send(msgspec.msgpack.encode(message.as_serializable_dict()))
 
     def stand(self, position: tuple[float, float, float]) -> None:
-        """Report a view turned by the user."""
+        """Send a camera position, as if the user had turned the view."""
         up, ahead = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
         self.send(
             messages.ViewerCameraMessage(
@@ -94,7 +94,7 @@ class Connection:
         )
 
     def set(self, label: str, value: object, which: int = 0) -> None:
-        """Set the control with this label, or number ``which`` of several."""
+        """Set the control with this label; ``which`` is its index among equal labels."""
         wait_for(lambda: len(self.uuids.get(label, ())) > which)
         self.send(messages.GuiUpdateMessage(self.uuids[label][which], {"value": value}))
 
@@ -154,7 +154,7 @@ class Connection:
             self.values[uuid] = value
 
     def _take_html(self, uuid: str, content: str) -> None:
-        """Read which step is shown and what is dimmed; answer the question whether everything is drawn."""
+        """Note the step and whether HTML is dimmed; confirm that all is drawn if the server asks."""
         if DRAWN_QUERY in content:
             for command in self._drawn:
                 self.send(messages.CommandTriggerMessage(command))

@@ -1,4 +1,4 @@
-"""One of many simulated users: clicks steps, drags the ball radius and waits for meshes."""
+"""A simulated user, who clicks steps, drags the ball radius and waits for meshes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ THINKING_S = 1.5
 MESH_SHARE = 0.3
 """Share of mesh requests among the actions while no mesh is awaited."""
 FIRST_S = 240.0
-"""Time limit for the first surface, seconds: all browsers come at once."""
+"""Time limit for the panel, seconds; it is long because all browsers come at once."""
 LONGEST_S = 30.0
 """Limit after which an answer counts as missing, seconds."""
 
@@ -35,9 +35,9 @@ class Diary:
     """Times measured by one browser."""
 
     opened_s: float = float("nan")
-    """Time until the panel was there."""
+    """Time until the panel had its steps and the slider of the radius."""
     first_mesh_s: float = float("nan")
-    """Time until all steps of the room were computed."""
+    """Time until the first surface was complete."""
     answers_s: list[float] = field(default_factory=list)
     """Answer times of clicks that need no computation."""
     meshes_s: list[float] = field(default_factory=list)
@@ -48,7 +48,7 @@ class Diary:
 
 
 class Visitor:
-    """A thread that uses the app until it has to leave."""
+    """A thread that uses the app until ``leave`` is called or the connection fails."""
 
     def __init__(self, url: str, seed: int) -> None:
         self.diary = Diary()
@@ -59,7 +59,7 @@ class Visitor:
         self._thread.start()
 
     def leave(self) -> None:
-        """Close the connection, even during a computation."""
+        """Close the connection after the current action; a mesh is not awaited."""
         self._leaving.set()
         self._thread.join()
 
@@ -102,7 +102,7 @@ class Visitor:
             page.set("Radius (mm)", float(radius_mm))
             self._dragged_s = time.monotonic()
             time.sleep(MOVE_S)
-        time.sleep(QUIET_S)  # a hand that has just let go clicks nothing yet
+        time.sleep(QUIET_S)  # a user does not click at once after a drag
 
     def _look_for_mesh(self, page: Connection) -> None:
         """Record the time of the last drag's surface if it has come."""

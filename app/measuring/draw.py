@@ -47,12 +47,12 @@ class MeasureDrawing:
         pending: Sequence[End] = (),
         camera: viser.CameraHandle | None = None,
     ) -> None:
-        """Draw these measures with their names, and these points, in place of all others.
+        """Draw these measures with their names, and these points; remove all others.
 
         Args:
             measures: measures that have numbers; others are left out.
             pending: points of a measure that is not complete.
-            camera: view in which no label covers another one; None if nobody looks.
+            camera: view for which labels are moved apart; None without a browser.
         """
         wanted = {(id(made), name): (taken, made) for taken, name, made in measures if made.quantities}
         for key in self._drawn.keys() - wanted.keys():

@@ -46,7 +46,7 @@ class Survey:
         return self._once((true_m, measured.values), scale)
 
     def _once(self, key: Hashable, find: Callable[[], Found]) -> Found:
-        """Return what ``find`` found when this was first asked for, or raise its error again."""
+        """Return the cached result of ``find`` for this key; an ``InputError`` is cached and raised, too."""
         if key not in self._found:
             try:
                 self._found[key] = find()

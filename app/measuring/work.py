@@ -59,11 +59,11 @@ class _Loop:
 
 
 def answer(surfaces: Sequence[MeasuredSurface], request: MeasureRequest) -> MeasureAnswer:
-    """Turn clicks into points, and compute the wanted and the completed measures.
+    """Turn clicks into points, and compute the requested measures and those that the clicks complete.
 
     Args:
         surfaces: the surfaces that can be clicked; a measure has all its points on one of them.
-        request: measures and clicks. What cannot be measured has its reason in the answer.
+        request: measures and clicks. For what cannot be measured, the answer has the reason.
     """
     surveys = [survey_of(surface) for surface in surfaces]
     if not request.clicks:
@@ -157,7 +157,7 @@ def _rim_on_ray(
 
 
 def _scaled(surveys: Sequence[Survey], scale: Scale) -> tuple[Sequence[Survey], ScaleView]:
-    """Return the surfaces at the scale of a true length; as they are if that length sets none."""
+    """Scale the surfaces so that a measure gets its true length; if that fails, return them unchanged."""
     try:
         measured = _measured(surveys[scale.by.part], scale.by)[0]
         found = [survey.scaled(scale.true_m, measured) for survey in surveys]
@@ -190,7 +190,7 @@ def _measured(survey: Survey, taken: Taken) -> tuple[Measure, list[Mark], list[P
     """Return a measure with its marks and planes.
 
     Raises:
-        InputError: the surface has nothing at the points, or they give no measure.
+        InputError: the surface has no point or plane there, or these give no measure.
     """
     marks, planes = list[Mark](), list[Plane]()
     for step, place in zip(steps_of(taken.kind, taken.snap), taken.points_m, strict=True):

@@ -23,10 +23,10 @@ _SCRIPT = Path(__file__).parent / "calibration.js"
 
 
 def write_calibration_report(report: CameraReport, trust: Trust, path: Path) -> None:
-    """Write the page, whole or not at all.
+    """Write the page; an error leaves no partial file.
 
     Raises:
-        InputError: the folder cannot be written.
+        InputError: the file cannot be written.
     """
     found = report.calibration
     mark, judged = "reproduced" if trust.verdict.passed else "not-reproduced", trust.verdict.word
@@ -86,6 +86,6 @@ def _all_figures(report: CameraReport, trust: Trust) -> list[go.Figure]:
 
 
 def _places(count: int) -> Markup:
-    """Return HTML of the places where ``calibration.js`` draws the figures, side by side."""
+    """Return HTML elements, two to a row, in which ``calibration.js`` draws the figures."""
     place = Markup('<div class="plotly-graph-div" id="figure-{}" style="min-width: 0; height: {}px"></div>')
     return pictures((place.format(row, HEIGHT_PX) for row in range(count)), 2)

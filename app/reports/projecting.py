@@ -25,7 +25,7 @@ def camera_of(view: Viewpoint, size_px: tuple[int, int]) -> Camera:
 
 
 def project(points_m: FloatArray, camera: Camera) -> tuple[FloatArray, FloatArray]:
-    """Return (N, 2) pixels and (N,) depths in metres of world points before an undistorted camera."""
+    """Project (N, 3) world points without distortion. Returns (N, 2) pixels and (N,) depths, metres."""
     T = camera.T_world_camera
     seen = (points_m - T[:3, 3]) @ T[:3, :3] @ camera.intrinsics.matrix.T
     return seen[:, :2] / seen[:, 2:], seen[:, 2]

@@ -146,7 +146,7 @@ class Address:
         self._timer = ui.debounce(WAIT_S, self._send)
 
     def show(self, place: Place) -> None:
-        """Update the address to this place; wait until the page has sent its first address."""
+        """Set the address to this place after a pause, and not before the page has sent its first address."""
         if place == self._place:
             return
         self._place = place

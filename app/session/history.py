@@ -95,7 +95,7 @@ class History:
         self._now = self._read()
 
     def follow(self, by_hand: bool) -> None:
-        """Note a possible change; one that a result has brought belongs to the step before it."""
+        """Record a step if the settings have changed; a change by a result is no step of its own."""
         if self._now is None:
             return
         before, now = self._now, self._read()

@@ -216,7 +216,7 @@ class Lecture:
             seat.show_size(sentence if size else Markdown("**Nobody is in the class yet.**"))
 
     def _add_chip(self, seat: _Seat) -> None:
-        """Add the bar with a student's messages, and receive what the student's page sends."""
+        """Add the student's bar to the page, and handle the page's messages: follow, roam or vote."""
         client, name = seat.client, uuid.uuid4().hex
         ui = self._own_ui(client)
         with add_hidden(ui, name, page_call("beginSeat", name)):

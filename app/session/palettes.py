@@ -187,7 +187,7 @@ class OwnPalette:
         self._calls = 0
 
     def offer(self, terms: Mapping[tuple[str, str], str]) -> None:
-        """Offer the views of what is drawn now, and these terms: names and explanations, with a screen."""
+        """Offer the views of what is drawn now, and ``terms``: the screen by name and explanation."""
         self._palette.offer([*self._entries(), *self._terms(terms)])
 
     def _entries(self) -> Iterator[Entry]:

@@ -30,8 +30,8 @@ class Places:
 
         Args:
             session: the session.
-            views: its views; None where many browsers share it.
-            on_opened: called when the place of the address with which the session was opened is set.
+            views: its views; None if many browsers share the session.
+            on_opened: called once, when the first address has been applied.
         """
         self._session, self._views, self._on_opened = session, views, on_opened
         self._opened = False

@@ -81,10 +81,10 @@ class Views:
         return "" if view is None else ",".join(f"{value:.3f}" for value in view.ravel())
 
     def take(self, place: str) -> None:
-        """Turn the view to the one in an address.
+        """Turn the view to the one in an address; an empty ``place`` restores the app's own view.
 
         Raises:
-            InputError: the text is not two positions.
+            InputError: the text is not two different positions.
         """
         try:
             view = np.array([float(value) for value in place.split(",")] if place else [])

@@ -56,7 +56,7 @@ class Entrance:
     """The tokens of a server."""
 
     visitor: Token | None = None
-    """Token that browsers need, unless they have the teacher's; None admits all."""
+    """Token without which only the teacher's browser is admitted; None admits all."""
     teacher: Token | None = None
     """The teacher's token in a lecture."""
 
@@ -65,7 +65,7 @@ class Entrance:
         return self.visitor is None or any(token.is_in(cookies) for token in self._tokens)
 
     def guarded(self) -> AbstractContextManager[None]:
-        """Context in which servers start that set the cookie of a valid link and refuse other browsers."""
+        """Context for starting servers that set the cookie of a valid link and refuse other browsers."""
         return answering(self._answering)
 
     @property
@@ -85,7 +85,7 @@ class Entrance:
             response = connection.respond(http.HTTPStatus.SEE_OTHER, "")
             home = WELCOME if token is self.teacher else "/"
             place = f"/?{urlencode(given)}" if given else home
-            response.headers["Location"] = f".{place}"  # relative: a proxy may have a path of its own
+            response.headers["Location"] = f".{place}"  # relative, because a proxy may add a path
             response.headers["Set-Cookie"] = f"{token.cookie}={token.text}; Path=/; HttpOnly; SameSite=Lax"
             return response
 

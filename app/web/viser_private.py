@@ -104,7 +104,7 @@ def listen(server: viser.ViserServer, listener: Listener) -> None:
 
 
 def find_control(server: viser.ViserServer, number: int, uuid: str) -> tuple[Any, bool] | None:
-    """Return the browser's control with this name and whether it is shared; None if there is none."""
+    """Return the browser's control with this uuid and whether it is shared; None if there is none."""
     for gui, shared in _guis(server, number):
         handle = gui._gui_input_handle_from_uuid.get(uuid)
         if handle is not None:
@@ -113,7 +113,7 @@ def find_control(server: viser.ViserServer, number: int, uuid: str) -> tuple[Any
 
 
 def find_command(server: viser.ViserServer, number: int, uuid: str) -> tuple[Any, bool] | None:
-    """Return the browser's command with this name and whether it is shared; None if there is none."""
+    """Return the browser's command with this uuid and whether it is shared; None if there is none."""
     for gui, shared in _guis(server, number):
         handle = gui._command_handle_from_uuid.get(uuid)
         if handle is not None:

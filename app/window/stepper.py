@@ -17,13 +17,13 @@ COLORS: dict[StepStatus, str] = {
     "failed": "#b54e00",
     "missing": "#5f6870",
 }
-"""Of texts on white, and of white texts: the contrast is at least 4.5 (WCAG 2.2, 1.4.3)."""
+"""Colours of text on white and under white text: the contrast is at least 4.5 (WCAG 2.2, 1.4.3)."""
 _BUTTON = Markup("div:has(> .packetmesh-steps) + div button:nth-of-type({}) {{ border-color: {}; {} }}")
 _MARK = Markup(
     "div:has(> .packetmesh-steps) + div button:nth-of-type({}) .mantine-Button-label::after "
     "{{ content: '\\00a0{}' }}"
 )
-"""The style sheet draws the status marks, so that a button keeps its element while it is clicked."""
+"""CSS draws the marks, because a button with a new label would be replaced while it is clicked."""
 
 
 class Stepper:
@@ -41,7 +41,7 @@ class Stepper:
 
 
 def _style(current: int, statuses: Sequence[StepStatus | None]) -> Markup:
-    """Return CSS with the colours of the buttons that follow this element; ``page.css`` sets their place."""
+    """Return CSS: the stage's background, and the buttons' colours and marks; ``page.css`` places them."""
     rules = [Markup("canvas[data-engine] {{ background: {} }}").format(css(BACKGROUND))]
     for number, status in enumerate(statuses, 1):
         color = COLORS[status] if status is not None else css(BRAND)

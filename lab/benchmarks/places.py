@@ -82,7 +82,7 @@ def by_verdict(rows: Iterable[Row]) -> list[Row]:
 
 
 def grouped(rows: Iterable[Row], key: str) -> dict[Any, list[Row]]:
-    """Return rows by the value of a column, in the order of appearance."""
+    """Group rows by the value of a column; groups are in the order of their first rows."""
     groups: dict[Any, list[Row]] = {}
     for row in rows:
         groups.setdefault(row[key], []).append(row)

@@ -36,7 +36,7 @@ _LINE = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """One image of one drive."""
+    """One image of one drive; ``picture``, ``improved`` and ``laser`` are None without such a file."""
 
     root: Path
     drive: str
@@ -52,7 +52,7 @@ class _Place:
 
     @property
     def improved(self) -> Path | None:
-        """Ground truth in the raw data's folders or in the depth benchmark's."""
+        """Improved ground truth, in the folders of the raw data or of the depth benchmark."""
         below = f"proj_depth/groundtruth/image_0{self.camera}/{self.number:010d}.png"
         drives = (self.drive, *(f"{part}/{Path(self.drive).name}" for part in ("train", "val")))
         return _first(self.root / drive / below for drive in drives)
@@ -68,7 +68,7 @@ class _Place:
 
 
 def find(root: Path) -> list[Load]:
-    """Return the frames in the list of Eigen's test split in ``root``, or of every drive below it.
+    """Return the frames in ``LIST``, or without it those of the left colour camera in all drives of ``root``.
 
     If any frame has the improved ground truth, only those that have it are returned, as in published tables
     (652 of the 697 test frames); otherwise the truth is the laser's points.
@@ -129,9 +129,9 @@ def judged(shape: tuple[int, ...]) -> BoolArray:
 
 
 def _laser_depth(place: _Place, shape: tuple[int, int]) -> FloatArray:
-    """Return (H, W) depth along the camera's axis of the laser points that it sees.
+    """Return (H, W) depth, metres, of the laser's points along the camera's axis; NaN without a point.
 
-    monodepth's tables take the laser's forward axis for the depth, which adds about 27 cm.
+    monodepth's tables use the coordinate along the laser's forward axis instead, which is about 27 cm larger.
     """
     assert place.laser is not None
     data = read_bytes(place.laser, MAX_IMAGE_BYTES, "laser scan")
@@ -150,7 +150,7 @@ def _laser_depth(place: _Place, shape: tuple[int, int]) -> FloatArray:
 
 
 def _matrix(file: Path, key: str, shape: tuple[int, ...]) -> FloatArray:
-    """Return the numbers of the line ``key: numbers``."""
+    """Return the numbers of the line ``key: numbers`` in this shape."""
     for line in read_text(file, "KITTI calibration").splitlines():
         if line.startswith(f"{key}:"):
             try:

@@ -219,7 +219,7 @@ def _raw_error(row: Row) -> float:
 
 
 def _by_rooms(rows: Sequence[Row]) -> tuple[float, float]:
-    """Return the 95 % bootstrap interval of the coverage over whole rooms."""
+    """Return the 95 % bootstrap interval of the coverage, with whole rooms drawn."""
     rooms: dict[int, list[bool]] = {}
     for row in rows:
         rooms.setdefault(row["room"], []).append(row["covered"])

@@ -123,11 +123,11 @@ def _seen_m(view: TrueView, layers: FloatArray, places_m: FloatArray) -> tuple[B
 
 
 def true_holes(room: Room) -> Iterator[Judged]:
-    """Yield the largest holes, the area (m^2) in the true points of their rims, and the time taken (s).
+    """Yield the measured areas of the largest holes, the areas of their true rims (m^2), and the times (s).
 
-    The true point of a rim's vertex is what a camera sees at its pixel. A hole counts if one camera sees all
-    of its rim, every true point near its vertex and no pixel next to a depth edge, where the true point is
-    open.
+    The true point of a rim's vertex is the surface that a camera sees at the vertex's pixel. A hole counts if
+    one camera has the whole rim in its image, with every true point within ``RIM_M`` of its vertex and no
+    pixel next to a depth edge, where the true point is ambiguous.
     """
     surface = room.surface
     holes = (hole for hole in find_holes(surface.vertices_m, surface.triangles) if hole.open)

@@ -81,7 +81,7 @@ class SurfaceImage:
 
 @dataclass(frozen=True, slots=True)
 class Catalogue:
-    """The furniture of rooms; models are read when needed and kept in ``cache``."""
+    """A catalogue of furniture for rooms; its models are converted when needed and kept in ``cache``."""
 
     entries: tuple[Entry, ...]
     images: tuple[SurfaceImage, ...]
@@ -93,7 +93,7 @@ class Catalogue:
 
         Args:
             source: for example ``/usr/share/sweethome3d``, or a folder with both packages.
-            cache: folder for prepared models; None takes one in the system's temporary folder.
+            cache: folder for prepared models; None uses one in the system's temporary folder.
 
         Raises:
             InputError: ``source`` holds no furniture.
@@ -136,7 +136,7 @@ class Catalogue:
         """Return the model of an entry, from memory, from the cache, or made now.
 
         Raises:
-            InputError: the file lacks it, or it has no triangles.
+            InputError: the file lacks the model, or the model has no triangles.
         """
         file = self.cache / "models" / f"{entry.key}.npz"
         if not file.exists():

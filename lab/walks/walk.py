@@ -36,7 +36,7 @@ class WalkTruth:
     """Ground truth of a walk."""
 
     vertices_m: FloatArray
-    """(V, 3) of the room's surface, world frame."""
+    """(V, 3) vertices of the room's surface, world frame."""
     triangles: IntArray
     """(F, 3)."""
     T_world_camera: FloatArray

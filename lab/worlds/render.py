@@ -96,7 +96,7 @@ class Renderer:
         self._gloss = np.array([m.gloss for m in materials] + [0.0], np.float32)
         self._infrared = np.array([m.infrared for m in materials] + [0.0], np.float32)
         self._emission = np.array([m.emission for m in materials] + [0.0], np.float32)
-        self._mirror = np.where(self._emission > 0.0, np.float32(0.0), self._gloss)  # own light outshines it
+        self._mirror = np.where(self._emission > 0.0, np.float32(0.0), self._gloss)  # no reflections on lamps
         self._ambient = np.asarray(scene.ambient, np.float32)
 
     @cached_property

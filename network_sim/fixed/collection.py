@@ -105,7 +105,7 @@ class Collection:
 
     @property
     def ended(self) -> simpy.Event:
-        """Event that every image has arrived or was given up, and no packet is left."""
+        """Event that triggers when every image has arrived or was given up, and no packet is left."""
         return self.shared.book.ended
 
     @property

@@ -31,7 +31,7 @@ class LinkTrace:
 
     @property
     def edges_ns(self) -> NDArray[np.int64]:
-        """(T + 1,) start times of the rows, and the end of the recording."""
+        """(T + 1,) start times of the rows, and the end of the last one."""
         starts_ns = np.rint(self.t_s * NS_PER_S).astype(np.int64)
         last_ns = _FOR_EVER_NS
         if len(starts_ns) > 1:

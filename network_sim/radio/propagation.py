@@ -78,7 +78,7 @@ class PathLoss:
 
 
 def free_space(tx_power_w: float, wavelength_m: float, gain: float = 1.0, loss: float = 1.0) -> PathLoss:
-    """Return Friis' law (1946): ``Pr = Pt G^2 lambda^2 / ((4 pi d)^2 L)``, G the gain of each antenna."""
+    """Return Friis' law (1946): ``Pr = Pt G^2 lambda^2 / ((4 pi d)^2 L)``, gain G per antenna, loss L."""
     least_m = wavelength_m / (4.0 * math.pi)
     near_w = tx_power_w * gain**2 * least_m**2 / loss
     return PathLoss(near_w, 2.0, near_w, 2.0, math.inf, least_m)

@@ -60,10 +60,11 @@ def image_balance(trace: NetworkTrace) -> Balance:
 
 
 def check(trace: NetworkTrace) -> None:
-    """Check the balances, the history of every packet and image, and that log and counters agree.
+    """Check the balances, the history of every packet and image, and, if the log is complete, the counters.
 
     Raises:
-        InternalError: a packet or image appears or vanishes without an event, or log and counters differ.
+        InternalError: a packet or image appears or vanishes without an event, a node is busy for longer than
+            the run, events are recorded too late, or log and counters differ.
     """
     faults = list(trace.counters.faults)
     for noun, sums in (("packets", balance(trace)), ("images", image_balance(trace))):

@@ -65,7 +65,7 @@ def local_planes(
     """Estimate the local planes of a depth image.
 
     Args:
-        depth: (H, W) metric.
+        depth: (H, W) depth, metres.
         intrinsics: the camera, whose focal length determines which steps are too steep for a surface.
         noise: the sensor's calibrated noise; None estimates it from the image.
         least_sd_m: (H, W) least standard deviation of each depth, NaN where there is none.

@@ -120,7 +120,7 @@ def _groups(blobs: Sequence[cv2.KeyPoint], board: Board) -> Iterator[tuple[Float
 
 
 def _together(blobs_px: FloatArray, sizes_px: FloatArray, board: Board) -> tuple[FloatArray, FloatArray]:
-    """Return the largest group of blobs connected from neighbour to neighbour, without other objects."""
+    """Return the largest group of blobs linked through neighbours; all blobs, if the board has as many."""
     if len(blobs_px) <= board.columns * board.rows:
         return blobs_px, sizes_px
     apart_px = np.linalg.norm(blobs_px[:, None] - blobs_px, axis=2)

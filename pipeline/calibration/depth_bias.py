@@ -58,7 +58,7 @@ class DepthFit:
     held_out_m: Mapping[str, float]
     """RMS depth error in held-out views, by the terms of each model that was tried."""
     rms_before_m: float
-    """Error of the measured depth: root of the mean over views of the mean square."""
+    """Error of the measured depth: root of the mean over views of the mean square, with Huber weights."""
     rms_after_m: float
     scale_focal_correlation: float | None
     """Correlation of the errors of scale and focal length; None without a scale."""
@@ -110,14 +110,14 @@ def fit_depth(samples: DepthSamples) -> DepthFit:
 
     A pixel's weight is 1/sd^2 by the noise law times Huber's at 3 sd; every view has the same weight, because
     the error of the board's pose affects all its pixels alike. A term is kept only if it lowers the error in
-    held-out views by more than the standard error. Standard errors combine the jackknife over views with
-    the lens's uncertainty.
+    held-out views by more than the standard error and its interval excludes 0. Standard errors combine the
+    jackknife over views with the lens's uncertainty.
 
     Args:
         samples: pixels of at least four views; the fit leaves out those on ink.
 
     Raises:
-        InputError: there are fewer views.
+        InputError: fewer than four views have pixels on white paper.
     """
     paper = samples.select(~samples.ink)
     count = len(rows_of_views(paper))

@@ -78,8 +78,8 @@ def _right_handed(points_px: FloatArray, board: Board) -> bool:
 
 
 def _interleaved(points_px: FloatArray, board: Board) -> bool:
-    """Return whether every point of a shifted row is nearer to the middle of its four neighbours in the rows
-    above and below than half of their distance; True for rows that are not shifted.
+    """Return whether each point of a shifted row is near the mean of its four neighbours in the rows above
+    and below: within ``MOST_BEND`` times its mean distance from them. True for rows that are not shifted.
     """
     if board.pattern != "circles-asymmetric":
         return True

@@ -1,4 +1,4 @@
-"""Lens models: projection of points, rays of pixels, and their derivatives by the parameters (SPEC 1.1)."""
+"""Lens models: projection of points, rays of pixels, and the derivatives for calibration (SPEC 1.1)."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Projection:
     points_px: FloatArray
     """(N, 2)"""
     by_pose: FloatArray
-    """(2 N, 6) derivatives by OpenCV's rotation vector and translation of the points' pose."""
+    """(2 N, 6) derivatives by the points' pose: OpenCV's rotation vector, then translation."""
     by_lens: FloatArray
     """(2 N, P) derivatives by the lens's free parameters."""
 

@@ -200,8 +200,8 @@ def _ridge(normal: FloatArray, optics: Optics, sizes: tuple[float, float], noise
 def _solved(
     normal: FloatArray, pull: FloatArray, squares: float, ridge: FloatArray
 ) -> tuple[float, FloatArray, FloatArray]:
-    """Return the logarithm of the evidence, the (Q,) most likely changes, and a (Q, Q) root of their
-    covariance.
+    """Return the logarithm of the evidence up to a constant, the (Q,) most likely changes, and a (Q, U) root
+    of their covariance, where U parts have a finite ``ridge``.
     """
     used = np.isfinite(ridge)
     scale = 1.0 / np.sqrt(np.diag(normal)[used] + ridge[used])

@@ -94,7 +94,7 @@ def place_of_first_mm(board: Board) -> FloatArray:
 
 
 def _around_mm(board: Board) -> float:
-    """Return the distance from the outermost points to the board's edge; circles have white paper around."""
+    """Return the distance from the outermost points to the board's edge; around circles is white paper."""
     if board.pattern == "aprilgrid":
         return 1000.0 * board.tag_spacing * board.spacing_m
     squares = board.pattern in ("chessboard", "charuco")
@@ -172,7 +172,7 @@ def write_target(board: Board, path: Path, pixel_mm: float | None = None) -> Boa
         pixel_mm: size of a pixel of the monitor that shows a PNG.
 
     Raises:
-        InputError: the suffix is none of these, or the pixel size for a PNG is missing.
+        InputError: the suffix is none of these, or a PNG has no pixel size from 0.01 to 5 mm.
     """
     ending = path.suffix.lower()
     if ending == ".png":
@@ -250,7 +250,7 @@ def pdf_of(whole: Sheet, title: str) -> bytes:
 
 
 def picture_of(whole: Sheet, pixel_mm: float) -> ByteArray:
-    """Draw an (H, W) grey image; edges are between pixels at the same positions as on the sheet."""
+    """Draw the sheet as an (H, W) grey image, with the edges of boxes rounded to the borders of pixels."""
     size = (round(whole.width_mm / pixel_mm), round(whole.height_mm / pixel_mm))
     picture = np.full(size[::-1], 255, np.uint8)
     scale = (1 << SUB_PIXEL) / pixel_mm

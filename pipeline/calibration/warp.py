@@ -72,7 +72,7 @@ def board_warp(
         lens: distortion model of the camera.
 
     Raises:
-        InputError: the lens is a fisheye, a view shows a part of the board, or the folds need more views.
+        InputError: the lens is a fisheye, a view shows only part of the board, or the folds need more views.
         ReconstructionError: the views do not determine lens and board.
     """
     if lens == "fisheye":

@@ -81,7 +81,7 @@ def _poses(transforms: Transforms, frames: list[str]) -> tuple[list[FloatArray |
 
 
 def _repeated(nodes: list[NodeImages]) -> list[str]:
-    """Return a note if several nodes have the very same colour and depth images."""
+    """Return a note if other nodes have the same colour and depth images as the first; else no note."""
     first = nodes[0]
     same = [
         np.array_equal(node.rgb, first.rgb)

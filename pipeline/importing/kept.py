@@ -96,10 +96,10 @@ class _Writer:
     """Times and poses of the frames that have one."""
 
     def write(self, frame: RgbdFrame, time_s: float) -> None:
-        """Write the images of a frame.
+        """Write the images of a frame, and keep its pose; depths beyond ``FARTHEST_M`` are written as 0.
 
         Raises:
-            InputError: its camera is not that of the frames before.
+            InputError: the frame's camera differs from that of earlier frames.
         """
         self.camera = frame.intrinsics if self.camera is None else self.camera
         if not alike(frame.intrinsics, self.camera):

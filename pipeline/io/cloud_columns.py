@@ -136,7 +136,7 @@ def table_of_columns(path: AnyPath, rows: FloatArray, given: tuple[str, ...] | N
 
 
 def table_named(rows: FloatArray, names: Sequence[str]) -> np.ndarray:
-    """Return a structured array; whole-number colours get an integer type, which marks them as 0 to 255."""
+    """Return a structured array; its colours are integers (0 to 255) if all are whole and any exceeds 1."""
     used = [(name, k) for k, name in enumerate(names) if name != UNUSED]
     colors = rows[:, [k for name, k in used if name in COLOR]]
     whole = colors.size > 0 and bool(np.all(colors == np.rint(colors))) and colors.max() > 1
@@ -211,10 +211,10 @@ def _option(names: Sequence[str], places: Sequence[int]) -> str:
 
 
 def _colors_at(path: AnyPath, rows: FloatArray, others: list[int], places: Sequence[int]) -> int | None:
-    """Return the first of the three columns that are colours.
+    """Return the first of the three columns that are colours; None if there are none.
 
     Raises:
-        InputError: more than three adjacent columns may be colours, and none stand out.
+        InputError: more than three adjacent columns may be colours, and no three are clearly likelier.
     """
     byte = [k for k in others if _whole(rows[:, k]) and rows[:, k].min() >= 0 and rows[:, k].max() <= 255]
     starts = [k for k in byte if k + 1 in byte and k + 2 in byte]

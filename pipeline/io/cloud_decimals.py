@@ -107,7 +107,11 @@ def _cut_decimals(rows: Sequence[Sequence[str]]) -> bool:
 
 
 def _with_decimals(path: AnyPath, plain: Dialect, cells: Sequence[str]) -> Dialect:
-    """Return the dialect with the meaning of the commas inside the numbers."""
+    """Return the dialect with the meaning of the commas inside the numbers.
+
+    Raises:
+        InputError: the commas may be decimal marks or mark thousands.
+    """
     commas = [cell for cell in cells if "," in cell]
     decimal = [cell for cell in commas if _COMMA.fullmatch(cell) and not _GROUPS.fullmatch(cell)]
     dots = [cell for cell in commas if _DOT_GROUPS.fullmatch(cell)]

@@ -165,7 +165,7 @@ def _all(distortion: FloatArray) -> FloatArray:
 
 
 def _radial(distortion: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return numerator and denominator of OpenCV's radial factor, polynomials in the squared radius."""
+    """Return numerator and denominator of OpenCV's radial factor, (4,) coefficients of r^6 down to 1."""
     k1, k2, _, _, k3, k4, k5, k6, *_ = _all(distortion)
     return np.array([k3, k2, k1, 1.0]), np.array([k6, k5, k4, 1.0])
 

@@ -25,7 +25,7 @@ UNKNOWN = 128
 
 @dataclass(frozen=True, slots=True)
 class Photographs:
-    """Frames of a walk with their photographs, and what they show of the map."""
+    """Chosen frames of a walk with their photographs, and the colours of the map."""
 
     views: tuple[RgbdFrame, ...]
     """The chosen frames, with their poses."""

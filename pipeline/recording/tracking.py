@@ -170,7 +170,7 @@ class _Tracker:
     """State of tracking: the keyframe, the pose in it, and the last motion."""
 
     def __init__(self, given: Sequence[FloatArray | None], brightness: Brightness) -> None:
-        """Begin; ``given`` are poses of the depth camera that came with the recording, if any did."""
+        """Start without frames; ``given`` has each frame's pose from the recording, None where unknown."""
         self._given, self._brightness = given, brightness
         self._clouds = KeyframeClouds()
         self._frames: list[Tracked | None] = []
@@ -179,7 +179,7 @@ class _Tracker:
         self._pose: FloatArray = np.eye(4)
         """Pose of the last tracked frame in its keyframe."""
         self._motion: FloatArray = np.eye(4)
-        """Pose of the last frame in the one before it."""
+        """Pose of the last tracked frame in the frame before it; the identity if that one was not tracked."""
         self._last = -1
         """Number of the last tracked frame."""
 

@@ -141,7 +141,9 @@ def _grown(store: _Blocks) -> _Blocks:
 
 @lru_cache(maxsize=8)
 def _weights(noise: DepthNoise, voxel_m: float) -> tuple[FloatArray, FloatArray]:
-    """Return (voxel / sd)^2 by depth, 0 beyond ``LARGEST_SD``, and its factor by the squared cosine."""
+    """Return two tables: weights (voxel / sd)^2 by depth, 0 where the sd exceeds ``LARGEST_SD`` voxels, and
+    the factor of the weight by the squared cosine of incidence.
+    """
     shares = np.linspace(0.0, 1.0, _TABLE + 1)
     sd = np.maximum(noise.sd_m(np.maximum(shares * FARTHEST_M, 1e-3)) / voxel_m, LEAST_SD)
     weights = np.where(sd <= LARGEST_SD, 1.0 / sd**2, 0.0)

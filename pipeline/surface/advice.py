@@ -88,7 +88,7 @@ def needed_radii_m(cloud: PointCloud, rows: IntArray) -> FloatArray:
 
 
 def closed_fans(triangles: IntArray, points: int) -> BoolArray:
-    """Return (points,) True where triangles surround a point without a gap."""
+    """Return (points,) True where triangles surround a point completely."""
     edges, faces = edges_and_faces(triangles)
     closed = np.zeros(points, dtype=bool)
     closed[edges] = True

@@ -191,7 +191,7 @@ def _patch(vertices_m: FloatArray, loop: IntArray, edges: set[int]) -> IntArray 
     taken = _taken(polygon[:, None], polygon[None], len(vertices_m), edges)
     step = np.arange(len(polygon)), np.roll(np.arange(len(polygon)), -1)
     if np.any(taken[step]) or not np.all(taken.T[step]):
-        return None  # a trail that does not close, where triangles disagree in their orientation
+        return None  # not a boundary of consistently oriented triangles
     triangles = least_area(vertices_m[polygon], ~(taken | taken.T))
     return None if triangles is None else polygon[triangles]
 

@@ -136,7 +136,8 @@ def _turned_outwards(points_m: FloatArray, normals: FloatArray) -> FloatArray:
 
 
 def _facing(points_m: FloatArray, normals: FloatArray, areas_m2: FloatArray, part: IntArray) -> FloatArray:
-    """Return (N,) positive values where the normals of a point's component face outwards (volume > 0).
+    """Return (N,) positive values where the normals of a point's component face outwards (volume > 0), or for
+    a flat component towards the positive direction of the axis that they are closest to.
 
     Args:
         points_m: (N, 3) points.

@@ -149,7 +149,7 @@ def _in_order(keys, order):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _sums(column, cell, cells):  # type: ignore[no-untyped-def]
-    """Return (cells, K) float64 sums, over each cell, of the rows of an (N, K) column."""
+    """Return (cells, K) float64 sums, over each cell, of the rows of an (N, K) array."""
     sums = np.zeros((cells, column.shape[1]))
     for row in range(len(column)):
         for part in range(column.shape[1]):

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Answers:
-    """The newest verdict and depth pictures; the depth job waits for the verdict."""
+    """The newest verdict and pictures of the depth error; the depth job starts after the verdict."""
 
     def __init__(
         self,
@@ -24,9 +24,9 @@ class Answers:
         """Start without requests.
 
         Args:
-            session: the session whose jobs answer.
+            session: runs the jobs.
             on_trust: called with a new verdict, or None if there is none.
-            on_depth: called when there are new depth pictures.
+            on_depth: called when the depth job has ended.
         """
         self._session, self._on_trust, self._on_depth = session, on_trust, on_depth
         self._trust: TrustView | None = None
@@ -48,12 +48,12 @@ class Answers:
         return pictures
 
     def ask(self, request: TrustRequest, view: str, depth: bool) -> None:
-        """Request what is not known yet.
+        """Request the verdict, and after it the depth pictures, unless requested before.
 
         Args:
             request: the verdict to compute.
             view: the view that is shown.
-            depth: whether its depth is needed.
+            depth: whether its depth pictures are needed.
         """
         if self._judging:
             return

@@ -208,16 +208,16 @@ def bars_of(camera: CameraView, suspects: Collection[str] = ()) -> tuple[Bar, ..
 
 
 class Bars:
-    """The bars of one camera's views; a click on one of them picks it."""
+    """Bars of the reprojection error, one for each view of a camera; a click on a bar chooses its view."""
 
     def __init__(self, ui: Ui, on_pick: Callable[[str], None]) -> None:
-        """Add an empty row; ``on_pick`` is called with the name of a view."""
+        """Add an empty row of bars; ``on_pick`` is called with the name of a clicked view."""
         self._on_pick = on_pick
         self._html = ui.gui.add_html(bars_html((), ""))
         self._field = ui.when_changed(ui.gui.add_text("View that was clicked", ""), self._picked)
 
     def show(self, bars: tuple[Bar, ...], chosen: str) -> None:
-        """Show these bars, one of them chosen."""
+        """Show these bars; ``chosen`` is the name of the highlighted view."""
         self._html.content = bars_html(bars, chosen)
 
     def _picked(self) -> None:

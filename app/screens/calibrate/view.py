@@ -43,9 +43,9 @@ class WarpView:
     """The board's own shape, estimated from the views of one camera."""
 
     off_plane_m: FloatArray
-    """(R, C) height of its points over their best-fitting plane."""
+    """(R, C) heights of its points over their best-fitting plane, metres."""
     used: bool
-    """Whether the camera was estimated with it, because that predicts held-out views better."""
+    """Whether the camera was estimated with this shape, because it predicts held-out views better."""
     rms_px: float
     """RMS of held-out views with this shape."""
     flat_rms_px: float

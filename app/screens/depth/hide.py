@@ -158,7 +158,7 @@ class HideFolder:
 
 
 def painted_line(discs: tuple[Disc, ...]) -> Markdown:
-    """Return a line with the number of painted discs; empty for none."""
+    """Return a line with the number of painted discs; empty without discs."""
     if not discs:
         return Markdown("")
     count = "1 disc" if len(discs) == 1 else f"{len(discs)} discs"

@@ -102,7 +102,7 @@ class DepthPanel(Panel):
         return Controls(self.ui, fields, self.session.spec.config, self.session.edit)
 
     def on_spec(self, spec: Spec) -> None:
-        """Show the current settings; remove a filled part that belongs to others."""
+        """Show the settings; remove filled depth of other settings, and painted discs of another scene."""
         for controls in self._controls:
             controls.write(spec.config)
         self._model.write(spec.config.depth)
@@ -238,7 +238,7 @@ class DepthPanel(Panel):
     # The lesson.
 
     def _lesson_numbers(self) -> Numbers:
-        """Return the numbers of the chosen node; empty while its depth is computed."""
+        """Return the numbers of the chosen node; empty unless its depth is up to date."""
         session, shown = self.session, self._shown()
         scene: SceneView | None = session.results.view("scene")
         if shown is None or scene is None or not session.results.fresh("depth", session.spec):

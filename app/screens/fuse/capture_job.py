@@ -22,7 +22,7 @@ MAP_POINTS = 2_000
 
 
 def capture_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, CaptureView]:
-    """Register with every rival from every start of the map; the race's own start has no effect."""
+    """Register with each of the race's methods from every start of the map; the race's start is ignored."""
     rig, nodes = yield from store.stages(spec, "rig", "nodes")
     race = replace(race, start=Start())
 

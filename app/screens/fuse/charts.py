@@ -127,8 +127,8 @@ def kernel(lane: RaceLane, shown: PairHistogram, edges_m: FloatArray) -> FloatAr
 
 
 def weights(shown: PairHistogram) -> FloatArray:
-    """Return (B,) the mean weight of each bin over the largest; linear over empty bins, and zero beyond the
-    farthest pair."""
+    """Return (B,) mean weights of the bins as parts of the largest one, interpolated over empty bins; zero
+    beyond the farthest pair, and NaN if no bin has pairs."""
     known = np.flatnonzero(np.isfinite(shown.weights))
     if not len(known):
         return shown.weights

@@ -57,5 +57,5 @@ class RaceClock:
         return t_ns / (NS_PER_MS if self.in_ms else COUNT_NS)
 
     def at(self, place: float | None) -> int:
-        """Return the time of an iteration or millisecond; None is the end."""
+        """Return the time, ns, of an iteration or of a number of milliseconds; None is the end."""
         return self.end_ns if place is None else round(place * (NS_PER_MS if self.in_ms else COUNT_NS))

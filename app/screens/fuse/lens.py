@@ -105,7 +105,7 @@ def _two_directions(center_m: FloatArray, tree: cKDTree, normals: FloatArray) ->
 
 
 def _pixels(points_m: FloatArray, center_m: FloatArray, axes: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Return (N, 2) column and row from 0 to 255 across the window, and (N,) whether they are in it."""
+    """Return (N, 2) columns and rows, 0 to 255 in the window, and (N,) whether a point is in it."""
     across = ((points_m - center_m) @ axes[:2].T) / WINDOW_M
     pixels = np.rint(255.0 * (0.5 + across * (1.0, -1.0)))
     return pixels, np.all((pixels >= 0) & (pixels <= 255), axis=1)

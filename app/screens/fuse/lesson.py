@@ -105,7 +105,7 @@ WORDS = {"more": ("weights", "alike", "plane"), "others": ("far", "close", "near
 
 
 def numbers(scene: str, race: Race, view: RaceView) -> Numbers:
-    """Return the fields' values for a race; errors are from the reference position or the other cloud."""
+    """Return the values of the lesson's fields for a race; errors are the ``off_m`` of its steps."""
     values = dict.fromkeys(NUMBERS, UNKNOWN)
     for place, lane in enumerate(view.lanes, 1):
         values[f"name_{place}"] = RIVAL_NAMES[lane.rival].replace(",", "")

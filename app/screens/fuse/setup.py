@@ -32,11 +32,11 @@ class RaceSetup:
     """The controls of a ``Race``."""
 
     def __init__(self, ui: Ui, on_change: Callable[[], object]) -> None:
-        """Start without controls; the panel adds them in its own order."""
+        """Start without controls; the panel adds them by the ``add_`` methods."""
         self._ui, self._on_change = ui, on_change
         self._race = FIRST
         self._from_address = False
-        """Whether the nodes are those of an address, although the scene may not be loaded yet."""
+        """Whether the nodes come from an address; its scene may not be loaded yet."""
         self._slots: list[viser.GuiDropdownHandle[str]] = []
 
     def add_comparisons(self) -> None:
@@ -75,7 +75,7 @@ class RaceSetup:
         self._ui.when_changed(self._preset, self._picked_preset)
 
     def add_nodes(self) -> None:
-        """Add the choice of the moving and the fixed node, and of the search direction for pairs."""
+        """Add drop-downs for the moving node, the fixed node, and the search direction for pairs."""
         gui, names = self._ui.gui, ["node_00", "node_01"]
         self._source = gui.add_dropdown(
             "Move", names, initial_value=names[1], hint="Node whose cloud moves (coloured)."

@@ -107,7 +107,7 @@ class ShownChoice:
         self._choose(RACE_NAMES[mode])
 
     def walk(self) -> None:
-        """Choose the walk, at once or as soon as the scene is known.
+        """Choose the walk; while the scene is loading, as soon as it is known.
 
         Raises:
             InputError: the scene is no recording.

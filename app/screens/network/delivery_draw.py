@@ -243,7 +243,7 @@ class DeliveryDrawing:
         self._clouds[row] = handle
 
     def _show_mesh(self, glb: bytes) -> None:
-        """Add a mesh; the previous one stays until the browser has read the new one."""
+        """Add a mesh and keep the one before it, so that no gap is seen; empty ``glb`` removes all."""
         while len(self._meshes) > 1:
             self._meshes.pop(0).remove()
         if not glb:

@@ -358,6 +358,6 @@ def _still(view: NetworkView) -> np.ndarray:
 
 
 def _round_down(length_m: float) -> float:
-    """Return the largest of 1, 2, 5, 10 and so on that is not longer."""
+    """Return the length rounded down to 1, 2 or 5 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(length_m))
     return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= length_m))

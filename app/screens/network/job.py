@@ -18,7 +18,7 @@ from packetmesh.progress import Progress, part
 
 
 def network_job(store: Store, spec: Spec) -> Generator[Any, None, Any]:
-    """Return a ``DeliveryView``, after partial ones, or the ``NetworkView`` of every run."""
+    """Return a ``DeliveryView``, yielding partial ones before, or the ``NetworkView`` of every run."""
     if spec.sent is not None:
         return (yield from delivery_job(store, spec))
     return (yield from runs_job(store, spec))

@@ -45,7 +45,7 @@ SHARES = ("ratio", "share", "coverage", "redundancy")
 
 
 def metric_tables(views: Sequence[NetworkView]) -> tuple[Markup, Markup]:
-    """Return HTML of the main metrics, and of all others that are not zero in every run."""
+    """Return HTML of the main metrics, and of the others, without those that are zero in all runs."""
     by_name: dict[str, list[Metric | None]] = {}
     for index, view in enumerate(views):
         for name, metric in view.metrics.items():

@@ -73,7 +73,7 @@ def _header_bytes(config: NetworkConfig) -> int:
 
 
 def _levels(trace: NetworkTrace, pieces: Pieces) -> tuple[tuple[int, ...], Levels]:
-    """Return the nodes that have a row, and the frames in these rows."""
+    """Return the nodes that have a row (senders and cameras), and the frames in these rows."""
     frames = pieces.where(pieces.what == What.AIR)
     sends = np.isin(np.arange(len(trace.names)), frames.node)
     nodes = np.flatnonzero(sends | camera_nodes(trace))

@@ -1,4 +1,4 @@
-"""The folder with a surface's holes: their list, their causes, and the cost of filling them."""
+"""The folder with a surface's holes: their list, their causes, and the result of filling them."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class HolesFolder:
         Args:
             ui: panel to add it to.
             on_explain: called with a surface and the index of its hole to explain.
-            on_fill: called with the length in metres of the longest hole to fill; None for none.
+            on_fill: called with the rim length, metres, up to which holes are filled; None fills none.
         """
         self._on_explain, self._on_fill = on_explain, on_fill
         self._holes: dict[Which, tuple[HoleView, ...]] = {}
@@ -91,8 +91,8 @@ class HolesFolder:
     def load(self, holes: Mapping[Which, tuple[HoleView, ...]], shown: Which | None) -> None:
         """Take the holes of the surfaces, and list those of the one that is shown alone.
 
-        A hole stays chosen if its surface is unchanged. A new surface after fusion is not filled, so the
-        slider returns to off.
+        A hole stays chosen if its surface and ``shown`` are unchanged. A new surface after fusion is not
+        filled, so the slider returns to off.
         """
         same = {which: _alike(holes.get(which, NOTHING), self._holes.get(which, NOTHING)) for which in WHICH}
         self._holes = dict(holes)
@@ -142,7 +142,7 @@ class HolesFolder:
             self._choose(0)
 
     def explain(self, answer: ExplainView | None) -> None:
-        """Show the cause of the chosen hole; None if no answer came."""
+        """Show the cause of the chosen hole; None if the job was stopped or failed."""
         if self._index is None:
             return
         if answer is None:
@@ -152,7 +152,7 @@ class HolesFolder:
             self._shares.content = shares_table(answer.found)
 
     def filled(self, view: FilledView | None) -> None:
-        """Show the filled surface's numbers; None if no answer came."""
+        """Show the filled surface's numbers; None if the job was stopped or failed."""
         if not self.filling:
             self._filled.content = FILL_OFF
         else:
@@ -205,7 +205,7 @@ class HolesFolder:
         return NOTHING if self._which is None else self._holes.get(self._which, NOTHING)
 
     def _names(self) -> dict[int, str]:
-        """Return the list's names of the largest holes, longest rims and the chosen one, by index."""
+        """Return the names of the listed holes by index: the largest holes, longest rims, and chosen one."""
         holes = [index for index, hole in enumerate(self._shown) if not hole.rim]
         rims = [index for index, hole in enumerate(self._shown) if hole.rim]
         listed = {*holes[:LISTED_HOLES], *rims[:LISTED_RIMS]} | (
@@ -253,7 +253,7 @@ def reason_text(found: Explanation) -> Markdown:
 
 
 def shares_table(found: Explanation) -> Markup:
-    """Return a table in HTML of the depth sources for the pixels in the hole; empty if no camera sees it."""
+    """Return an HTML table of the depth sources of the hole's pixels; empty if no camera sees it."""
     rows = [
         (name, hint, number(share, 0, "%", 100.0))
         for name, hint, share in (

@@ -56,7 +56,7 @@ class PaintRequest:
     """Most points in a quick look; a larger cloud is thinned to about this number."""
 
     def key(self, spec: Spec) -> tuple[Hashable, ...]:
-        """Return everything that the answer depends on: a quick look has the spec's points, not its ball."""
+        """Return the answer's cache key. A quick look depends on the spec's points, not on its radii."""
         return ("paint", self, key(spec, "after" if self.radius_m is None else "clouds"))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from pipeline.types import FloatArray
 
 Groups = Sequence[FloatArray]
-"""By rig: (S, K) terms of S repetitions."""
+"""(S, K) terms of each rig's S repetitions."""
 Estimate = tuple[float, tuple[float, float]]
 """A value with its 95 % interval."""
 RESAMPLES = 2000
@@ -56,8 +56,9 @@ def resampled_ci95(
     seed: int = 0,
     resamples: int = RESAMPLES,
 ) -> tuple[float, float]:
-    """Return the 95 % percentile interval of a statistic of sums, from (resamples, R, K) to (resamples,).
+    """Return the 95 % percentile bootstrap interval of a statistic.
 
+    The statistic maps (resamples, R, K) sums of the terms of R rigs to (resamples,) values.
     Repetitions share their rig, so rigs are drawn first, and then repetitions within each drawn rig, both
     with replacement (Davison and Hinkley, Bootstrap Methods, 1997, 3.8). Four rigs have only 35 different
     draws: such an interval is rather too narrow than too wide.

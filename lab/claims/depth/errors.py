@@ -192,7 +192,7 @@ def picture_strip(rgb: ByteArray, truth_m: FloatArray, inferred_m: FloatArray) -
 
 
 def colored(values: FloatArray, low: float, high: float, colors: int) -> ByteArray:
-    """Return (H, W, 3) a colour map from ``low`` to ``high``, black where a value is unknown."""
+    """Return (H, W, 3) RGB of (H, W) values by a colour map from ``low`` to ``high``; black if not finite."""
     share = np.clip((np.nan_to_num(values) - low) / max(high - low, 1e-9), 0.0, 1.0)
     bgr = cv2.applyColorMap(np.round(255.0 * share).astype(np.uint8), colors)
     return np.where(np.isfinite(values)[..., None], bgr[..., ::-1], np.uint8(0))

@@ -84,7 +84,7 @@ def validate(model: CompletionNet, frames: list[Tensor]) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Frames(IterableDataset):
-    """Endless frames with holes, every view once per epoch; new shards are used from the next epoch on."""
+    """Endless frames with holes: each epoch has every view once, also of the shards added before it."""
 
     data: Path
     seed: int

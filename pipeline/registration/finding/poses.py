@@ -1,4 +1,4 @@
-"""Poses of a source relative to a target, compared: the same answer or not, and how far apart, in words."""
+"""Comparison of two poses of a source relative to a target, and lengths as text."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SAME_DEG, SAME_VOXELS = 1.5, 0.8
 """Two poses that differ by less are the same answer: 1.5 degrees and 5 cm in a view of 3 m."""
 COMPARED_POINTS = 1000
 STRAY_MEDIANS = 10.0
-"""A point farther from the middle of a cloud than so many times the median is a stray."""
+"""A point farther from the middle of a cloud than this many times the median distance is a stray."""
 
 
 def same(T_a: FloatArray, T_b: FloatArray, source: PointCloud, target: PointCloud) -> bool:
@@ -29,8 +29,8 @@ def turn_deg(T_a: FloatArray, T_b: FloatArray) -> float:
 
 
 def compared_points_m(cloud: PointCloud) -> FloatArray:
-    """Return about 1000 points by which poses are compared, (n, 3), without strays: at an error of 0.001
-    degrees, a few points at a distance of a kilometre would outweigh all others.
+    """Return (n, 3) points by which poses are compared, fewer than 2000 and without strays: at an error of
+    0.001 degrees, a few points at a distance of a kilometre would outweigh all others.
     """
     some_m = cloud.points_m[:: max(1, len(cloud) // COMPARED_POINTS)]
     away_m = np.linalg.norm(some_m - np.median(some_m, axis=0), axis=1)
@@ -38,5 +38,5 @@ def compared_points_m(cloud: PointCloud) -> FloatArray:
 
 
 def length(metres: float) -> str:
-    """Return a length in words."""
+    """Return a length as text with its unit."""
     return f"{metres:.3g} m" if metres >= 1.0 else f"{100.0 * metres:.2g} cm"

@@ -1,4 +1,4 @@
-"""Registrations as edges of a pose graph: each holds the motion as well as its own pairs do."""
+"""Registrations as edges of a pose graph, with the information that their pairs give about each motion."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from pipeline.registration.observability import OPEN_SHARE
 from pipeline.types import FloatArray, RegistrationResult
 
 FLOOR_M = 0.001
-"""Standard error of a registration that no number of pairs makes smaller: of the shift, and of the turn
-where the pairs are."""
+"""Smallest standard error of a registration with any number of pairs: of the shift, and of the displacement
+that the turn causes at the pairs' root mean square distance from their centre."""
 SLACK_RAD, SLACK_M = 0.003, 0.006
-"""Further error of a right registration, from the sensors' bias and wrong pairs, which loops must allow:
+"""Further error of a right registration, from the sensors' bias and wrong pairs, which loop tests allow for:
 three edges close within 5 cm (a right registration has up to 2 cm, SPEC 4.7)."""
 WEAK_SHARE = 1e-4
-"""As ``OPEN_SHARE``, for the standard errors of measures: in rendered rooms, motions that the pairs hold by a
-share of 2e-4 to 2e-3 are right to millimetres, and noise alone holds 2e-5; ``python -m lab.measuring poses``
-prints how often poses are inside their ellipsoids by several shares."""
+"""Replaces ``OPEN_SHARE`` for the standard errors of measures: in rendered rooms, motions with a share from
+2e-4 to 2e-3 are right to millimetres, and noise alone gives 2e-5; ``python -m lab.measuring poses`` prints
+how often poses are inside their ellipsoids, for several shares."""
 OPEN_M = 1.0
 """Standard error given to a motion that the pairs do not determine at all."""
 
@@ -32,14 +32,14 @@ class PoseEdge:
     T_target_source: FloatArray
     """(4, 4) registered pose X."""
     information: FloatArray
-    """(6, 6) inverse covariance of the motion (turn in rad, then shift in m) in the source's frame that X
-    lacks: the true pose is X exp(motion)."""
+    """(6, 6) inverse covariance of the error of X: the motion (turn in rad, then shift in m) in the source's
+    frame with which X exp(motion) is the true pose."""
     strength: float = 1.0
     """Weight of the evidence, above 0: where edges contradict each other, the larger sum of weights stays."""
     agrees: bool = True
     """False for an edge that other evidence contradicts: it determines no pose and checks no loop."""
     weak_information: FloatArray | None = None
-    """(6, 6) information that also counts what holds a motion weakly, for standard errors; None: the same."""
+    """(6, 6) information with ``WEAK_SHARE``, for standard errors; None: ``information``."""
 
     @property
     def loop_covariance(self) -> FloatArray:
@@ -57,17 +57,17 @@ def registration_information(
     """Compute an edge's information from the normal matrix of its registration's last pairs.
 
     The covariance is that of least squares on the point-to-plane distances, s^2 (J^T W J)^-1 / n with n
-    effective pairs, plus ``FLOOR_M``. One J has the source's normals and the other the target's: their noise
-    is independent and cancels, while the square of one normal's noise would seem to hold every motion. A
-    share of the matrix below ``open_share`` counts as nothing, so a corridor does not hold the motion along
-    itself.
+    effective pairs, plus ``FLOOR_M`` squared. One J has the source's normals and the other the target's:
+    their noise is independent and cancels, while the square of one normal's noise would seem to determine
+    every motion. A share of the matrix below ``open_share`` counts as nothing, so a corridor does not
+    determine the motion along itself.
 
     Args:
         result: a registration with at least one step.
         source_m: (N, 3) source points, to which the pairs refer, in the source's frame.
         source_normals: (N, 3) their unit normals.
         target_normals: (M, 3) unit normals of the target's points, in the target's frame.
-        open_share: share of the best held motion below which a motion is open.
+        open_share: share of the best determined motion below which a motion is open.
 
     Returns:
         (6, 6) information as in ``PoseEdge``.
@@ -116,7 +116,7 @@ def adjoint(T_a_b: FloatArray) -> FloatArray:
 
 def small_motion(T: FloatArray) -> FloatArray:
     """Return the (..., 6) turn vector, rad, and shift, m, of rigid (..., 4, 4) motions; exact to first order
-    in the shift, and for turns of any size.
+    in the shift, and for turns below 180 degrees.
     """
     rotation = T[..., :3, :3]
     skew = 0.5 * (rotation - np.swapaxes(rotation, -1, -2))

@@ -51,7 +51,7 @@ class Loops:
         return float(strengths[list(self.tree)].sum() + strengths[agreeing].sum())
 
     def agreeing(self, edges: int) -> list[bool]:
-        """Return of each of the edges whether it is in the tree or agrees with it."""
+        """Return for each of ``edges`` edges whether it is in the tree or agrees with it."""
         kept = {*self.tree, *np.array(self.closing, int)[self.close].tolist()}
         return [place in kept for place in range(edges)]
 
