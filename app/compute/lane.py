@@ -93,6 +93,17 @@ class LatestWins:
         on_end(outcome)
 
 
+class UrgentLanes(dict[str, LatestWins]):
+    """An urgent lane for each kind of job, so that a newer job replaces only those of its own kind."""
+
+    def __init__(self, pool: ComputePool) -> None:
+        self._pool = pool
+
+    def __missing__(self, job: str) -> LatestWins:
+        lane = self[job] = LatestWins(self._pool, object(), urgent=True)
+        return lane
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Submission:
     """A step submitted to its lane. It can be submitted again while its earlier job is stopping."""

@@ -1,4 +1,4 @@
-"""Point clouds in the scene: sent once, then moved by their pose."""
+"""Point clouds in the scene, sent once, then moved by their pose; and how drawings are removed."""
 
 from __future__ import annotations
 
@@ -81,6 +81,12 @@ def _colors(cloud: Sample, color: tuple[int, int, int] | None) -> ByteArray:
         return cloud.colors
     light = cloud.colors.mean(axis=1, keepdims=True) / 255.0
     return np.clip(np.array(color) * (0.6 + 0.7 * light), 0, 255).astype(np.uint8)
+
+
+def shorten(handles: list[viser.GlbHandle], most: int) -> None:
+    """Remove the oldest meshes until at most ``most`` are left."""
+    while len(handles) > most:
+        handles.pop(0).remove()
 
 
 def clear(scene: viser.SceneApi, name: str) -> None:

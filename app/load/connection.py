@@ -36,7 +36,7 @@ def wait_for(happened: Callable[[], bool], patience_s: float = PATIENCE_S) -> No
     end_s = time.monotonic() + patience_s
     while not happened():
         if time.monotonic() > end_s:
-            raise TimeoutError("that did not happen")
+            raise TimeoutError(f"what was awaited did not come within {patience_s:g} s")
         time.sleep(0.02)
 
 

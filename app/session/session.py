@@ -14,7 +14,7 @@ from typing import Any
 import viser
 
 from app.compute import jobs
-from app.compute.lane import LatestWins, Submission, Track
+from app.compute.lane import LatestWins, Submission, Track, UrgentLanes
 from app.compute.pool import ComputePool, Outcome
 from app.compute.shared import SharedViews
 from app.compute.state import CHAIN, STEPS, Results, Spec, Step
@@ -71,7 +71,7 @@ class Session:
             Track(LatestWins(pool, object()), ("calibrate",)),
             Track(LatestWins(pool, object()), ("network",)),
         )
-        self._side, self._quick = LatestWins(pool, self), LatestWins(pool, object(), urgent=True)
+        self._side, self._quick = LatestWins(pool, self), UrgentLanes(pool)
         self._closed = False
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="session")
         self.panels: Sequence[Panel] = [panel(self) for panel in panels]
@@ -122,7 +122,7 @@ class Session:
 
     @property
     def _lanes(self) -> list[LatestWins]:
-        return [self._side, self._quick, *(track.lane for track in self._tracks)]
+        return [self._side, *self._quick.values(), *(track.lane for track in self._tracks)]
 
     def clients(self) -> Iterable[viser.ClientHandle]:
         """Return the browsers whose view this session turns."""
@@ -172,10 +172,10 @@ class Session:
     def quick_job(
         self, job: str, *arguments: Any, on_end: Callable[[Any], None], key: Hashable = None
     ) -> None:
-        """Run a job in parallel with the chain; of several, only the last. Answers with a key are shared."""
+        """Run a job in parallel with the chain, of each kind only the last. Answers with a key are shared."""
         view = None if key is None else self._shared.get(key)
         if view is None:
-            self._run_beside(self._quick, job, arguments, on_end, lambda _: None, key)
+            self._run_beside(self._quick[job], job, arguments, on_end, lambda _: None, key)
         else:
             self.post(on_end, view)
 

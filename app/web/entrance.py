@@ -20,7 +20,7 @@ from app.web.origin import Answer, answering
 WELCOME = "/?welcome"
 """Page to which the teacher's link redirects."""
 NOT_THAT = "This is not a link of this server: open the one that was printed when it started.\n"
-NO_LINK = "PacketMesh lets in who has its link: open the whole address that it printed when it started.\n"
+NO_LINK = "You need the link of this server: open the whole address that it printed when it started.\n"
 
 
 class Token:

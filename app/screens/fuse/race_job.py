@@ -123,7 +123,7 @@ def contest_of(rig: Rig, nodes: Sequence[NodeClouds], race: Race) -> Contest:
     last = max(race.source, race.target)
     if last >= len(nodes):
         raise InputError(
-            f"This scene has {len(nodes)} nodes, and none is number {last}; choose another node."
+            f"This scene has no node number {last}, only 0 to {len(nodes) - 1}; choose another node."
         )
     moving = nodes[race.source]
     if race.mode == "inferred":

@@ -115,7 +115,7 @@ class ShownChoice:
         if WALK in self._handle.options:
             self._choose(WALK)
         elif self._known:
-            raise InputError("This scene is no recording, so no camera walks; choose a recording under Scene")
+            raise InputError("In this scene no camera walks; choose a recording under Scene")
         else:
             self._requested = "walk"
 

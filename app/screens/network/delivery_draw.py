@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.drawing.clouds import clear
+from app.drawing.clouds import clear, shorten
 from app.drawing.colors import BACKGROUND, BRAND, DELIVERED, LOSS, NEUTRAL, SOURCE
 from app.drawing.poses import place
 from app.screens.network.delivery_view import DeliveryView, MomentView, PacketView
@@ -147,16 +147,22 @@ class DeliveryDrawing:
         self._packets.visible = bool(len(both))
         self._show_causes(now_ns, shown_ns)
 
-    def show_moment(self, moment: MomentView | None, most_j: float = 0.0) -> None:
+    def show_moment(self, moment: MomentView | None, most_j: float = 0.0) -> bool:
         """Show pictures, clouds and mesh of a moment; None is before anything has arrived.
 
         Args:
             moment: the moment.
             most_j: energy at which a node's battery has the colour of an empty one.
+
+        Returns:
+            Whether a new mesh stands over the one before, which goes when the moment is shown once more.
         """
         self._show_batteries(moment, most_j)
-        if moment is not self._shown:
+        if moment is self._shown:
+            shorten(self._meshes, 1)
+        else:
             self._show_pictures(moment)
+        return len(self._meshes) > 1
 
     def _show_pictures(self, moment: MomentView | None) -> None:
         self._shown = moment
@@ -244,19 +250,11 @@ class DeliveryDrawing:
 
     def _show_mesh(self, glb: bytes) -> None:
         """Add a mesh and keep the one before it, so that no gap is seen; empty ``glb`` removes all."""
-        while len(self._meshes) > 1:
-            self._meshes.pop(0).remove()
-        if not glb:
-            while self._meshes:
-                self._meshes.pop().remove()
-            return
-        self._made += 1
-        self._meshes.append(self._scene.add_glb(f"{self._below}/mesh-{self._made}", glb, cast_shadow=False))
-
-    def drop_old(self) -> None:
-        """Remove the mesh that a newer one has replaced."""
-        while len(self._meshes) > 1:
-            self._meshes.pop(0).remove()
+        shorten(self._meshes, 1 if glb else 0)
+        if glb:
+            name = f"{self._below}/mesh-{self._made}"
+            self._made += 1
+            self._meshes.append(self._scene.add_glb(name, glb, cast_shadow=False))
 
     def _show_causes(self, now_ns: int, shown_ns: int) -> None:
         """Show the causes of recent losses as words at the places where they happened."""

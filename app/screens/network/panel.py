@@ -377,7 +377,8 @@ class NetworkPanel(Panel):
         self._moment_s = time.monotonic()
         moment = view.moment_at(self._dock.now_ns)
         with self.ui.atomic():
-            drawing.show_moment(moment, most_j(view))
+            if drawing.show_moment(moment, most_j(view)):
+                self._hand.restart()
             self._measures.follow(view, moment)
             self._table.content = moment_table(view, moment, self._dock.now_ns)
             self._others.content = more_rows(view, moment) + metric_tables((view.run,))[1]

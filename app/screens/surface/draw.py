@@ -6,6 +6,7 @@ import numpy as np
 import viser
 
 from app.compute.records import MeshView
+from app.drawing.clouds import shorten
 from app.drawing.colors import INFERRED, TARGET
 from app.screens.surface.view import PaintedMesh, UnusedView
 from pipeline.types import FloatArray
@@ -36,7 +37,7 @@ class SurfaceDrawing:
             for handle in (*self._meshes, *self._rims):
                 handle.visible = False
         for kind, glb, handles in (("mesh", view.glb, self._meshes), ("rims", view.rims_glb, self._rims)):
-            _shorten(handles, 1 if glb else 0)
+            shorten(handles, 1 if glb else 0)
             if glb:
                 handles.append(self._add(f"{kind}-{self._made}", glb, kind == "mesh" or self._rims_shown))
 
@@ -68,12 +69,12 @@ class SurfaceDrawing:
     def drop_old(self) -> None:
         """Remove all meshes but the last."""
         for handles in (self._meshes, self._rims):
-            _shorten(handles, 1)
+            shorten(handles, 1)
 
     def clear(self) -> None:
         """Remove everything."""
         for handles in (self._meshes, self._rims):
-            _shorten(handles, 0)
+            shorten(handles, 0)
 
     def show(self, visible: bool, rims: bool, offset_m: FloatArray, top_m: FloatArray | None) -> None:
         """Show or hide it at an offset; a label at ``top_m`` distinguishes two surfaces."""
@@ -90,9 +91,3 @@ class SurfaceDrawing:
 
     def _add(self, name: str, glb: bytes, visible: bool) -> viser.GlbHandle:
         return self._scene.add_glb(f"{self._below}/{name}", glb, cast_shadow=False, visible=visible)
-
-
-def _shorten(handles: list[viser.GlbHandle], most: int) -> None:
-    """Remove the oldest handles until at most ``most`` are left."""
-    while len(handles) > most:
-        handles.pop(0).remove()

@@ -17,22 +17,20 @@ from pipeline.surface.findings import Explanation, RayParts
 from pipeline.types import FloatArray
 
 TEXT = Markdown(
-    """**Click a red rim in the picture, or choose one here**, and read its cause. The list has all rims
-of the mesh, also those that no camera sees: that of a *hole* is shorter than 1 m with surface all around it;
-at an *outer rim* the surface ends, or the rim is longer."""
+    """**Click a red rim in the picture, or choose one here**, and read its cause. The rim of a *hole* is
+shorter than 1 m, with surface all around it; at an *outer rim* the surface ends, or the rim is longer. The
+list has the 30 largest holes and the 10 longest outer rims, also those that no camera sees."""
 )
 NONE = "none"
 LISTED_HOLES, LISTED_RIMS = 30, 10
 LOOKING = Markdown("Looking for the cause …")
-SILENT = Markdown("There is no result, because another computation replaced this one. Click the hole again.")
+SILENT = Markdown("There is no result: the computation was replaced or failed. Click the hole again.")
 FILL_MOST_CM = 100.0
 FILL_OFF = Markdown(
     "Filling is off. Drag the slider to close small holes with an invented surface, and compare its error."
 )
 FILLING = Markdown("Filling …")
-UNFILLED = Markdown(
-    "There is no result, because another computation replaced this one. Drag the slider again."
-)
+UNFILLED = Markdown("There is no result: the computation was replaced or failed. Drag the slider again.")
 NOTHING: tuple[HoleView, ...] = ()
 WHICH: tuple[Which, ...] = ("after", "before")
 
@@ -68,7 +66,7 @@ class HolesFolder:
             )
             ui.when_changed(self._list, self._listed)
             steps = {"Previous": lambda: self._step(-1), "Next": lambda: self._step(1)}
-            ui.buttons("Go to", steps, "The hole before or after this one.")
+            ui.buttons("Go to", steps, "Choose the previous or the next hole.")
             self._why = gui.add_markdown(Markdown(""))
             self._shares = gui.add_html(Markup(""))
             self._parts = gui.add_markdown(Markdown(""))

@@ -14,7 +14,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 import pool_jobs as jobs
 
-from app.compute.lane import LatestWins
+from app.compute.lane import LatestWins, UrgentLanes
 from app.compute.pool import DIED, ComputePool, Outcome
 
 TIMEOUT_S = 60.0
@@ -88,6 +88,16 @@ def test_a_superseded_job_that_never_reports_loses_its_process(pool, tmp_path):
     lane.submit(jobs.count, 1, **second.callbacks())
     assert first.end().kind == "stopped"
     assert second.end() == Outcome("result", 1)
+
+
+def test_an_urgent_job_does_not_stop_one_of_another_kind(pool, tmp_path):
+    lanes, first, second = UrgentLanes(pool), Inbox(), Inbox()
+    lanes["look"].submit(jobs.report_and_note, str(tmp_path), "look", **first.callbacks())
+    wait_for(tmp_path / "look")
+    lanes["measure"].submit(jobs.count, 1, **second.callbacks())
+    assert second.end() == Outcome("result", 1)
+    (tmp_path / "go").touch()
+    assert first.end() == Outcome("result", "look")
 
 
 def test_the_job_of_a_lane_that_is_stopped_ends_at_its_next_report(pool, tmp_path):

@@ -180,7 +180,7 @@ def test_an_inferred_cloud_belongs_where_it_is(rig, nodes):
 
 @pytest.mark.parametrize("which", ["source", "target"])
 def test_a_node_that_an_address_names_has_to_be_there(rig, nodes, which):
-    with pytest.raises(InputError, match=f"has {len(nodes)} nodes, and none is number 99"):
+    with pytest.raises(InputError, match=f"no node number 99, only 0 to {len(nodes) - 1}"):
         contest_of(rig, nodes, Race(**{which: 99}))
 
 

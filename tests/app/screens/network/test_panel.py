@@ -138,7 +138,7 @@ def test_scrubbing_shows_the_moment_before_and_nothing_before_the_first(screen):
         for node, now in zip(view.nodes, moment.nodes, strict=True):
             (cloud,) = (name for name in screen.names() if name.startswith(f"cloud-{node.name}-"))
             assert len(screen.handle(cloud).points) == len(now.points_m)
-    assert sum(name.startswith("mesh-") for name in screen.names()) >= 1
+    assert sum(name.startswith("mesh-") for name in screen.names()) == 1
 
 
 def test_more_and_more_arrives(screen):
