@@ -1,6 +1,6 @@
-"""Make pictures of docs/ again: ``python -m tests.browser.pictures [fuse] [surface] [network] ...``.
+"""Make pictures of docs/ again: ``python -m tests.browser.pictures [fuse] [walk] [surface] ...``.
 
-``fuse``, ``surface``, ``network`` and ``calibrate`` open the app in Chromium; ``kinect`` reconstructs the two
+``fuse``, ``walk``, ``surface``, ``network`` and ``calibrate`` open the app in Chromium; ``kinect`` reconstructs the two
 real frames of ``--frames``, a folder with ``kinect_desk`` and ``kinect_basket``.
 """
 
@@ -46,6 +46,15 @@ def fuse(frames: Path) -> Image.Image:
     return _screen("Fuse", to_the_end)
 
 
+def walk(frames: Path) -> Image.Image:
+    """The walk through the living room, three quarters of the way."""
+
+    def there(page: Page) -> None:
+        page.locator(".packetmesh-dock-row .names").get_by_text("frame 150").wait_for()
+
+    return _screen("", there, "living-room-walk", "screen=fuse&frame=150")
+
+
 def surface(frames: Path) -> Image.Image:
     """The Surface screen with the living room."""
     return _screen("Surface", lambda page: None)
@@ -80,7 +89,8 @@ def _screen(
         browser = playwright.chromium.launch(executable_path=chromium_path(), args=ARGUMENTS)
         page = browser.new_page(viewport=WINDOW_PX)
         page.goto(f"{app.url}?{address}")
-        go(page, step)
+        if step:
+            go(page, step)
         page.get_by_text("Up to date").wait_for(timeout=120_000)
         prepare(page)
         for close in page.locator(".mantine-Notification-closeButton").all():
@@ -122,7 +132,10 @@ def _panel(title: str, rgb: np.ndarray) -> np.ndarray:
     return panel
 
 
-PICTURES = {"fuse": fuse, "surface": surface, "network": network, "calibrate": calibrate, "kinect": kinect}
+PICTURES = {
+    **{"fuse": fuse, "walk": walk, "surface": surface, "network": network},
+    **{"calibrate": calibrate, "kinect": kinect},
+}
 
 
 def main() -> None:

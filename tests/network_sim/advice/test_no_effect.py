@@ -21,13 +21,13 @@ from packetmesh.settings import key_of, settings, with_settings
 
 RELAYED = ["nodes.layout=line", "nodes.spacing_m=90", "nodes.count=4", "nodes.images=0"]
 """Relays, hidden nodes, and links near the end of their range."""
-SMALL = [*RELAYED, "nodes.image_bytes=3000", "nodes.buffer_packets=12", "run.horizon_s=6"]
+SMALL = [*RELAYED, "nodes.image_bytes=3000", "nodes.buffer_packets=12", "run.horizon_s=4"]
 LARGE = [
     *(*RELAYED, "nodes.interval_s=0.7", "nodes.image_bytes=20000", "nodes.depth_bytes=9000"),
     *("nodes.deadline_s=2", "run.horizon_s=4"),
 ]
 STREET = [
-    *("run.horizon_s=40", "run.warmup_s=5", "street.vehicles=40", "street.blocks=2"),
+    *("run.horizon_s=24", "run.warmup_s=5", "street.vehicles=40", "street.blocks=2"),
     *("scheme.image_bytes=6000", "scheme.summary_interval_s=2"),
 ]
 WALLS = ["radio.walls_m=40,-9,40,9", "radio.wall_db=1", "nodes.spacing_m=80", "radio.noise_dbm=-72"]
