@@ -1,7 +1,7 @@
 """Make pictures of docs/ again: ``python -m tests.browser.pictures [fuse] [walk] [surface] ...``.
 
-``fuse``, ``walk``, ``surface``, ``network`` and ``calibrate`` open the app in Chromium; ``kinect`` reconstructs the two
-real frames of ``--frames``, a folder with ``kinect_desk`` and ``kinect_basket``.
+``kinect`` reconstructs the two real frames of ``--frames``, a folder with ``kinect_desk`` and
+``kinect_basket``; the others open the app in Chromium.
 """
 
 from __future__ import annotations
@@ -133,8 +133,12 @@ def _panel(title: str, rgb: np.ndarray) -> np.ndarray:
 
 
 PICTURES = {
-    **{"fuse": fuse, "walk": walk, "surface": surface, "network": network},
-    **{"calibrate": calibrate, "kinect": kinect},
+    "fuse": fuse,
+    "walk": walk,
+    "surface": surface,
+    "network": network,
+    "calibrate": calibrate,
+    "kinect": kinect,
 }
 
 

@@ -116,7 +116,7 @@ def score(lane: RaceLane, row: int) -> dict[str, str]:
     elif ended:
         note = f"stopped · {lane.iterations} iterations"
     of = "off" if step.point_error_m is not None else "to the nearest point"
-    verdict = f"RMSE {_cm(step.rmse_m)} · {lane.verdict_text}" if ended else ""
+    verdict = f"RMSE {_cm(step.rmse_m)} · verdict {lane.verdict_text}" if ended else ""
     return {"number": distance, "unit": f"{unit} {of}", "note": note, "state": state, "verdict": verdict}
 
 

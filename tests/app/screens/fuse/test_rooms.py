@@ -78,5 +78,5 @@ def test_a_mirrored_cloud_is_found_out_although_ceicp_has_a_low_rmse(ends):
 def test_the_board_has_the_verdict_beside_the_rmse_at_the_end_only(ends):
     lane = ends["square"][1]
     said = score(lane, len(lane.steps) - 1)["verdict"]
-    assert said == f"RMSE {100 * lane.steps[-1].rmse_m:.2f} cm · {lane.verdict_text}"
+    assert said == f"RMSE {100 * lane.steps[-1].rmse_m:.2f} cm · verdict {lane.verdict_text}"
     assert score(lane, 0)["verdict"] == ""
