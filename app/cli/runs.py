@@ -32,7 +32,7 @@ from pipeline.reconstruct import Reconstruction, iterate_reconstruction
 from pipeline.recording.walk import LEAST_FRAMES
 from pipeline.sources import Calibrated, FileSource, Recorded, RigFolder
 from pipeline.spec import Spec
-from pipeline.stages import RunCache, cameras_of, compute, run
+from pipeline.stages import RunCache, cameras_of, compute, dressed, run
 from pipeline.surface.pictures import mesh_picture
 
 REPORT, PICTURE, TASK, IMPORTED = "report.html", "picture.jpg", "task.json", "imported"
@@ -100,10 +100,13 @@ def iterate_run(
     if isinstance(rig, Recorded) and result.rig.walk is not None:
         recording = yield from part(rig.iterate_open(), "files", 0.9, 0.95, detail=True)
         yield from part(iterate_keyframes(recording, result.rig.walk, out), "keyframes", 0.95, 1.0)
-    write_reconstruction_report(result, metrics, out / REPORT)
+    yield Progress("writing the report", 1.0)
+    texture = dressed(result.rig, result.placement, result.after)
+    write_reconstruction_report(result, metrics, out / REPORT, texture)
     if baseline is not None and beside is not None:
         write_baseline(baseline, beside, result, out)
-    write_run_folder(result, metrics, out)
+    yield Progress("writing the surfaces", 1.0)
+    write_run_folder(result, metrics, out, texture=texture)
     return result, metrics
 
 

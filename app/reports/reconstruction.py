@@ -12,11 +12,10 @@ from app.reports.html import picture, pictures, table, write_page
 from app.reports.measures import measured_sections
 from app.web.markup import Markup
 from pipeline.folders.walk import lost_sentences
-from pipeline.kernels.rays import Camera
+from pipeline.io.textures import Texture
 from pipeline.reconstruct import Reconstruction
 from pipeline.stages import cameras_of, dressed
-from pipeline.surface.pictures import beside, mesh_picture
-from pipeline.types import ByteArray, Surface
+from pipeline.surface.pictures import MeshPainter, beside
 
 MOST_SHOWN = 6
 """Most nodes of which the report has pictures."""
@@ -42,7 +41,11 @@ QUALITY_ROWS = (
 
 
 def write_reconstruction_report(
-    result: Reconstruction, metrics: dict[str, Any], path: Path, measures: dict[str, Any] | None = None
+    result: Reconstruction,
+    metrics: dict[str, Any],
+    path: Path,
+    texture: Texture,
+    measures: dict[str, Any] | None = None,
 ) -> None:
     """Write the self-contained HTML report of a run to ``path``.
 
@@ -50,14 +53,15 @@ def write_reconstruction_report(
         result: the reconstruction.
         metrics: its metrics.
         path: file of the report.
+        texture: photographs on the surface after fusion.
         measures: record of what was measured on the surface (``app.measuring.results``); None for nothing.
     """
-    sections = Markup("").join(_sections(result, metrics, measures))
+    sections = Markup("").join(_sections(result, metrics, texture, measures))
     write_page(path, f"PacketMesh: {metrics['scene']}", sections)
 
 
 def _sections(
-    result: Reconstruction, metrics: dict[str, Any], measures: dict[str, Any] | None
+    result: Reconstruction, metrics: dict[str, Any], texture: Texture, measures: dict[str, Any] | None
 ) -> Iterator[Markup]:
     before, after = metrics["surface_before"], metrics["surface_after"]
     yield Markup("<h1>{}</h1>").format(metrics["scene"])
@@ -73,7 +77,7 @@ def _sections(
     )
     yield from _recording(metrics)
     yield from _doubts(metrics)
-    yield from _surfaces(result, before, after)
+    yield from _surfaces(result, texture, before, after)
     if measures is not None:
         yield from measured_sections(measures)
     yield from _truth(metrics)
@@ -134,7 +138,9 @@ def _doubts(metrics: dict[str, Any]) -> Iterator[Markup]:
             yield Markup('<p class="lead"><b>{}.</b></p>').format(node["place"]["sentence"])
 
 
-def _surfaces(result: Reconstruction, before: dict[str, Any], after: dict[str, Any]) -> Iterator[Markup]:
+def _surfaces(
+    result: Reconstruction, texture: Texture, before: dict[str, Any], after: dict[str, Any]
+) -> Iterator[Markup]:
     yield Markup("<h2>The surface before and after fusion</h2>")
     radii = ", ".join(f"{1000 * radius:.1f}" for radius in before["radii_m"])
     yield Markup(
@@ -143,19 +149,20 @@ def _surfaces(result: Reconstruction, before: dict[str, Any], after: dict[str, A
     ).format(radii, _whose(len(result.placement.placed(result.rig.frames))))
     frames, placed = result.placement.placed(result.rig.frames), cameras_of(result.rig, result.placement)
     view = beside(placed[0], result.after)
+    painters = {"before": MeshPainter(result.before), "after": MeshPainter(result.after)}
+    textures = {"before": dressed(result.rig, result.placement, result.before), "after": texture}
     yield pictures(
         (
-            picture(_in_photographs(result, surface, view), f"{when} fusion, in the nodes' photographs")
-            for when, surface in (("before", result.before), ("after", result.after))
+            picture(painters[when].picture(view, texture=worn), f"{when} fusion, in the nodes' photographs")
+            for when, worn in textures.items()
         ),
         columns=2,
     )
     for frame, camera in zip(frames[:MOST_SHOWN], placed[:MOST_SHOWN], strict=True):
-        surfaces = (("before", result.before), ("after", result.after))
         figures = (
-            picture(mesh_picture(surface, camera, colored), f"{frame.name}, {when} fusion{how}")
+            picture(painter.picture(camera, colored), f"{frame.name}, {when} fusion{how}")
             for colored, how in ((True, ""), (False, ", shape only"))
-            for when, surface in surfaces
+            for when, painter in painters.items()
         )
         yield pictures(figures, columns=2)
     rows = (
@@ -171,10 +178,6 @@ def _surfaces(result: Reconstruction, before: dict[str, Any], after: dict[str, A
 def _whose(nodes: int) -> str:
     """Return whose cameras the report's pictures are from."""
     return "each node's camera" if nodes <= MOST_SHOWN else f"the cameras of the first {MOST_SHOWN} nodes"
-
-
-def _in_photographs(result: Reconstruction, surface: Surface, camera: Camera) -> ByteArray:
-    return mesh_picture(surface, camera, texture=dressed(result.rig, result.placement, surface))
 
 
 def _truth(metrics: dict[str, Any]) -> Iterator[Markup]:

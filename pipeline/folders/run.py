@@ -17,6 +17,7 @@ from pipeline.folders.walk import FILES as WALK_FILES
 from pipeline.folders.walk import walk_metrics, write_trajectory
 from pipeline.io.clouds import write_cloud
 from pipeline.io.meshes import write_mesh
+from pipeline.io.textures import Texture
 from pipeline.measuring.surface import MEASURING, measured_surface, write_measured
 from pipeline.merging import MergedClouds
 from pipeline.placement.agreement import Agreement
@@ -51,6 +52,7 @@ def write_run_folder(
     metrics: dict[str, Any],
     folder: Path,
     config: dict[str, Any] | None = None,
+    texture: Texture | None = None,
 ) -> list[Path]:
     """Write everything but the report and keyframes into ``folder``, each file whole or not at all.
 
@@ -63,6 +65,7 @@ def write_run_folder(
         metrics: its metrics.
         folder: output folder, created if it is missing.
         config: record of the run's settings; None uses ``config_of``.
+        texture: photographs on the surface after fusion; None computes them.
 
     Returns:
         The files written.
@@ -79,7 +82,7 @@ def write_run_folder(
         files.append(folder / name)
         write_cloud(files[-1], cloud)
     meshes = zip(MESH_FILES, (reconstruction.before, reconstruction.after, reconstruction.after), strict=True)
-    texture = dressed(reconstruction.rig, reconstruction.placement, reconstruction.after)
+    texture = texture or dressed(reconstruction.rig, reconstruction.placement, reconstruction.after)
     for name, mesh in meshes:
         if len(mesh.triangles):
             files.append(folder / name)

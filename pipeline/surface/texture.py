@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.io.textures import WHITE_ROWS, Texture
 from pipeline.kernels.geometry import apply, inverse, project, scaled
+from pipeline.kernels.kdtree import compiled
 from pipeline.kernels.rays import Camera, hit_depths
 from pipeline.types import BoolArray, ByteArray, FloatArray, IntArray, Surface
 
@@ -54,15 +55,15 @@ def photographed(
     small = [Camera(scaled(camera.intrinsics, _shrink(camera)), camera.T_world_camera) for camera in cameras]
     depths = hit_depths(vertices_m, triangles, small)
     pixels = [_pixels(camera, vertices_m) for camera in cameras]
-    middles = [pixels_of[triangles].mean(axis=1) for pixels_of in pixels]
-    scores = np.stack(
-        [
-            _scores(surface, camera, pixels_of, middle, depth.z_m, known)
-            for camera, pixels_of, middle, depth, (_, known) in zip(
-                cameras, pixels, middles, depths, pictures, strict=True
-            )
-        ]
-    )
+    scores = np.empty((len(cameras), len(triangles)))
+    middles = np.empty(scores.shape, np.int32)
+    for row, (camera, depth, (_, known)) in enumerate(zip(cameras, depths, pictures, strict=True)):
+        shape = camera.intrinsics.height_px, camera.intrinsics.width_px
+        first_m = np.where(np.isfinite(depth.z_m), depth.z_m, np.inf).astype(np.float32)
+        around_m = cv2.erode(first_m, np.ones((NEAR_RIM_PX, NEAR_RIM_PX), np.uint8))
+        seen = _inside(pixels[row], shape, known), shape, first_m, around_m, _shrink(camera)
+        to = scores[row], middles[row]
+        _score(vertices_m, triangles, pixels[row], *seen, camera.T_world_camera, *to)
     gains = _gains(scores > 0, middles, [rgb for rgb, _ in pictures])
     image, corners, scale = _side_by_side([rgb for rgb, _ in pictures], gains)
     size = np.array([image.shape[1], image.shape[0]])
@@ -85,61 +86,100 @@ def _pixels(camera: Camera, points_m: FloatArray) -> FloatArray:
     return np.clip(pixels, FAR_OUTSIDE_PX, -FAR_OUTSIDE_PX)
 
 
-def _scores(
-    surface: Surface,
-    camera: Camera,
+def _inside(pixels: FloatArray, shape: tuple[int, int], known: BoolArray | None) -> BoolArray:
+    """Return (V,) True for the pixels inside an image of this shape whose colour is known."""
+    inside: BoolArray = np.all((pixels >= 0.0) & (pixels <= (shape[1] - 1.0, shape[0] - 1.0)), axis=1)
+    if known is not None:
+        column, row = np.rint(np.clip(pixels, 0, (shape[1] - 1, shape[0] - 1))).astype(int).T
+        inside &= known[row, column]
+    return inside
+
+
+@compiled
+def _score(
+    vertices_m: FloatArray,
+    triangles: IntArray,
     pixels: FloatArray,
-    middles: FloatArray,
-    z_m: FloatArray,
-    known: BoolArray | None,
-) -> FloatArray:
-    """Return (F,) scores: a camera's pixels per area of each triangle, up to a factor; 0 if not seen.
+    inside: BoolArray,
+    shape: tuple[int, int],
+    first_m: FloatArray,
+    around_m: FloatArray,
+    shrink: float,
+    T_world_camera: FloatArray,
+    scores: FloatArray,
+    middles: IntArray,
+) -> None:
+    """Score the triangles of a mesh in one camera.
 
     Args:
-        surface: mesh, whose triangles are tested at their corners and middles.
-        camera: camera at full image size.
-        pixels: (V, 2) pixels of the vertices.
-        middles: (F, 2) pixels of the triangles' middles.
-        z_m: (h, w) depth of the first surface, at reduced size.
-        known: (H, W) True where the photograph is known, or None.
+        vertices_m: (V, 3) world frame.
+        triangles: (F, 3).
+        pixels: (V, 2) pixels of the vertices, in the photograph.
+        inside: (V,) True where the photograph has a colour.
+        shape: (rows, columns) of the photograph.
+        first_m: (h, w) depth of the first surface, at reduced size; inf where there is none.
+        around_m: (h, w) the smallest depth around each pixel.
+        shrink: factor from the size of the photograph to that of the depth.
+        T_world_camera: (4, 4) pose of the camera.
+        scores: (F,) written: the camera's pixels per area of each triangle, up to a factor; 0 if not seen.
+        middles: (F,) written: index of the photograph's pixel at the middle of each triangle.
     """
-    shape = camera.intrinsics.height_px, camera.intrinsics.width_px
-    limits = np.array([shape[1] - 1.0, shape[0] - 1.0])
-    inside = np.all((pixels >= 0.0) & (pixels <= limits), axis=1)
-    if known is not None:
-        inside &= known[_places(pixels, shape)]
-    corners_m = surface.vertices_m[surface.triangles]
-    normals = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
-    to_camera_m = camera.T_world_camera[:3, 3] - corners_m.mean(axis=1)
-    distance_m = np.maximum(np.linalg.norm(to_camera_m, axis=1), 1e-9)
-    cosines = np.abs(np.einsum("fi,fi->f", normals, to_camera_m))
-    cosines /= np.maximum(np.linalg.norm(normals, axis=1) * distance_m, 1e-15)
-    own_z_m = -to_camera_m @ camera.T_world_camera[:3, 2]
-    nearest_m = own_z_m - np.maximum(HIDDEN_M, HIDDEN_SHARE * own_z_m)
-    first_m = np.where(np.isfinite(z_m), z_m, np.inf).astype(np.float32)
-    around_m = cv2.erode(first_m, np.ones((NEAR_RIM_PX, NEAR_RIM_PX), np.uint8))
-    place = _places((middles + 0.5) * _shrink(camera) - 0.5, first_m.shape)
-    shown: BoolArray = nearest_m <= first_m[place]
-    free = nearest_m <= around_m[place]
-    seen = inside[surface.triangles].all(axis=1) & shown & (cosines > LEAST_COSINE)
-    return np.where(seen, cosines / distance_m**2 * np.where(free, 1.0, AT_RIM), 0.0)
+    eye_m = T_world_camera[:3, 3]
+    for f in range(len(triangles)):
+        a, b, c = triangles[f]
+        u = (pixels[a, 0] + pixels[b, 0] + pixels[c, 0]) / 3.0
+        v = (pixels[a, 1] + pixels[b, 1] + pixels[c, 1]) / 3.0
+        middles[f] = _nearest(v, shape[0]) * shape[1] + _nearest(u, shape[1])
+        scores[f] = 0.0
+        if not (inside[a] and inside[b] and inside[c]):
+            continue
+        area = square = z_m = along = 0.0
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            normal = (vertices_m[b, i] - vertices_m[a, i]) * (vertices_m[c, j] - vertices_m[a, j]) - (
+                vertices_m[b, j] - vertices_m[a, j]
+            ) * (vertices_m[c, i] - vertices_m[a, i])
+            to_camera_m = eye_m[k] - (vertices_m[a, k] + vertices_m[b, k] + vertices_m[c, k]) / 3.0
+            area += normal**2
+            square += to_camera_m**2
+            along += normal * to_camera_m
+            z_m -= to_camera_m * T_world_camera[k, 2]
+        distance_m = max(np.sqrt(square), 1e-9)
+        cosine = abs(along) / max(np.sqrt(area) * distance_m, 1e-15)
+        nearest_m = z_m - max(HIDDEN_M, HIDDEN_SHARE * z_m)
+        row = _nearest((v + 0.5) * shrink - 0.5, first_m.shape[0])
+        column = _nearest((u + 0.5) * shrink - 0.5, first_m.shape[1])
+        if cosine > LEAST_COSINE and nearest_m <= first_m[row, column]:
+            free = nearest_m <= around_m[row, column]
+            scores[f] = cosine / distance_m**2 * (1.0 if free else AT_RIM)
 
 
-def _places(pixels: FloatArray, shape: tuple[int, ...]) -> tuple[IntArray, IntArray]:
-    """Return rows and columns of (N, 2) pixels, clipped to an image of this shape."""
-    column, row = np.rint(np.clip(pixels, 0, (shape[1] - 1, shape[0] - 1))).astype(int).T
-    return row, column
+@compiled
+def _nearest(place_px: float, size_px: int) -> int:
+    """Return the nearest pixel of an axis that has so many."""
+    return int(np.rint(min(max(place_px, 0.0), size_px - 1.0)))
 
 
 def _chosen(scores: FloatArray, triangles: IntArray) -> IntArray:
     """Return (F,) best camera of each triangle by (C, F) scores smoothed over neighbours; -1 for none."""
-    seen = scores > 0.0
-    relative = scores / np.maximum(scores.max(axis=0), 1e-12)
-    beside = _neighbours(triangles)
+    most, beside = np.maximum(scores.max(axis=0), 1e-12), _neighbours(triangles)
+    best, best_score = np.full(len(triangles), -1, np.int32), np.full(len(triangles), -1.0)
+    for camera, own in enumerate(scores):
+        smoothed = _smoothed(own / most, beside)
+        better = (own > 0.0) & (smoothed > best_score)
+        best[better], best_score[better] = camera, smoothed[better]
+    return best
+
+
+@compiled
+def _smoothed(scores: FloatArray, beside: IntArray) -> FloatArray:
+    """Return (F,) scores averaged with those of the (F, 3) neighbours ``SMOOTHING_ROUNDS`` times."""
+    now, then = scores, np.empty_like(scores)
     for _ in range(SMOOTHING_ROUNDS):
-        relative = 0.25 * (relative + relative[:, beside].sum(axis=2))
-    best = np.where(seen, relative, -1.0).argmax(axis=0)
-    return np.where(seen.any(axis=0), best, -1).astype(np.int32)
+        for f in range(len(scores)):
+            then[f] = 0.25 * (now[f] + now[beside[f, 0]] + now[beside[f, 1]] + now[beside[f, 2]])
+        now, then = then, now
+    return now
 
 
 def _neighbours(triangles: IntArray) -> IntArray:
@@ -155,19 +195,17 @@ def _neighbours(triangles: IntArray) -> IntArray:
     return beside.reshape(count, 3)
 
 
-def _gains(seen: BoolArray, middles: Sequence[FloatArray], pictures: Sequence[ByteArray]) -> FloatArray:
+def _gains(seen: BoolArray, middles: IntArray, pictures: Sequence[ByteArray]) -> FloatArray:
     """Return (C, 3) factors that equalise the cameras' exposures, from medians of logarithmic ratios.
 
     Args:
         seen: (C, F) True for the triangles that each camera sees.
-        middles: (F, 2) pixels of the triangles in each camera.
+        middles: (C, F) index of the pixel at the middle of each triangle.
         pictures: photographs of the cameras.
     """
     count = len(pictures)
-    logs = [
-        np.log(rgb[_places(own, rgb.shape)] + np.float32(DARK))
-        for own, rgb in zip(middles, pictures, strict=True)
-    ]
+    log_of = np.log(np.arange(256, dtype=np.float32) + np.float32(DARK))
+    logs = [log_of[rgb.reshape(-1, 3)[own]] for own, rgb in zip(middles, pictures, strict=True)]
     rows, values = [np.ones(count)], [np.zeros(3)]
     for a in range(count):
         for b in range(a):

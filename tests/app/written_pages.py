@@ -35,6 +35,7 @@ from pipeline.io.demos import load_demo
 from pipeline.reconstruct import iterate_reconstruction
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
+from pipeline.stages import dressed
 from pipeline.types import Rig
 from tests.app.hand_outs import frames, hand_out, wall
 from tests.pipeline.calibration.test_trust import BOARD, SIZE, views
@@ -52,7 +53,8 @@ def reconstruction(folder: Path) -> str:
     metrics = metrics_of(result) | {"scene": EVIL, "preset": EVIL, "registration": [node | numbers]}
     metrics["import"] = {"notes": [EVIL]}
     metrics["nodes"][0]["place"]["sentence"] = EVIL
-    write_reconstruction_report(result, metrics, folder / "page.html")
+    texture = dressed(result.rig, result.placement, result.after)
+    write_reconstruction_report(result, metrics, folder / "page.html", texture)
     return (folder / "page.html").read_text(encoding="utf-8")
 
 

@@ -75,8 +75,9 @@ def _archive(
 ) -> None:
     run = path.parent / "run"
     run.mkdir()
-    write_run_folder(result, metrics, run)
-    write_reconstruction_report(result, metrics, run / "report.html", measures)
+    texture = dressed(result.rig, result.placement, result.after)
+    write_run_folder(result, metrics, run, texture=texture)
+    write_reconstruction_report(result, metrics, run / "report.html", texture, measures)
     if measures is not None:
         write_json(run / "measures.json", measures)
     if baseline is not None:

@@ -126,7 +126,9 @@ def race_table(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markup:
 def _doubts(lanes: tuple[RaceLane, ...]) -> Markup:
     """Return a line for each lane whose end pose is not sure, with the reasons; empty if all are."""
     lines = [
-        Markup("<b style='color: {}'>{}</b> {}.").format(css(color_of(lane.rival)), mark, lane.verdict_text)
+        Markup("<b style='color: {}'>{}</b> Verdict {}.").format(
+            css(color_of(lane.rival)), mark, lane.verdict_text
+        )
         for mark, lane in zip(MARKS, lanes, strict=False)
         if lane.reasons
     ]

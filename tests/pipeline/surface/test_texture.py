@@ -9,7 +9,7 @@ import trimesh
 from pipeline.io.meshes import read_mesh, write_mesh
 from pipeline.kernels.geometry import apply, inverse, look_at, project
 from pipeline.kernels.rays import Camera
-from pipeline.surface.pictures import MISSED, beside, mesh_picture
+from pipeline.surface.pictures import MISSED, MeshPainter, beside, mesh_picture
 from pipeline.surface.texture import photographed
 from pipeline.types import CameraIntrinsics, Surface
 
@@ -201,3 +201,12 @@ def test_a_glb_file_wears_it(tmp_path):
     back = read_mesh(tmp_path / "wall.glb")
     assert len(back.triangles) == len(WALL.triangles)
     np.testing.assert_allclose(np.ptp(back.vertices_m, axis=0), np.ptp(WALL.vertices_m, axis=0), atol=1e-6)
+
+
+def test_one_painter_makes_the_pictures_of_several_cameras():
+    texture = photographed(WALL, [LEFT], [(photograph(LEFT), None)])
+    painter = MeshPainter(WALL)
+    for camera in (LEFT, RIGHT, LEFT):
+        for how in ({"colored": True}, {"colored": False}, {"texture": texture}):
+            assert np.array_equal(painter.picture(camera, **how), mesh_picture(WALL, camera, **how))
+    assert not np.array_equal(painter.picture(LEFT), painter.picture(RIGHT))

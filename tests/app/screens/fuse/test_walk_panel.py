@@ -221,7 +221,7 @@ def test_a_rig_has_no_walk_and_its_lesson_says_so(fuse, recording):
     assert WALK not in fuse.gui.find("Show").options
     assert not fuse.gui.find("Loop").seen
     assert fuse.panel._walk._view is None
-    with pytest.raises(InputError, match="no recording"):
+    with pytest.raises(InputError, match="no camera walks"):
         fuse.panel._walk._take_look(WalkLook())
     with pytest.raises(InputError, match="walk"):
         fuse.panel.in_address["show"].take("walk")
