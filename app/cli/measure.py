@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import tyro
 
 from app.cli.text import aligned, print_json, say, wrong_use
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from pipeline.measuring.marks import Mark
     from pipeline.measuring.surface import MeasuredSurface
     from pipeline.measuring.values import Measure, Value
 
 Place = tuple[float, float, float]
 Places = Annotated[tuple[str, ...], tyro.conf.arg(metavar="X,Y,Z")]
+Snap: TypeAlias = Literal["surface", "vertex", "edge", "plane"]
+LEAST_AWAY_M = 0.001
 OnePlace = Annotated[str | None, tyro.conf.arg(metavar="X,Y,Z")]
 
 
@@ -25,7 +30,7 @@ def measure(
     planes: Places = (),
     box: OnePlace = None,
     hole: OnePlace = None,
-    snap: Literal["surface", "vertex", "edge", "plane"] = "surface",
+    snap: Snap = "surface",
     scale_by: float | None = None,
     json: bool = False,
 ) -> None:
@@ -46,7 +51,7 @@ def measure(
             where two planes meet, or onto their plane.
         scale_by: True length, in metres, of the first length that is measured: the surface is scaled by it,
             and everything is measured again.
-        json: Print the values as JSON.
+        json: Print the values, and the points that were measured, as JSON.
     """
     from pipeline.measuring.measures import with_scale
     from pipeline.measuring.surface import read_measured
@@ -58,18 +63,22 @@ def measure(
     }
     _check(places, singles)
     surface = read_measured(run)
-    found = _measured(surface, places, singles, snap, 1.0)
+    factor, marks = 1.0, _marks(surface, places, snap, 1.0)
+    found = _measured(surface, marks, places, singles, factor)
     if scale_by is not None:
         length = next((one for one in found if len(one.values) == 1 and one.values[0].unit == "m"), None)
         if length is None:
             wrong_use("--scale-by needs a length that is measured: give two --points")
         surface, check = with_scale(surface, scale_by, length)
-        found = _measured(surface, places, singles, snap, check.factor)
+        factor, marks = check.factor, _marks(surface, places, snap, check.factor)
+        found = _measured(surface, marks, places, singles, factor)
         say(check.sentence)
     if json:
-        print_json([record for one in found for record in one.records()])
+        print_json([record | {"ends_m": one.ends_m.tolist()} for one in found for record in one.records()])
         return
     print(aligned([_row(one, value) for one in found for value in one.values]))
+    for sentence in _moved(marks, places, factor):
+        say(sentence)
     say(surface.scale_source)
     say(HELD)
 
@@ -101,21 +110,39 @@ def _check(places: dict[str, list[Place]], singles: dict[str, Place]) -> None:
         )
 
 
+def _marks(surface: MeasuredSurface, places: dict[str, list[Place]], snap: Snap, factor: float) -> list[Mark]:
+    """Return the points of the surface for --points, times the factor of the surface's scale."""
+    import numpy as np
+
+    from pipeline.measuring.marks import mark
+
+    return [mark(surface, factor * np.array(place), snap) for place in places["points"]]
+
+
+def _moved(marks: list[Mark], places: dict[str, list[Place]], factor: float) -> Iterator[str]:
+    """Yield a sentence for each of --points from which the measured point is a millimetre away or more."""
+    import numpy as np
+
+    for one, place in zip(marks, places["points"], strict=True):
+        away_m = float(np.linalg.norm(one.point_m / factor - place))
+        if away_m >= LEAST_AWAY_M:
+            given, found = (",".join(f"{x:.4g}" for x in at) for at in (place, one.point_m / factor))
+            yield f"The point {given} was taken for {found}, {100.0 * away_m:.1f} cm away ({one.snapped})"
+
+
 def _measured(
     surface: MeasuredSurface,
+    marks: list[Mark],
     places: dict[str, list[Place]],
     singles: dict[str, Place],
-    snap: Literal["surface", "vertex", "edge", "plane"],
     factor: float,
 ) -> list[Measure]:
     """Return all measures; the places are multiplied by the factor of the surface's scale."""
     import numpy as np
 
     from pipeline.measuring import measures
-    from pipeline.measuring.marks import mark
     from pipeline.measuring.planes import plane_at
 
-    marks = [mark(surface, factor * np.array(place), snap) for place in places["points"]]
     planes = [plane_at(surface, factor * np.array(place)) for place in places["planes"]]
     found = [measures.distance(surface, a, b) for a, b in pairwise(marks)]
     corners = zip(marks, marks[1:], marks[2:], strict=False)

@@ -33,7 +33,7 @@ def values(capsys, *argv):
     assert code == 0
     found = json.loads(out)
     for one in found:
-        assert set(one) == {"kind", "name", "value", "unit", "ci95", "guessed"}
+        assert set(one) == {"kind", "name", "value", "unit", "ci95", "guessed", "ends_m"}
         assert one["ci95"][0] <= one["value"] <= one["ci95"][1]
     return found
 
@@ -43,6 +43,16 @@ def test_points_give_lengths_and_the_angles_between(capsys, folder):
     assert [one["kind"] for one in found] == ["distance", "distance", "angle"]
     assert [one["value"] for one in found] == pytest.approx([0.3, 0.2, 90.0], abs=1e-3)
     assert [one["unit"] for one in found] == ["m", "m", "deg"]
+    assert np.allclose(found[0]["ends_m"], [[0.0, 0.0, 0.15], [0.3, 0.0, 0.15]], atol=1e-3)
+    assert len(found[2]["ends_m"]) == 3
+
+
+def test_a_point_that_is_moved_says_where_to_and_how_far(capsys, folder):
+    ends = ("--points", "0,0,0.15", "0.29,0.19,0.15", "--snap", "vertex")
+    _, out, err = run(capsys, folder, *ends)
+    assert out.split()[2] == "0.3606"  # to the corner of the box
+    (moved,) = [line for line in err.splitlines() if "was taken for" in line]
+    assert moved == "The point 0.29,0.19,0.15 was taken for 0.3,0.2,0.15, 1.4 cm away (vertex)"
 
 
 def test_planes_give_a_distance_an_angle_or_a_box(capsys, folder):
