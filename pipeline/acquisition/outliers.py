@@ -67,7 +67,7 @@ def find_outliers(cloud: PointCloud, config: AcquisitionConfig, focal_px: float)
         InputError: there are at most N points, points behind the camera, or the mode is ``flying``.
     """
     if config.outlier_mode == "flying":
-        raise InputError("Outlier mode 'flying' looks at a depth image, not at a cloud; try mode 'robust'.")
+        raise InputError("Outlier mode 'flying' needs a depth image, not a cloud; try mode 'robust'.")
     if len(cloud) <= config.outlier_neighbours:
         raise InputError(
             f"The cloud has {len(cloud)} points, too few to compare each with {config.outlier_neighbours} "

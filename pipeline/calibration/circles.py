@@ -162,7 +162,7 @@ def _why_no_circles(gray: ByteArray, board: Board, blobs_px: FloatArray, groups:
     kind = "shifted rows" if board.pattern == "circles-asymmetric" else "straight rows"
     return (
         f"{len(blobs_px)} circles are seen, but no {kind} of {board.columns} x {board.rows} among them; "
-        "check --pattern, --columns and --rows, and that nothing round lies beside the board"
+        "check --pattern, --columns and --rows, and that nothing else round is in the picture"
     )
 
 

@@ -178,7 +178,7 @@ def write_target(board: Board, path: Path, pixel_mm: float | None = None) -> Boa
     if ending == ".png":
         if pixel_mm is None or not 0.01 <= pixel_mm <= 5.0:
             raise InputError(
-                f"{path.name} is for a monitor: say how large its pixels are, for example --pixel-mm 0.277 "
+                f"{path.name} is for a monitor: give the size of its pixels, for example --pixel-mm 0.277 "
                 "(width of the screen in mm over its pixels)"
             )
         pixels = max(1, round(1000.0 * board.spacing_m / pixel_mm))

@@ -78,7 +78,7 @@ def board_warp(
     if lens == "fisheye":
         raise InputError("A board's warp cannot be found with a fisheye lens; try the lens 'rational'")
     if any(len(view.points_px) != len(board.points_m) for view in views):
-        raise InputError("A board's warp takes views of the whole board; leave out those of a part of it")
+        raise InputError("A board's warp needs views of the whole board; leave out those of a part of it")
     flat = held_out(views, size_px, folds, lens)
     calibration, board_m = _released(views, size_px, board, lens)
     placed: dict[int, FittedView] = {}

@@ -88,7 +88,8 @@ def _repeated(nodes: list[NodeImages]) -> list[str]:
         and np.array_equal(node.depth.z_m, first.depth.z_m, equal_nan=True)
         for node in nodes[1:]
     ]
-    return [f"{sum(same)} other nodes have the very same images as node_00"] if any(same) else []
+    others = "1 other node has" if sum(same) == 1 else f"{sum(same)} other nodes have"
+    return [f"{others} the very same images as node_00"] if any(same) else []
 
 
 def _node(

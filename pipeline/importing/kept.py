@@ -104,7 +104,7 @@ class _Writer:
         self.camera = frame.intrinsics if self.camera is None else self.camera
         if not alike(frame.intrinsics, self.camera):
             raise InputError(
-                f"The camera of {frame.name} is not that of the frames before, and TUM's form has only one; "
+                f"{frame.name} has another camera than the frames before it, and TUM's form has only one; "
                 "try `packetmesh reconstruct --recording` with the recording as it is"
             )
         name = f"{frame.name.removeprefix('frame_')}.png"

@@ -132,5 +132,5 @@ def _with_decimals(path: AnyPath, plain: Dialect, cells: Sequence[str]) -> Diale
 def _doubt(path: AnyPath, why: str) -> InputError:
     return InputError(
         f"The numbers of the point cloud {path} cannot be read without doubt: {why}; try to export it with "
-        "points as decimal marks and without marks for thousands"
+        "'.' as the decimal mark and without marks for thousands"
     )

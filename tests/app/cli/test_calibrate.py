@@ -83,7 +83,7 @@ def test_a_board_is_drawn_and_says_what_it_is(tmp_path, capsys):
     assert (tmp_path / "board.pdf").read_bytes().startswith(b"%PDF")
     main(["target", "--out", str(tmp_path / "board.png"), "--pixel-mm", "0.3"])
     assert "--spacing-mm 35.1" in capsys.readouterr().err
-    assert "how large its pixels are" in failure(["target", "--out", str(tmp_path / "x.png")], capsys)
+    assert "size of its pixels" in failure(["target", "--out", str(tmp_path / "x.png")], capsys)
 
 
 def test_a_verdict_is_given_at_the_range_and_accuracy_that_one_names(folder, tmp_path, capsys):

@@ -92,5 +92,5 @@ def test_bad_input():
         filter_outliers(PointCloud(points_m[:4]), AcquisitionConfig("thesis"), FOCAL_PX)
     with pytest.raises(InputError, match="in front of the camera"):
         filter_outliers(PointCloud(points_m), AcquisitionConfig("robust"), FOCAL_PX)
-    with pytest.raises(InputError, match="not at a cloud"):
+    with pytest.raises(InputError, match="a depth image, not a cloud"):
         filter_outliers(PointCloud(points_m), AcquisitionConfig("flying"), FOCAL_PX)

@@ -72,7 +72,7 @@ def test_on_a_monitor_all_pitches_are_whole_pixels(board, tmp_path):
     ("name", "pixel_mm", "sentence"),
     [
         ("board.jpg", None, r"try \.pdf, \.svg or \.png"),
-        ("board.png", None, "how large its pixels are"),
+        ("board.png", None, "size of its pixels"),
         ("board.png", 99.0, "pixels"),
     ],
 )
