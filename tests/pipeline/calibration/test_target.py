@@ -8,7 +8,7 @@ import pytest
 
 from packetmesh.errors import InputError
 from pipeline.calibration.board import Board
-from pipeline.calibration.target import Disc, picture_of, sheet, write_target
+from pipeline.calibration.target import MARGIN_MM, Box, Disc, picture_of, sheet, write_target
 
 BOARDS = [
     Board(),
@@ -48,6 +48,21 @@ def test_the_mark_is_in_the_first_circle_only_and_only_where_it_is_needed():
     first = next(shape for shape in sheet(BOARDS[0]).shapes if isinstance(shape, Disc))
     assert [(one.x_mm, one.y_mm) for one in white] == [(first.x_mm, first.y_mm)]
     assert all(shape.black for shape in sheet(BOARDS[1]).shapes if isinstance(shape, Disc))
+
+
+@pytest.mark.parametrize("board", [*BOARDS, Board("chessboard", 3, 4, 0.005)])
+def test_board_and_ruler_keep_the_margin_from_the_sheet_s_sides(board):
+    whole = sheet(board)
+    ends_mm = [
+        (one.x_mm - one.radius_mm, one.x_mm + one.radius_mm)
+        if isinstance(one, Disc)
+        else (one.x_mm, one.x_mm + one.width_mm)
+        for one in whole.shapes
+        if isinstance(one, Disc | Box)
+    ]
+    left_mm, right_mm = np.min(ends_mm), np.max(ends_mm)
+    assert left_mm >= MARGIN_MM - 0.2
+    assert right_mm <= whole.width_mm - MARGIN_MM + 0.2
 
 
 def test_charuco_squares_and_markers_are_opencvs(tmp_path):
