@@ -237,7 +237,7 @@ def _let_in(app: AppServer, gate: Gate, begin: Callable[[Target, int], Session])
     """Give every browser its own session while it is connected and there is room."""
     server = app.viser_server
     notes = dict[int, Any]()
-    """Notifications of the waiting browsers."""
+    """Notifications of the waiting browsers, by their numbers."""
 
     def leave(client: viser.ClientHandle) -> None:
         app.crowd.leave(client.client_id)
@@ -264,7 +264,7 @@ def _let_in(app: AppServer, gate: Gate, begin: Callable[[Target, int], Session])
         title = "You are waiting for a place"
         notes[client.client_id] = client.add_notification(title, FULL, auto_close_seconds=None)
 
-    async def come(client: viser.ClientHandle) -> None:  # quick, so it runs on the connections' thread
+    async def come(client: viser.ClientHandle) -> None:  # quick enough for the connections' thread
         number = client.client_id
         app.crowd.come(
             Visitor(
@@ -342,7 +342,7 @@ def _taken_sentence(port: int) -> str:
 
 
 def _dress(server: viser.ViserServer) -> None:
-    """Set the name, colours and place of the control panel; disable sharing through an outside server."""
+    """Set up the control panel, up direction and lights; disable sharing through an outside server."""
     server.gui.configure_theme(
         control_width="large", show_logo=False, show_share_button=False, brand_color=BRAND
     )

@@ -189,14 +189,13 @@ def read_text(path: str | os.PathLike[str], what: str, max_bytes: int | None = N
 
 
 def text_in(data: bytes, errors: str = "strict") -> str:
-    """Decode UTF-8, or UTF-16 with a byte order mark, without the mark and with ``\\n`` for all line ends.
+    """Decode UTF-8, or UTF-16 with a byte order mark; drop the mark, make all line ends ``\\n``.
 
     Raises:
         UnicodeDecodeError: it is neither, and ``errors`` is "strict".
     """
-    marked = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-    is_utf16 = marked and data.count(0) > len(data) // 4  # most letters are ASCII, every other byte 0
-    text = data.decode("utf-16" if is_utf16 else "utf-8-sig", errors)
+    marked = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))  # never the beginning of UTF-8
+    text = data.decode("utf-16" if marked else "utf-8-sig", errors)
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 

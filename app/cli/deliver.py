@@ -89,7 +89,7 @@ def _settings(
 ) -> tuple[NetworkConfig, NetworkConfig, PipelineConfig, list[str]]:
     """Return the network before and after its changes, the chain's settings, and the network's changes.
 
-    Each change goes to the one that has its key.
+    A change whose key is one of the chain's goes to the chain, every other to the network.
     """
     from network_sim.presets import PRESETS as NETWORKS
     from pipeline.config import PRESETS

@@ -121,7 +121,7 @@ class WorkAhead:
                 self._drop(likely)
 
     def _compute(self, likely: LikelyJob) -> bool:
-        """Return whether the job ended by itself, with or without an answer; a stopped one is begun again."""
+        """Compute a job. Returns False if the pool stopped it, so that it must start again."""
         ends: list[str] = []
 
         def ended(outcome: Outcome) -> None:

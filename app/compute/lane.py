@@ -94,7 +94,7 @@ class LatestWins:
 
 
 class UrgentLanes(dict[str, LatestWins]):
-    """An urgent lane for each kind of job, so that a newer job replaces only those of its own kind."""
+    """An urgent lane for each kind of job, so that a job replaces only an earlier one of its own kind."""
 
     def __init__(self, pool: ComputePool) -> None:
         self._pool = pool

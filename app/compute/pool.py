@@ -91,7 +91,7 @@ class ComputePool:
         warm_up: Callable[[], Iterator[None]] = _nothing,
         patience_s: float = PATIENCE_S,
     ) -> None:
-        """Start the first process; each other starts when jobs wait or the processes before it are warm.
+        """Start the first process; each further one starts when the one before it is warm, or when jobs wait.
 
         Each process runs ``warm_up`` to its first yield before any job, and the later parts between jobs.
         """

@@ -57,7 +57,7 @@ class Store:
         return value
 
     def has(self, key: tuple[Hashable, ...]) -> bool:
-        """Return whether there is a result for ``key``, which may be damaged."""
+        """Return whether a file is stored for ``key``; it may be damaged."""
         return self._path(key).exists()
 
     def get(self, key: tuple[Hashable, ...]) -> Any:
@@ -74,8 +74,8 @@ class Store:
         return value
 
     def stages(self, spec: Spec, *stages: StageName) -> Generator[Any, None, tuple[Any, ...]]:
-        """The results of several stages."""
-        from pipeline.stages import run  # computing needs large libraries, serving does not
+        """Return the results of several stages; compute the stages before them if necessary."""
+        from pipeline.stages import run  # large libraries, which the server does not need
 
         done = yield from run(spec, self, stages)
         return tuple(one.value for one in done.values())
@@ -84,7 +84,7 @@ class Store:
         return Path(self.folder, f"{key[0]}-{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}")
 
     def _write(self, path: Path, value: Any) -> None:
-        """Write a result after its checksum. If the disk is full, the result is only lost to later calls."""
+        """Write a checksum and the result. If that fails, later calls compute the result again."""
         with contextlib.suppress(InputError, OSError):
             with atomic_path(path) as temporary, temporary.open("wb") as file:
                 file.write(bytes(CHECKSUM_BYTES))

@@ -50,7 +50,7 @@ def bias_curve(fit: DepthFit, to_m: float | None = None) -> BiasCurve:
 
     Args:
         fit: result of the depth calibration.
-        to_m: end of the curve; None extrapolates to 1.25 times the largest measured depth.
+        to_m: depth at which the curve ends; None extrapolates to 1.25 times the largest measured depth.
     """
     near_m, far_m = fit.correction.range_m
     z_m = np.linspace(min(near_m, 0.4), to_m or 1.25 * far_m, STEPS)

@@ -21,10 +21,10 @@ _UNLIT = "KHR_materials_unlit"
 
 
 def mesh_glb(vertices_m: FloatArray, triangles: IntArray, colors: ByteArray) -> bytes:
-    """Return a mesh: (V, 3) vertices, (V, 3) sRGB colours, (F, 3) front-facing triangles; empty if none."""
+    """Return a glTF of (V, 3) vertices, (F, 3) counterclockwise triangles, (V, 3) sRGB; empty if F is 0."""
     if not len(triangles):
         return b""
-    rgba = np.full((len(colors), 4), 65535, dtype="<u2")  # linear light, as glTF requires
+    rgba = np.full((len(colors), 4), 65535, dtype="<u2")  # linear RGB, as glTF requires
     rgba[:, :3] = _LINEAR[colors]
     return _glb(
         _TRIANGLES,
@@ -41,9 +41,9 @@ def textured_glb(
 
     Args:
         vertices_m: (V, 3) vertices.
-        triangles: (F, 3) vertex indices, front-facing.
+        triangles: (F, 3) vertex indices, counterclockwise seen from the front.
         colors: (V, 3) sRGB by which the picture is multiplied.
-        uv: (V, 2) positions in shares of the picture from its upper left corner.
+        uv: (V, 2) texture coordinates, 0 to 1, from the picture's upper left corner.
         picture: a JPEG file.
     """
     if not len(triangles):
@@ -60,7 +60,7 @@ def textured_glb(
 
 
 def lines_glb(segments_m: FloatArray, color: tuple[int, int, int]) -> bytes:
-    """Return (E, 2, 3) segments, one pixel wide, in an sRGB colour; empty if there are none."""
+    """Return a glTF of (E, 2, 3) line segments in an sRGB colour, one pixel wide; empty without segments."""
     if not len(segments_m):
         return b""
     red, green, blue = (_LINEAR[list(color)] / 65535.0).tolist()
@@ -130,7 +130,7 @@ def _accessor(row: int, array: np.ndarray) -> dict[str, Any]:
 
 
 def _linear_light() -> np.ndarray:
-    """Return (256,) uint16: the linear light of every sRGB value (IEC 61966-2-1)."""
+    """Return (256,) uint16 linear intensities of the sRGB values 0 to 255 (IEC 61966-2-1)."""
     srgb = np.arange(256) / 255.0
     linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
     return np.rint(65535.0 * linear).astype("<u2")

@@ -21,8 +21,8 @@ class Sums:
     """(F + 1, 4) running sums: number of frames and sum of their times, then both for the lost frames."""
 
     def until(self, first: int, last: int, t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return (T, 4) the sums over frames ``first`` to ``last`` before each time; times ascend."""
-        # Most of the row is outside a narrow window: find the window first, then the pixels within it.
+        """Return (T, 4) sums over those of the frames [first, last) before each of (T,) ascending times."""
+        # Most of the row is outside a narrow window: find the window first, then the times within it.
         low, high = first + np.searchsorted(self.t_ns[first:last], (t_ns[0], t_ns[-1]))
         at = low + np.searchsorted(self.t_ns[low:high], t_ns)
         return self.before[at] - self.before[first]

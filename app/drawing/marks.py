@@ -14,14 +14,14 @@ from pipeline.types import FloatArray, IntArray
 def mark(
     figure: go.Figure, x: float, label: str, color: str, side: str, dash: str = "solid", log: bool = False
 ) -> None:
-    """Draw a line over the whole height. Labels are above it, on sides where they do not overlap.
+    """Draw a vertical line over the chart's whole height, with a label above it.
 
     Args:
         figure: the chart.
         x: position in the unit of the axis.
         label: HTML of the label.
         color: CSS colour.
-        side: side of the label that is at ``x``: left, center or right.
+        side: side of the label that is at ``x``: left, center or right, so that labels do not overlap.
         dash: dash style of the line.
         log: whether the axis is logarithmic.
     """

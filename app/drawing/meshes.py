@@ -69,12 +69,12 @@ def photographed_glb(surface: Surface, texture: Texture, tinted: bool = False) -
 
 
 def _lit(surface: Surface, colors: ByteArray | None, photographed: bool) -> ByteArray:
-    """Return (V, 3) colours with light on them."""
+    """Return (V, 3) vertex colours with diffuse shading; grey without colours."""
     if colors is None:
         colors, photographed = np.tile(np.array(NEUTRAL, np.uint8), (len(surface.vertices_m), 1)), False
     normals = vertex_normals(surface)
-    light = normals.mean(axis=0)  # from where the cameras are
-    light[2] += 0.4  # and from above
+    light = normals.mean(axis=0)  # the mean normal points towards the cameras
+    light[2] += 0.4  # some light from above
     light /= max(float(np.linalg.norm(light)), 1e-9)
     darkest = DARKEST[photographed]
     shade = darkest + (1.0 - darkest) * np.clip(0.5 + 0.5 * (normals @ light), 0.0, 1.0)

@@ -1,3 +1,3 @@
-"""Lessons: their files, and the row above the picture that leads through them. Imports of ``app`` only
-``window`` and the packages that ``window`` imports.
+"""Lessons: their files, and the row above the picture that shows their stops. From ``app`` it imports only
+``window`` and packages that ``window`` imports.
 """

@@ -3,11 +3,11 @@
 A lesson begins with a ``# title`` and lines ``screen: name``, ``scene: name`` and ``language: code``, of
 which a teacher's own lesson needs the first. Then come sections. A section is a ``## title``, lines ``set:
 name = value``, lines ``open: folder or tab``, lines ``see: control or number``, and its text. What a section
-does not set has its default, so that each stop can be shown alone. The folders, controls and numbers that it
-names are opened, framed and scrolled into view. A text may have emphasis, lists and web links; tags and
-images in it are shown as plain text. Numbers are computed from the screen, not typed: ``{name}``.
-``{{, and was {3:name}}}`` gives the number at the third stop, and is left out for users who have not been
-there.
+does not set has its default, so that each stop can be shown alone. The folders and tabs that it names are
+opened; they, the controls and the numbers are framed, and the page scrolls to the first. A text may have
+emphasis, lists and web links; tags and images in it are shown as plain text. Numbers are computed from the
+screen, not typed: ``{name}``. ``{{, and was {3:name}}}`` gives the number at the third stop, and is left out
+for users who have not been there.
 After its text a section may ask a question::
 
     ask: What does it cost?
@@ -21,7 +21,7 @@ If the right choice depends on the scene, each choice has a reason and names the
 right: ``- [more=plane] The plane. | Why it is wrong in other scenes.``
 
 ``NAME.de.md`` next to ``NAME.md`` is the lesson in German: the same sections, questions and fields, without
-the lines that set and open, which are taken from ``NAME.md``.
+the lines ``screen``, ``scene``, ``language``, ``set``, ``open`` and ``see``, which only ``NAME.md`` has.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ Value = TypeVar("Value")
 Look = TypeVar("Look", bound="DataclassInstance")
 """State of a screen: a frozen record of everything that a stop may set."""
 Setting: TypeAlias = Callable[[Look, str], Look]
-"""Returns a look with the change of a line ``set: name = text``; a ValueError advises what to try."""
+"""Returns the look after a line ``set: name = text``; the message of its ValueError says what to try."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +123,7 @@ class Lesson(Generic[Look]):
     title: str
     stops: tuple[Stop[Look], ...]
     default: Look
-    """The state in which a stop has what its section does not set."""
+    """The default of everything that a section does not set."""
     name: str = ""
     """Name of the file without its suffix."""
     scene: str = ""
@@ -147,13 +147,13 @@ class Kind(Generic[Look]):
     settings: Mapping[str, Setting[Look]]
     """What a section can set, by the names that it uses."""
     default: Look
-    """The state for what a section does not set."""
+    """The default of everything that a section does not set."""
     numbers: tuple[str, ...] = ()
     """Names of the fields that the texts may use."""
     statement: Callable[[Numbers], str] = lambda numbers: ""
     """Returns a sentence on what the picture shows, from its numbers, for screen readers."""
     words: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
-    """The words that a number can be, if it is one of three that decide a question, by the number's name."""
+    """The three possible values of each number that decides a question, by the number's name."""
 
 
 def screen_of(kind: str) -> str:

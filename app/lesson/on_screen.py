@@ -31,7 +31,7 @@ class ScreenLessons(Generic[Look]):
         on_stop: Callable[[Look], None],
         numbers: Callable[[], Numbers] = dict,
     ) -> None:
-        """Add a folder for each lesson.
+        """Add a folder for each lesson, and the sentence for screen readers.
 
         Args:
             ui: panel of the browser.

@@ -286,8 +286,8 @@ class LessonFolder(Generic[Look]):
         self._guess.visible = self._waits()
 
     def _filled(self, text: str, index: int, fill: Callable[..., Text]) -> Text:
-        """Return the text with its numbers, of this stop or as they were at another in the same scene.
-        Clauses about stops that the user has not visited are left out."""
+        """Replace the text's fields by the numbers of this stop, or those stored at another stop in the same
+        scene. Clauses about stops that the user has not visited are left out."""
         now = self._numbers()
         if now:
             same = {at: known for at, known in self._known.items() if known[SCENE] == now[SCENE]}

@@ -123,7 +123,7 @@ def read_text(path: Path) -> str:
     """Return the text of a lesson's file.
 
     Raises:
-        InputError: it is missing, no file, too large, empty, or no text.
+        InputError: it is missing, not a regular file, too large, empty, or cannot be decoded.
     """
     try:
         size_bytes = path.stat().st_size

@@ -137,12 +137,12 @@ class CutHandles:
 
 
 def with_face(box: Box, row: int, at_m: float) -> Box:
-    """Return the box with a face moved along its axis; the opposite face stays.
+    """Return the box with a face moved along its axis. The opposite face stays, at least 1 cm away.
 
     Args:
         box: the box.
-        row: the face: twice its axis, plus one for the side of larger coordinates.
-        at_m: where the face is to be along its axis, from the world's origin.
+        row: index of the face: twice its axis, plus one for the side of larger coordinates.
+        at_m: new coordinate of the face along its axis, from the world's origin.
     """
     axis, axes = row // 2, box_axes(box)
     middle_m = axes @ np.array(box.centre_m)

@@ -1,7 +1,7 @@
-"""How a reconstruction is looked at, and the same as text for the page's address.
+"""Display settings of a reconstruction (cut, light, point size, scale bar), and their text in the address.
 
-``plane_2500_1800_900_0_1000_0~wire~ruler``: the parts that differ from the usual, joined by ``~``. Lengths
-are in millimetres, the directions of normals in thousandths, angles in degrees.
+``plane_2500_1800_900_0_1000_0~wire~ruler``: the settings that differ from the default, joined by ``~``.
+Lengths are in millimetres, the components of normals in thousandths, angles in degrees.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ EXAMPLE = "plane_2500_1800_900_0_1000_0~ruler"
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How a reconstruction is looked at; the default is as it is drawn."""
+    """Display settings of a reconstruction; the default changes nothing."""
 
     cut: Cut = None
     wire: bool = False
     """Whether surfaces are drawn as the edges of their triangles."""
     point_mm: int = 0
-    """Size of the points; 0 leaves each cloud its own."""
+    """Size of all points; 0 keeps the size that each cloud has."""
     light_deg: tuple[int, int] | None = None
-    """Where the light comes from: azimuth from +x towards +y, and height; None for the light as drawn."""
+    """Direction to the light: azimuth from +x towards +y, and elevation; None keeps the default light."""
     ruler: bool = False
     """Whether scale bar and axes are drawn."""
 
 
 def text_of(look: Look) -> str:
-    """Return the look as text; empty for the usual one."""
+    """Return the look as text; empty for the default."""
     parts = [_cut_text(look.cut)] if look.cut is not None else []
     parts += ["wire"] if look.wire else []
     parts += [f"points_{look.point_mm}"] if look.point_mm else []
@@ -81,7 +81,7 @@ def look_of(text: str) -> Look:
 
 
 _LENGTHS = {"top": 1, "plane": 6, "box": 7, "out": 7}
-"""Count of numbers of each kind of cut."""
+"""Number of values of each kind of cut."""
 _COUNTS = {"wire": 0, "points": 1, "light": 2, "ruler": 0}
 
 

@@ -50,7 +50,7 @@ class MeasureDrawing:
         """Draw these measures with their names, and these points; remove all others.
 
         Args:
-            measures: measures that have numbers; others are left out.
+            measures: marks, name and result of each; those without quantities are not drawn.
             pending: points of a measure that is not complete.
             camera: view for which labels are moved apart; None without a browser.
         """
@@ -143,24 +143,20 @@ def lines_of(taken: Taken, made: Made) -> list[FloatArray]:
 
 
 def box_edges(corners_m: FloatArray) -> list[tuple[int, int]]:
-    """Return the 12 pairs of a box's (8, 3) corners that are joined by an edge, whatever their order."""
-    pairs = list(combinations(range(len(corners_m)), 2))
+    """Return the index pairs of the 12 edges of a box with (8, 3) corners in any order."""
     from_first = corners_m - corners_m[0]
     length_m = np.linalg.norm(from_first, axis=1)
-    order = np.argsort(length_m)[1:]
-    axes = list[FloatArray]()
-    for row in order:  # of corner 0's neighbours only, three are square to each other
-        towards = from_first[row] / max(float(length_m[row]), 1e-12)
-        if all(abs(float(towards @ axis)) < SQUARE for axis in axes):
-            axes.append(towards)
+    sides_m = list[FloatArray]()
+    for row in np.argsort(length_m)[1:]:  # a diagonal comes after its edges, and is not square to the longest
+        cosines = [float(from_first[row] @ side) / length_m[row] / np.linalg.norm(side) for side in sides_m]
+        if all(abs(cosine) < SQUARE for cosine in cosines):
+            sides_m.append(from_first[row])
+    sides = np.array(sides_m)
+    beyond = from_first @ sides.T > 0.5 * np.sum(sides**2, axis=1)  # (8, 3): at the far end of each side
     return [
         (one, other)
-        for one, other in pairs
-        if any(
-            float(np.linalg.norm(np.cross(corners_m[other] - corners_m[one], axis)))
-            < SQUARE * float(np.linalg.norm(corners_m[other] - corners_m[one]))
-            for axis in axes
-        )
+        for one, other in combinations(range(len(corners_m)), 2)
+        if np.count_nonzero(beyond[one] != beyond[other]) == 1
     ]
 
 

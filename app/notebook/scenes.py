@@ -103,10 +103,10 @@ def add_registration(
     target: PointCloud,
     T_init: FloatArray | None,
 ) -> tuple[View, Play]:
-    """Draw both clouds; returns the view, and the playback of all steps from the start pose.
+    """Draw both clouds. Returns the view and the function that records all steps from the start pose.
 
     Raises:
-        InputError: a cloud is empty, or the start pose is no (4, 4) matrix.
+        InputError: a cloud is empty, or the start pose is not a (4, 4) matrix.
     """
     if not (len(source) and len(target)):
         raise InputError("A cloud of the registration has no points to show; try the clouds that were given")
@@ -159,7 +159,7 @@ def _view_of_cameras(clouds: Sequence[PointCloud], poses: Sequence[FloatArray]) 
     """Return the view from behind the cameras.
 
     Raises:
-        InputError: no camera has measured anything.
+        InputError: all clouds are empty.
     """
     seen = [(cloud.points_m, pose) for cloud, pose in zip(clouds, poses, strict=True) if len(cloud)]
     if not seen:

@@ -23,7 +23,7 @@ _SCRIPT = Path(__file__).parent / "calibration.js"
 
 
 def write_calibration_report(report: CameraReport, trust: Trust, path: Path) -> None:
-    """Write the page; an error leaves no partial file.
+    """Write the report of a camera as one HTML page; an error leaves no partial file.
 
     Raises:
         InputError: the file cannot be written.

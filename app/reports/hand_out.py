@@ -121,7 +121,7 @@ def thumbnail(rgb: ByteArray, known: BoolArray) -> bytes:
         known: (H, W) whether the colour has arrived.
 
     Returns:
-        No bytes if nothing has arrived.
+        Bytes of the JPEG file; empty if nothing has arrived.
     """
     if not known.any():
         return b""
@@ -146,7 +146,8 @@ def viewpoint(hand_out: HandOut) -> Viewpoint:
 def viewpoint_of(
     poses: Sequence[FloatArray], points_m: FloatArray, cameras_in_sight: bool = True
 ) -> Viewpoint:
-    """Return the viewpoint for cameras' (4, 4) T_world_camera and (N, 3) points, world frame."""
+    """Return the viewpoint, on the first camera's side and above, that shows (N, 3) points and, unless
+    ``cameras_in_sight`` is false, the cameras; poses are (4, 4) T_world_camera."""
     up = _up(np.mean([-pose[:3, 1] for pose in poses], axis=0))
     first = poses[0]
     if not len(points_m):
@@ -161,7 +162,7 @@ def viewpoint_of(
     cameras_m = [pose[:3, 3] for pose in poses if cameras_in_sight]
     place_m = np.vstack([points_m, *cameras_m]) @ axes.T
     slope = np.tan(0.5 * FIELD_RAD) / MARGIN * np.array([ASPECT, 1.0])
-    # The four sides of the view as planes: each touches the outermost point on its side.
+    # Shift the four side planes of the view frustum until each touches the outermost point on its side.
     high_m, low_m = (sign * (sign * place_m[:, :2] + slope * place_m[:, 2:]).max(axis=0) for sign in (1, -1))
     far_m = float(((high_m - low_m) / (2.0 * slope)).max())
     eye_m = axes.T @ np.append(0.5 * (high_m + low_m), far_m)

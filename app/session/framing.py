@@ -26,7 +26,7 @@ class Framing:
     def __init__(self, session: PanelSession, views: Views | None) -> None:
         """Keep the session and its ``views``, which are None in a lecture.
 
-        A page that a race of an earlier session had narrowed gets its field of view back.
+        Reset the browser's field of view, which a race in an earlier session may have narrowed.
         """
         self._session, self._views = session, views
         self._wide = self._by_screen = False

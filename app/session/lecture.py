@@ -1,7 +1,7 @@
 """A lecture: one session for all browsers. A teacher steers it; the class follows, votes and may look around.
 
 A browser that opened the teacher's link teaches. The server ignores what other browsers do with shared
-controls, except votes, until the teacher lets the class steer.
+controls until the teacher lets the class steer.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class _Seat:
     vote: int = 0
     """The vote, 1 to 3; 0 for none."""
     call: Callable[..., None] = lambda *_: None
-    """Calls a function of the seat's page by name, with these arguments."""
+    """Calls a function of the seat's page: its name, then its arguments."""
     show_size: Callable[[Markdown], None] = lambda _: None
     """Shows the teacher the number of students, in markdown."""
     leave: Callable[[], None] = lambda: None
@@ -58,7 +58,7 @@ class _Seat:
 
 
 class Lecture:
-    """All browsers of a lecture. Methods run on the session's thread, those that judge messages excepted."""
+    """All browsers of a lecture. Methods run on the session's thread, except those that check messages."""
 
     def __init__(self, server: viser.ViserServer, gate: Gate, token: Token, class_url: str) -> None:
         """Allow only browsers with the teacher's token to steer; the class opens ``class_url``."""
@@ -102,7 +102,7 @@ class Lecture:
         return self._server.get_clients().values()
 
     def poll(self, count: Count | None) -> None:
-        """Open a vote whose votes ``count`` receives, or close it (None); earlier votes are dropped."""
+        """Open a vote and pass each vote to ``count``, or close it (None); earlier votes are dropped."""
         self._count_vote = count
         for seat in self._present():
             seat.vote = 0

@@ -123,9 +123,9 @@ class Palettes:
             yield Entry(scene.title, "Scene", partial(self._open_scene, name))
 
     def _settings(self, screen: str, inside: Iterable[tuple[Any, tuple[str, ...]]]) -> Iterator[Entry]:
-        """Yield an entry for each control and folder of a screen, which shows where it is.
+        """Yield an entry for each control and folder of a screen; choosing the entry points at the control.
 
-        The folder is named only for a second control of the same label, because the palette searches it too.
+        An entry names folders only if its label was used before, because the palette searches this text too.
         """
         labels = set[str]()
         for handle, titles in inside:

@@ -25,7 +25,7 @@ SIZE = re.compile(r"\d{1,9} ([1-9]\d{0,4}) ([1-9]\d{0,4})")
 
 
 def size_of(text: str) -> tuple[int, int]:
-    """Return width and height of the picture from the page's answer.
+    """Return width and height of the picture, pixels: twice the size of the view in the page's answer.
 
     Raises:
         InputError: the answer is not a size, or the picture would be too large.

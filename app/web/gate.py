@@ -71,7 +71,7 @@ class Gate:
     """Checks the messages of all browsers of a server, on the thread of its connections."""
 
     def __init__(self, server: viser.ViserServer) -> None:
-        """Start checking. Made together with the server, it checks from the first browser on."""
+        """Start checking. Create the gate with the server, so that it checks all browsers."""
         self._server = server
         self._guests: dict[int, _Guest] = {}
         self.dropped: Counter[str] = Counter()
@@ -79,14 +79,14 @@ class Gate:
         self.may_steer: Callable[[int], bool] = lambda _: True
         """Whether the browser with this number may use shared controls."""
         self.on_refused: Callable[[int], None] = lambda _: None
-        """Called with the number of a browser whose use of a shared control was refused."""
+        """Called with the number of a browser that was refused a shared control or command."""
         self.on_too_much: Callable[[int, str], None] = lambda *_: None
-        """Called with the number of a browser that uploads too much, and a sentence about it."""
+        """Called with the number of a browser that uploads too much, and a sentence for its user."""
         private.listen(server, self._on_message)
         server.on_client_disconnect(lambda client: self._guests.pop(client.client_id, None))
 
     def shows_page(self, number: int) -> bool:
-        """Whether a browser has sent something that only a shown page sends."""
+        """Return whether a browser has sent a message that only a shown page sends."""
         return number in self._guests and self._guests[number].shows_page
 
     async def _on_message(self, number: int, message: Any, go_on: Callable[[], Awaitable[None]]) -> None:
@@ -227,7 +227,7 @@ class Gate:
         return self._touch(number, found)
 
     def gizmo(self, number: int, message: Any) -> Verdict:
-        """Check that a transform gizmo in the scene is grabbed, dragged or released."""
+        """Check that a transform gizmo in the scene was grabbed, dragged or released."""
         moves = isinstance(message, messages.TransformControlsUpdateMessage)
         if not _is_name(message.name) or not isinstance(message.owner, str):
             return Verdict.FORGED

@@ -47,7 +47,7 @@ class Markdown(Markup):
 def shipped_markdown(
     text: str, field: re.Pattern[str] = _NOTHING, value: Callable[[re.Match[str]], object] = str
 ) -> Markdown:
-    """Return the markdown of a file of the program; its tags are shown as text.
+    """Return the markdown of a text file, such as a lesson; its HTML tags are shown as text.
 
     Args:
         text: text of the file.

@@ -47,10 +47,10 @@ def plain(command: str) -> str:
 
 
 def keep_upload(file: viser.UploadedFile, folder: Path, limit_bytes: int, instead: str) -> Path:
-    """Store an uploaded file in ``folder`` under its own name and return its path.
+    """Store an uploaded file in ``folder`` under its own name, without special characters; return its path.
 
     Raises:
-        InputError: the file is larger than the limit; ``instead`` advises what to do.
+        InputError: it cannot be written, or is larger than the limit; ``instead`` advises what to do then.
     """
     if len(file.content) > limit_bytes:
         raise InputError(

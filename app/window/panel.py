@@ -100,7 +100,7 @@ class PanelSession(Protocol):
     def quick_job(
         self, job: str, *arguments: Any, on_end: Callable[[Any], None], key: Hashable = None
     ) -> None:
-        """Run a job of a fraction of a second, of each kind only the last. Answers with a key are shared."""
+        """Run a short job, of each module only the last. With a key, answers are shared."""
         ...
 
     def cancel_side_job(self) -> None:

@@ -114,7 +114,7 @@ def _rates(trace: NetworkTrace) -> Rows:
 
 
 def _losses(trace: NetworkTrace) -> Rows:
-    """Yield failed attempts, packets and images by cause, zeros too, so that runs can be averaged."""
+    """Yield numbers of failed attempts, packets and images by cause; zeros too, for averages over runs."""
     delivered = _count(trace, EventKind.DELIVER)
     for kind, name, what in (
         (EventKind.LOSS, "attempts_lost", "Attempts to send that failed, others may have followed"),

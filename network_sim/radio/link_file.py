@@ -147,7 +147,7 @@ def _lines(text: str) -> Iterable[Line]:
 
 
 def _form(rows: Sequence[Line], path: str) -> Form:
-    """Return the form of the rows, of which the first may be a header."""
+    """Return how the rows are written; the first row may be a header."""
     below = rows[1:] or rows
     line = next((row for row in below if "," in row.text), below[-1])
     for separator in (";", "\t"):

@@ -133,7 +133,7 @@ def _refined(gray: ByteArray, board: Board) -> tuple[bool, FloatArray | None]:
 
 
 def _dark_first(gray: ByteArray, board: Board, points_px: FloatArray) -> Detection:
-    """Order corners to have a black square between the first four; ambiguous boards have one at both ends."""
+    """Order corners to have a black square between the first four; ambiguous boards keep their order."""
     square = [0, 1, board.columns, board.columns + 1]
     here, there = (
         float(brightness(gray, order[square].mean(axis=0)[None])[0]) for order in (points_px, points_px[::-1])

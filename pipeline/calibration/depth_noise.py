@@ -71,25 +71,29 @@ def noise_law(points: NoisePoints) -> DepthNoise:
     """Fit max(s0, s1 z^p) / cos(angle)^q by least squares on its logarithm: near and far count equally.
 
     The law bends where s1 z^p reaches s0. For a given bend the fit is linear; the bend with the smallest sum
-    of squared residuals is chosen.
+    of squared residuals is chosen. Bends with p above ``STEEPEST`` are left out; if all are, p is
+    ``STEEPEST`` at the nearest bend.
     """
     log_z, log_cos, log_sd = np.log(points.z_m), np.log(points.cosine), np.log(points.sd_m)
     best, least = DepthNoise(LEAST_M, LEAST_M, 0.0, 0.0), np.inf
     for bend in np.linspace(log_z.min(), log_z.max(), BENDS, endpoint=False):
         columns = np.column_stack([np.ones(len(log_z)), np.maximum(log_z - bend, 0.0), -log_cos])
         (log_s0, p, q), squares = _not_negative(columns, log_sd)
-        if squares < least and (p <= STEEPEST or math.isinf(least)):
+        if p > STEEPEST and math.isinf(least):
+            p, steep = STEEPEST, log_sd - STEEPEST * columns[:, 1]
+            (log_s0, q), squares = _not_negative(columns[:, [0, 2]], steep)
+        if squares < least and p <= STEEPEST:
             best, least = DepthNoise(math.exp(log_s0), math.exp(log_s0 - p * bend), p, q), squares
     return best
 
 
 def _not_negative(columns: FloatArray, values: FloatArray) -> tuple[list[float], float]:
-    """Fit (K, 3) columns with the last two parameters >= 0; returns parameters and squared residuals."""
-    used = [0, 1, 2]
+    """Fit (K, P) columns with all parameters but the first >= 0; returns them and the squared residuals."""
+    used = list(range(columns.shape[1]))
     while True:
         found = np.linalg.lstsq(columns[:, used], values, rcond=None)[0]
         if found[1:].min(initial=0.0) >= 0.0:
-            x = np.zeros(3)
+            x = np.zeros(columns.shape[1])
             x[used] = found
             return x.tolist(), float(((values - columns @ x) ** 2).sum())
         del used[1 + int(np.argmin(found[1:]))]

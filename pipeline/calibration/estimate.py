@@ -106,7 +106,7 @@ class Calibration:
 
     @property
     def focal_sd(self) -> float:
-        """Standard error of the focal lengths, the larger of both, as a share of them."""
+        """Larger relative standard error of the two focal lengths."""
         values = self.parameters
         return max(
             error / values[name] for name, error in self.standard_errors.items() if name in ("fx", "fy")

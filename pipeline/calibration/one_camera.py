@@ -1,4 +1,4 @@
-"""Check that one camera took all images of a folder, where their names leave it open."""
+"""Check, by the fit, that one camera took all images of a folder whose names form several series."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from pipeline.calibration.estimate import LEAST_VIEWS, Calibration, View, best_f
 from pipeline.calibration.series import same_moments
 
 WORSE = 1.5
-"""Least ratio of the RMS of one camera for all images to that of a camera for each series of names, from
-which on they are several cameras."""
+"""The images are of several cameras if one camera for all has more than this many times the RMS of one
+camera for each series of names."""
 
 
 def check_series_agree(found: Calibration, views: Sequence[View], paths: Mapping[str, Path]) -> None:
-    """Check that the camera of all images fits as well as one for each series, such as front_1 and back_1.
+    """Check that one camera fits all images about as well as one per series of names (front_1, back_1).
 
     Args:
-        found: the camera of all views.
+        found: the camera calibrated from all views.
         views: its views.
         paths: image files by the names of views.
 
     Raises:
-        InputError: the series fit much better alone.
+        InputError: a camera for each series fits much better.
     """
     series = same_moments([paths[view.name] for view in views])
     if not series:

@@ -21,7 +21,7 @@ from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.types import FloatArray
 
 ALONE, DEPTH = 0.7, 0.85
-"""Progress at the end of the cameras' own calibrations, and at the start of that of depth."""
+"""Progress when each camera is calibrated alone, and when the calibration of depth starts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ def iterate_rig_calibration(
         depth_scale: depth units per metre; by default whole numbers are millimetres.
 
     Yields:
-        Progress before each image.
+        Progress before each image and each later step.
 
     Raises:
         InputError: images are unreadable, differ in size within a camera, too few show the board, an image to
@@ -149,7 +149,7 @@ def cameras_together(
 
     Raises:
         InputError: there are fewer than two cameras, or some never see the board together.
-        ReconstructionError: the views do not determine the poses, or a camera that fits best cannot exist.
+        ReconstructionError: the views do not determine the poses, or the best camera is impossible.
     """
     images = camera_images(nodes)
     seen = {name: _seen(report, images[name]) for name, report in reports.items()}

@@ -94,7 +94,7 @@ def place_of_first_mm(board: Board) -> FloatArray:
 
 
 def _around_mm(board: Board) -> float:
-    """Return the distance from the outermost points to the board's edge; around circles is white paper."""
+    """Return the distance from the outermost points to the board's edge; circles have a white border."""
     if board.pattern == "aprilgrid":
         return 1000.0 * board.tag_spacing * board.spacing_m
     squares = board.pattern in ("chessboard", "charuco")

@@ -134,7 +134,7 @@ def projected_covariance_px2(seen: Sight, covariance: FloatArray, placing: Float
 
 
 def placing(views: Sequence[tuple[FloatArray, FloatArray]], optics: Optics) -> FloatArray:
-    """Return the (6, P) derivative by the lens of the camera's new pose, for boards that do not move.
+    """Return the (6, P) derivative, by the lens, of the camera pose that fits unmoved boards best.
 
     Args:
         views: (N, 3) points of each board and its (4, 4) pose in the camera's frame.

@@ -25,7 +25,7 @@ class Images:
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """Images decoded from the received bytes; pixels that these do not describe stay unknown."""
+    """Images decoded from the received bytes; pixels whose bytes are missing stay unknown."""
 
     rgb: ByteArray
     """(H, W, 3), zero where the colour is unknown."""

@@ -40,7 +40,7 @@ class Raw:
     def decode(
         self, data: ByteArray, arrived: BoolArray, shape: tuple[int, int], packet_bytes: int
     ) -> Received:
-        """Decode as ``Coding.decode``: a pixel is known when all of its bytes are."""
+        """Decode as ``Coding.decode``: a pixel is known when all of its bytes arrived."""
         order = self.order(shape)
         depth_file = len(_depth_header(shape)) + _DEPTH_BYTES * order.size
         color_file = len(_color_header(shape)) + _COLOR_BYTES * order.size

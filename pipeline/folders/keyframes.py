@@ -42,7 +42,7 @@ class _Written:
     camera: CameraIntrinsics
     T_world_camera: FloatArray
     points: IntArray
-    """(N,) rows of the map's points that it sees."""
+    """(N,) indices, in the COLMAP model, of the points that it sees."""
     pixels: FloatArray
     """(N, 2) columns and rows of these points."""
 
@@ -63,9 +63,9 @@ def delete_keyframes(folder: Path) -> None:
 def iterate_keyframes(recording: Recording, walk: Walk, folder: Path) -> Generator[Progress, None, Path]:
     """Write ``folder``/keyframes with images/, depth/, transforms.json, and sparse/ as COLMAP's text model.
 
-    It is written completely or not at all, and replaces that of an earlier run. Images have no distortion;
-    depth has whole millimetres and the pixels of its colour image. Keyframes that cannot be read are left
-    out.
+    The folder is written completely or not at all, and replaces that of an earlier run. Images have no
+    distortion; depth is in whole millimetres, on the pixels of its colour image. Keyframes without a pose or
+    that cannot be read are left out.
 
     Args:
         recording: the frames.
@@ -73,7 +73,7 @@ def iterate_keyframes(recording: Recording, walk: Walk, folder: Path) -> Generat
         folder: folder of the run.
 
     Raises:
-        InputError: no keyframe can be read, or the folder cannot be written.
+        InputError: no keyframe has a pose and can be read, or the folder cannot be written.
     """
     out = folder / FOLDER
     delete_keyframes(folder)
@@ -112,7 +112,7 @@ def _iterate_images(
 
 
 def straight(frame: RgbdFrame) -> RgbdFrame:
-    """Return a frame without distortion, in a pinhole camera of the same size that sees all of its image."""
+    """Return a frame without distortion, in the pinhole camera of its ``straight_view``."""
     camera = frame.intrinsics
     if is_pinhole(camera):
         return frame
@@ -131,7 +131,7 @@ def _write(out: Path, frame: RgbdFrame, cloud: PointCloud) -> _Written:
 
 
 def _transforms(written: list[_Written]) -> dict[str, object]:
-    """Return the values of transforms.json: OpenGL's camera axes, pixels that begin at their corners."""
+    """Return the values of transforms.json: OpenGL's camera axes; the first pixel's corner is 0, 0."""
     frames = [
         {
             "file_path": f"images/{own.color}",

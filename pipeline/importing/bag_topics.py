@@ -161,7 +161,7 @@ def of_separate_cameras(
 
 
 def _is_resized(small: Topic, large: Topic) -> bool:
-    """Return whether two topics of one frame have the same camera in different sizes."""
+    """Return whether two topics have the same frame and the same camera, in different sizes."""
     if small.frame != large.frame or small.camera.width_px == large.camera.width_px:
         return False
     resized = scaled_to(large.camera, small.camera.width_px, small.camera.height_px)

@@ -63,7 +63,7 @@ class FolderRecording:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes; that there are no poses is none: a recording's camera is tracked or stands."""
+        """Notes; none on missing poses, because the camera of a recording is tracked or stands."""
         return (*self.sequence.notes, *unreadable_note(self.unreadable))
 
     def view(self, index: int) -> DepthView:

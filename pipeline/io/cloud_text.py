@@ -270,7 +270,10 @@ def _numbers(
     places: Sequence[int],
     more: bool = False,
 ) -> FloatArray:
-    """Return the (N, len(places)) numbers at some places of lines of ``width`` cells; empty cells are NaN."""
+    """Return (N, len(places)) numbers: the cells at ``places`` of N lines of ``width`` cells, or ``more``.
+
+    Empty cells and words such as null are NaN.
+    """
     cells = dialect.cells(lines)
     if any(len(row) < width if more else len(row) != width for row in cells):
         raise _not_numbers(path, width)

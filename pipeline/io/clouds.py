@@ -63,15 +63,16 @@ def read_cloud(path: AnyPath, columns: str | None = None, header_unit: bool = Tr
     Args:
         path: the file.
         columns: columns of text, .npy and .bin files, such as ``x,y,z,_,r,g,b`` (``parse_columns``); without
-            it they are found in the file, and what is not plain is logged.
+            it they are found in the file, and doubtful guesses are logged.
         header_unit: whether positions are converted to metres if the titles of the columns, or the coordinate
             system of a LAS file, have another unit.
 
     Returns:
-        (N, 3) points in the file's unit, which should be metres.
+        The cloud, in the file's unit, which should be metres, unless ``header_unit`` converted it.
 
     Raises:
-        InputError: the file is missing, truncated, too large, of another format or without points.
+        InputError: the file is missing, truncated, too large, of another format or without points; it names
+            its columns itself and ``columns`` are given; or its positions are degrees.
 
     >>> from pathlib import Path; import packetmesh as pm
     >>> _ = Path("corners.csv").write_text("x,y,z\\n0,0,1\\n0.5,0,1\\n0,0.5,1\\n")

@@ -185,7 +185,7 @@ def _decode(path: AnyPath, data: bytes, flags: int, what: str) -> np.ndarray:
 
 
 def _is_whole(data: bytes) -> bool:
-    """Return whether a file is complete, without missing bytes at its end."""
+    """Return whether a file is not truncated; of a JPEG, whether it has an end marker anywhere."""
     if data.startswith(_PNG_SIGNATURE):
         return _png_is_whole(data)
     if data.startswith(_PNM_SIGNATURES):

@@ -39,7 +39,7 @@ class Texture:
     """(C, V, 2) float32 texture coordinates of each vertex in each camera's photograph."""
 
     def corners(self, triangles: IntArray) -> Corners:
-        """Return the mesh in renderers' form, by the (F, 3) triangles of the original mesh."""
+        """Return the mesh in the form that renderers need, from the (F, 3) triangles of the original mesh."""
         count = self.uv.shape[1]
         keys = (self.camera[:, None].astype(np.int64) + 1) * count + triangles
         used, inverse_of = np.unique(keys, return_inverse=True)

@@ -34,7 +34,7 @@ def straight_view(camera: CameraIntrinsics) -> CameraIntrinsics:
 
 
 def straight_image(rgb: ByteArray, camera: CameraIntrinsics, view: CameraIntrinsics) -> ByteArray:
-    """Return (H, W, 3) an image of ``camera`` as ``view`` sees it; black outside the image."""
+    """Return a (H, W, 3) image of ``camera`` on the pixels of ``view``; black outside the image."""
     return cv2.remap(rgb, *maps_between(camera, view), cv2.INTER_LINEAR, borderValue=(0, 0, 0))
 
 

@@ -297,7 +297,7 @@ def _reconciled(
 
 
 def poses_by_tracking(track: Track) -> tuple[FloatArray | None, ...]:
-    """Return (4, 4) poses of all frames along the links of tracking alone, as in ``Trajectory``."""
+    """Return the poses ``Trajectory.T_first_depth`` of all frames, by the links of tracking alone."""
     return _frame_poses(track, _chain(track))
 
 

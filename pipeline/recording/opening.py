@@ -121,7 +121,7 @@ def _walks_by_poses(recording: Recording) -> bool:
 
 
 def unchanged_share(first: DepthView, other: DepthView) -> float:
-    """Return the share of the first view's squares whose mean 1/z the other has, too; 0 for other sizes."""
+    """Return the share of the first view's squares with unchanged mean 1/z; 0 if the sizes differ."""
     shape = first.depth.z_m.shape
     if shape != other.depth.z_m.shape:
         return 0.0

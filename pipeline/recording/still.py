@@ -93,7 +93,7 @@ def _with_neighbours(spread: BoolArray) -> BoolArray:
 
 
 def _tables(inverse: FloatArray, noise: DepthNoise) -> tuple[tuple[float, float], FloatArray, FloatArray]:
-    """Return least and largest 1/z, and (``ENTRIES``,) standard deviation and step of 1/z between them."""
+    """Return the range of a sample of 1/z, and (``ENTRIES``,) standard deviation and step of 1/z over it."""
     every = max(1, round(np.sqrt(inverse[0].size * min(len(inverse), 4) / SAMPLED)))
     some = inverse[:, ::every, ::every]
     values = some[:4][some[:4] > 0.0].astype(float)
@@ -184,7 +184,7 @@ def _vote(
 
 @compiled
 def _sort_row(inverse: FloatArray, row: int, of_row: FloatArray, measured: ByteArray) -> None:
-    """Write the measurements of a row's pixels to (W, N) ``of_row``, ascending, and their (W,) numbers."""
+    """Sort the measurements of a row's pixels into (W, N) ``of_row``; count them in (W,) ``measured``."""
     for frame in range(inverse.shape[0]):
         for column in range(inverse.shape[2]):
             value = inverse[frame, row, column]

@@ -170,7 +170,7 @@ class _Tracker:
     """State of tracking: the keyframe, the pose in it, and the last motion."""
 
     def __init__(self, given: Sequence[FloatArray | None], brightness: Brightness) -> None:
-        """Start without frames; ``given`` has each frame's pose from the recording, None where unknown."""
+        """Start without frames; ``given`` has the depth camera's pose at each frame or None, or is empty."""
         self._given, self._brightness = given, brightness
         self._clouds = KeyframeClouds()
         self._frames: list[Tracked | None] = []

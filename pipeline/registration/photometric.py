@@ -145,7 +145,7 @@ def _smooth(z_m: FloatArray) -> BoolArray:
 
 
 def _slopes(grey: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the (H, W) changes of brightness a pixel to the right and down."""
+    """Return the (H, W) changes of brightness per pixel, to the right and down."""
     return cv2.Scharr(grey, cv2.CV_32F, 1, 0) / 32.0, cv2.Scharr(grey, cv2.CV_32F, 0, 1) / 32.0
 
 

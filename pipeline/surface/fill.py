@@ -44,7 +44,7 @@ class Filled:
 
 
 def fill_holes(surface: SurfaceResult, longest_m: float) -> Filled:
-    """Close every hole whose loop is short enough by the triangulation of least area.
+    """Close every hole whose loop is short enough, with the triangulation of least area.
 
     Rims and islands stay open, as do loops of more than 256 vertices and those for which every
     triangulation needs an edge that the mesh already has: no edge gets more than two faces. All new

@@ -28,7 +28,7 @@ class Hole:
     """(L,) vertex indices, the first not repeated; a hole's are clockwise seen from outside."""
     length_m: float
     area_m2: float
-    """Area of the fan of triangles from the loop's first vertex."""
+    """Length of the loop's area vector (``loop_measures``): its area if it is flat."""
     center_m: FloatArray
     """(3,) mean of the loop's edges, weighted by their length."""
     rim: bool

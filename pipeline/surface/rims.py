@@ -125,7 +125,7 @@ def _rim_of(edges: IntArray, size: int) -> _Rim:
 
 
 def _closed_notches(points_m: FloatArray, surface: Surface, triangles: IntArray, rim: _Rim) -> IntArray:
-    """Return (N, 3) triangles that close notches, the sharpest first, and take them off the rim."""
+    """Return (N, 3) triangles that close notches, the sharpest first; take their corners off the rim."""
     size = len(points_m)
     single = rim.before >= 0
     on = single.copy()

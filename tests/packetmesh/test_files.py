@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from packetmesh.files import atomic_path, writable_folder
+from packetmesh.files import atomic_path, text_in, writable_folder
 from pipeline.io.clouds import write_cloud
 from pipeline.io.images import write_color, write_depth_mm
 from pipeline.io.intrinsics import write_intrinsics
@@ -66,3 +66,9 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path, name):
     with pytest.raises(InputError, match=r"taken.*cannot be written.*; try another folder"):
         WRITERS[name](tmp_path / "taken" / name)
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
+
+
+@pytest.mark.parametrize("words", ["hello world", "Привет, как дела", "你好世界"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_text_of_any_language_is_read_as_windows_saves_it(words, encoding):
+    assert text_in(f"{words}\r\n{words}".encode(encoding)) == f"{words}\n{words}"

@@ -70,14 +70,14 @@ class BoardsDrawing:
         came: SceneView | None,
         chosen: str,
     ) -> None:
-        """Draw all cameras at their calibrated poses, next to the scene's.
+        """Draw the boards and the calibrated cameras at their poses, and in grey the cameras' loaded poses.
 
         Args:
             view: the cameras.
-            rig: their poses.
-            scene: the scene in the chain.
-            came: the scene as it was loaded.
-            chosen: the chosen view.
+            rig: poses of the cameras and the boards.
+            scene: the scene in the chain, whose sensor clouds are drawn.
+            came: the scene as it was loaded; the first camera stands at its pose there.
+            chosen: name of the view to highlight.
         """
         clear(self._scene, BELOW)
         self._handles, self._dropped = {}, frozenset()
@@ -148,7 +148,7 @@ class BoardsDrawing:
         color: tuple[int, int, int],
         picture: str | None = None,
     ) -> None:
-        """Add a camera; one that is named like a view can be clicked."""
+        """Add a camera's frustum; it can be clicked if its label is the name of a fitted view."""
         assert camera.calibration is not None
         width_px, height_px = camera.size_px
         path = f"{BELOW}/frustum-{name.replace('/', '-')}"  # never below another camera of the node

@@ -67,9 +67,9 @@ SETTINGS: dict[str, Setting[CalibrateLook]] = {
 
 
 def left_out(camera: CameraView, keep: Keep) -> Iterator[tuple[str, str]]:
-    """Yield camera and moment of the views to leave out.
+    """Yield the camera and the moment of each view to leave out.
 
-    "three alike" keeps the three whose boards have the most similar directions that still determine a lens.
+    "three alike" keeps the three views whose boards' normals differ least but still determine a lens.
     """
     lens = camera.calibration
     if keep == "all" or lens is None:

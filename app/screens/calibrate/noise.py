@@ -33,13 +33,13 @@ class NoiseFolder:
 
         Args:
             ui: panel to add it to.
-            on_replay: called with the noise in px, and whether the lens is another model.
+            on_replay: called with the noise in px, and whether another lens projects the points.
             on_stop: called to stop the running replay.
         """
         self._on_replay, self._on_stop = on_replay, on_stop
         self._view: NoiseView | None = None
         self._running: tuple[float, bool] | None = None
-        """Noise and lens of the running replay."""
+        """Arguments of ``on_replay`` for the running replay."""
         gui = ui.gui
         self._resting = ui.debounce(REST_S, self._rested)
         self._folder = gui.add_folder("What if the points were noisier?", expand_by_default=False)

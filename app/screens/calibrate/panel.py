@@ -292,7 +292,7 @@ class CalibratePanel(Panel):
     # The chain.
 
     def _use_it(self) -> None:
-        """Write the calibration that is shown, and let the chain use it.
+        """Write the shown calibration to a new folder, and let the chain use it.
 
         Raises:
             InputError: the scene is a recording.

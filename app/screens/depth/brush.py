@@ -72,8 +72,8 @@ def clicked_disc(
 def picked_point(points_m: FloatArray, origin_m: FloatArray, direction: FloatArray) -> int | None:
     """Return the row of the (N, 3) point that a ray selects; None if none is within 1 degree of it.
 
-    Of the points in reach, those of the nearest surface count, and of these the one closest to the ray:
-    between the points of a sparse surface one sees the surface behind it.
+    Of the points within 1 degree, only those of the nearest surface count, because rays also pass between the
+    points of a sparse surface to the one behind it. Of these, the point closest to the ray is selected.
     """
     forward = np.asarray(direction, float) / np.linalg.norm(direction)
     offset_m = points_m.astype(float) - origin_m

@@ -28,12 +28,12 @@ TEST_DEPTH.z_m[80:160, 120:200] = np.nan
 
 
 def model_job(store: Store, spec: Spec, choice: ModelChoice) -> Generator[Progress, None, ModelView]:
-    """Load a network and infer one image, without results of the chain.
+    """Load a network and run it on one test image; no result of the chain is needed.
 
     Raises:
-        InputError: it is no depth network, its kind is unknown, it does not take the size, or a network that
-            takes image and depth comes with settings of others.
-        ReconstructionError: its answer is no depth.
+        InputError: it is not a depth network, its kind is unknown, it rejects the image size, or a network
+            that takes image and depth comes with settings for networks that take an image alone.
+        ReconstructionError: its output is no depth, or does not follow the given depth.
     """
     yield Progress("loading the network", 0.3)
     choice = told_apart(choice)

@@ -198,8 +198,8 @@ def in_window(
         picture_m: height of the picture at the middle of a lane, metres.
 
     Returns:
-        (N,) positions over the window's width from the left, and (N,) over its height from the top; far
-        outside if a point is behind the viewer.
+        (N,) positions from the left of the window, as shares of its width, and (N,) from the top of the
+        picture, as shares of its height; 1e9 for points behind the viewer.
     """
     right_m, up_m, away_m = points_m.T
     nearer = 1.0 + 2.0 * away_m * np.tan(0.5 * FOV_RAD) / picture_m

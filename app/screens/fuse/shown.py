@@ -72,11 +72,11 @@ class ShownChoice:
             self._offer(single=False, walk=walk)
 
     def offer(self, single: bool, walk: bool) -> None:
-        """Offer what a scene has.
+        """Offer the entries that a scene has, and choose the one that the address names.
 
         Args:
             single: whether the scene has one node, so that no two nodes can race.
-            walk: whether it is a recording, whose keyframes have no poses before registration.
+            walk: whether it is a recording: it has a walk, but no poses before registration.
         """
         self._offer(single, walk)
         requested, self._requested, self._known = self._requested, "", True

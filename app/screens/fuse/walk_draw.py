@@ -181,7 +181,7 @@ class WalkDrawing:
 
 
 def pieces(until: IntArray) -> IntArray:
-    """Return (P,) ascending ends of pieces of the map: each holds all points of a few frames.
+    """Return (P,) ascending end indices of the pieces of the map: each holds all points of a few frames.
 
     Args:
         until: (F,) number of points after each frame.

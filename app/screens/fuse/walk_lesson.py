@@ -69,7 +69,7 @@ def loop_of(look: WalkLook, view: WalkView) -> int:
 
 
 def numbers(scene: str, view: WalkView, surface: Any, times: int) -> Numbers:
-    """Return the fields' values.
+    """Return the values of the lesson's fields.
 
     Args:
         scene: title of the scene.

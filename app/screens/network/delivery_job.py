@@ -72,7 +72,7 @@ def delivery_job(store: Store, spec: Spec) -> Steps:
 def packet_job(
     store: Store, spec: Spec, row: int, first_byte: int, byte_count: int
 ) -> Generator[Progress, None, PacketView]:
-    """Return what bytes [first_byte, first_byte + byte_count) of a node's images give without the others.
+    """Return the pixels and points that one packet of a node's images gives without the other packets.
 
     Args:
         store: store of the results.

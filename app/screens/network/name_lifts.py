@@ -11,15 +11,15 @@ LETTER_PX, LINE_PX = 6.2, 20.0
 
 
 def lifts(at_px: FloatArray, letters: IntArray, fixed: int) -> FloatArray:
-    """Return how far labels must move so that none overlaps another; their order along the way is kept.
+    """Return how far labels must move in one direction, up or down, so that none overlaps another.
 
     Args:
-        at_px: (N, 2) middle of each label's edge: to the right, and along the way of the move (up or down).
+        at_px: (N, 2) middle of each label's edge: to the right, and along the direction of the move.
         letters: (N,) number of letters of each label.
-        fixed: the first so many labels do not move.
+        fixed: number of labels at the start that do not move.
 
     Returns:
-        (N - fixed,) moves of the other labels, px.
+        (N - fixed,) moves of the other labels, px; at least 0.
     """
     widths_px = LETTER_PX * letters
     from_px, at_px = at_px, at_px.copy()

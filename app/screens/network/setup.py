@@ -248,7 +248,7 @@ class NetworkSetup:
         """Return the delivery that the controls set.
 
         Raises:
-            InputError: some settings contradict each other.
+            InputError: a setting is invalid, or some contradict each other.
         """
         changes = (
             f"radio.shadowing_db={float(self._shadowing.value)}",

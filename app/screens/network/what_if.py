@@ -174,11 +174,11 @@ class WhatIf:
         self._draw()
 
     def offer(self, names: Sequence[str], apart: bool = True) -> None:
-        """Offer these nodes; a single one cannot be switched off.
+        """Offer these nodes in the drop-downs; a single one cannot be switched off.
 
         Args:
             names: names of the nodes.
-            apart: whether their places are known; only then their radios can be moved.
+            apart: whether the cameras have different places; otherwise no radio can be moved.
         """
         for handle in (self._off, self._walled, self._mover):
             able = apart if handle is self._mover else handle is self._walled or len(names) > 1

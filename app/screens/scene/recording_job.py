@@ -101,12 +101,12 @@ def unpack(path: Path, folder: Path) -> None:
 def _used(
     path: Path, place: Path, frames: int | None, depth_scale: float | None
 ) -> Generator[Progress, None, ReadRecording]:
-    """Import some frames of a recording to ``place`` as a rig, or move all of it there."""
+    """Import some frames of a recording to ``place`` as a rig, or move it there; a file moves next to it."""
     if frames is not None:
         report = yield from iterate_import(path, place, frames, depth_scale)
         found = f"{report.kind}: {len(report.frames)} of {report.candidates} frames became nodes"
         return ReadRecording(RigFolder(str(place)), (found, *report.notes))
     opened = yield from iterate_opening(path, depth_scale)  # reports errors of the recording now
     note = f"{opened.kind}: {len(opened.times_s)} frames become one surface"
-    place = place.with_name(path.name) if path.is_file() else place  # a bag keeps its suffix
+    place = place.with_name(path.name) if path.is_file() else place  # a bag keeps its name
     return ReadRecording(Recorded(str(path.rename(place)), depth_scale), (note,))

@@ -27,11 +27,11 @@ LEVEL_SHARE = 0.01
 
 
 def sweep_figure(view: SweepView | None, below: str = WORK) -> go.Figure:
-    """Return two plots above each other over the radius in millimetres, on a logarithmic axis.
+    """Return two plots above each other, over the ball radius in millimetres on a logarithmic axis.
 
     Args:
-        view: the balls; None gives an empty figure.
-        below: one of ``BELOW``.
+        view: results by ball radius; None gives an empty figure.
+        below: curves of the lower plot, one of ``BELOW``.
     """
     left, right = ("triangles", "ball, ms") if below == WORK else ("unused, %", "holes, m²")
     figure = styled_figure(

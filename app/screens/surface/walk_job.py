@@ -44,7 +44,7 @@ def walk_job(store: Store, spec: Spec, request: WalkRequest) -> Generator[Progre
 def walk_over(
     cloud: PointCloud, radii_m: tuple[float, ...], request: WalkRequest
 ) -> Generator[Progress, None, WalkView]:
-    """Return the walk over a cloud with normals, or over a patch of it; raises like ``walk_job``."""
+    """Return the ball's walk over a cloud with normals, or over a patch of it; raises like ``walk_job``."""
     if request.close_up:
         triangles = roll(cloud.points_m, cloud.normals, radii_m).triangles
         assert cloud.normals is not None  # or the ball would not have rolled

@@ -79,9 +79,9 @@ def quick_registration(
         source: the cloud that moves.
         target: the cloud that stays.
         T_start: (4, 4) start pose T_target_source.
-        gate_m: its gate.
-        direction: its direction.
-        config: its other settings.
+        gate_m: gate of the registration.
+        direction: direction of the registration; with a scale, it is always ``both``.
+        config: other settings of the registration.
         seed: seed of the draw of points; None for the settings'.
         points: largest number of points of each cloud.
 

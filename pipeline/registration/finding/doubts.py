@@ -44,12 +44,12 @@ class Checked(NamedTuple):
     """Largest point error between the pose and those of other draws of the points; infinite if one failed,
     NaN if another pose had the better score."""
     settled: bool
-    """Whether the draws agree: without doubts it is sure, else a rival is the only doubt."""
+    """Whether the draws agree; then the pose is sure, unless ``doubts`` name a rival."""
 
 
 @dataclass(frozen=True, slots=True)
 class Checks:
-    """Tries to doubt answers for two clouds."""
+    """Checks answers for two clouds; called with an answer."""
 
     source: PointCloud
     target: PointCloud
@@ -57,9 +57,15 @@ class Checks:
     config: RegistrationConfig
 
     def __call__(self, way: Way, answer: Candidate, tried: Sequence[Candidate]) -> Checked:
-        """Check an answer without doubts, from some kind of start, beside all registrations that were tried.
+        """Check an answer whose evidence has no doubts, by draws of the points and rival poses.
 
-        Where both clouds have colours, these have refuted all quarter turns but that of a room of one colour.
+        Where both clouds have colours, no rivals are tried: colours refute quarter turns, except in a room of
+        one colour.
+
+        Args:
+            way: where the start pose came from.
+            answer: the answer to check.
+            tried: all registrations that were tried.
         """
         at, clouds = (answer.T_target_source, answer.evidence), (self.source, self.target)
         answer = better_slide(*clouds, *at, self.judge, self.config) or answer

@@ -100,7 +100,7 @@ def test_no_job_of_a_browser_that_left_runs_on(running, tmp_path):
     with contextlib.closing(Connection(running.url)) as one:
         wait_for(lambda: bool(one.steps) and up_to_date(one) and len(running.sessions) == 1, LONG_S)
         (session,) = running.sessions.values()
-        for lane, job in ((session._side, pool_jobs.count_forever), (session._quick, pool_jobs.deaf)):
+        for lane, job in ((session._side, pool_jobs.count_forever), (session._quick["deaf"], pool_jobs.deaf)):
             (tmp_path / job.__name__).mkdir()
             lane.submit(job, str(tmp_path / job.__name__), on_progress=repr, on_end=repr)
         wait_for(lambda: len(list(tmp_path.glob("*/began"))) == 2, LONG_S)

@@ -25,6 +25,15 @@ def test_noise_that_does_not_grow_has_exponents_of_zero_and_not_below():
     assert found.s0_m == pytest.approx(np.exp(np.mean(np.log(0.004 / z_m))))
 
 
+def test_no_exponent_is_above_the_limit_and_the_law_then_fits_at_that_limit():
+    z_m = np.geomspace(1.0, 3.0, 40)
+    found = noise_law(NoisePoints(z_m, np.ones(40), 0.001 * z_m**6, np.zeros(40)))
+    assert found.p == 4.0
+    off = np.log(found.sd_m(z_m, np.ones(40)) / (0.001 * z_m**6))
+    assert np.mean(off) == pytest.approx(0.0, abs=1e-9)
+    assert np.abs(off).max() == pytest.approx(np.log(3.0), rel=1e-6)  # 2 log(3) from end to end
+
+
 def test_noise_is_what_is_left_of_a_views_plane_without_what_is_four_sds_off():
     rng = np.random.default_rng(0)
     pixels = rng.integers(0, (640, 480), (8000, 2))
