@@ -276,7 +276,7 @@ def test_the_lesson_walks_its_stops_and_sets_the_controls(fuse):
         if stop == 10:
             expect(fuse.locator(".packetmesh-dock-time")).to_have_text(re.compile("of .* m?s$"))
         if stop > 10:
-            doubt = re.compile(f"RMSE [23][.]\\d\\d cm · doubtful: .*{DOUBTS[stop]}")
+            doubt = re.compile(f"RMSE [23][.]\\d\\d cm · verdict doubtful: .*{DOUBTS[stop]}")
             assert any(doubt.match(verdict_at_end(fuse, 1)) for _ in range(150))
     assert starts == {"aligned", "slightly off (3°, 6 cm)", "far off (20°, 40 cm)", "by hand"}
     fuse.get_by_role("button", name="Back", exact=True).click()
