@@ -78,4 +78,5 @@ $(VENV)/.core: $(VENV)/.uv requirements.lock pyproject.toml
 
 $(VENV)/.dev: $(VENV)/.core requirements-dev.lock
 	$(BIN)/uv pip install -q --python $(BIN)/python --require-hashes -r requirements-dev.lock
+	$(BIN)/python -m app.compute.prepared  # again: what it keeps depends on the installed packages
 	@touch $@
