@@ -126,7 +126,7 @@ def _moved(marks: list[Mark], places: dict[str, list[Place]], factor: float) -> 
     for one, place in zip(marks, places["points"], strict=True):
         away_m = float(np.linalg.norm(one.point_m / factor - place))
         if away_m >= LEAST_AWAY_M:
-            given, found = (",".join(f"{x:.4g}" for x in at) for at in (place, one.point_m / factor))
+            given, found = (",".join(f"{x:.3f}" for x in at) for at in (place, one.point_m / factor))
             yield f"The point {given} was taken for {found}, {100.0 * away_m:.1f} cm away ({one.snapped})"
 
 

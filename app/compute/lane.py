@@ -99,8 +99,8 @@ class UrgentLanes(dict[str, LatestWins]):
     def __init__(self, pool: ComputePool) -> None:
         self._pool = pool
 
-    def __missing__(self, job: str) -> LatestWins:
-        lane = self[job] = LatestWins(self._pool, object(), urgent=True)
+    def __missing__(self, kind: str) -> LatestWins:
+        lane = self[kind] = LatestWins(self._pool, object(), urgent=True)
         return lane
 
 

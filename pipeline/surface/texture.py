@@ -57,8 +57,8 @@ def photographed(
     pixels = [_pixels(camera, vertices_m) for camera in cameras]
     scores = np.empty((len(cameras), len(triangles)))
     middles = np.empty(scores.shape, np.int32)
-    for row, (camera, depth, (_, known)) in enumerate(zip(cameras, depths, pictures, strict=True)):
-        shape = camera.intrinsics.height_px, camera.intrinsics.width_px
+    for row, (camera, depth, (rgb, known)) in enumerate(zip(cameras, depths, pictures, strict=True)):
+        shape = rgb.shape[0], rgb.shape[1]
         first_m = np.where(np.isfinite(depth.z_m), depth.z_m, np.inf).astype(np.float32)
         around_m = cv2.erode(first_m, np.ones((NEAR_RIM_PX, NEAR_RIM_PX), np.uint8))
         seen = _inside(pixels[row], shape, known), shape, first_m, around_m, _shrink(camera)
@@ -174,7 +174,7 @@ def _chosen(scores: FloatArray, triangles: IntArray) -> IntArray:
 @compiled
 def _smoothed(scores: FloatArray, beside: IntArray) -> FloatArray:
     """Return (F,) scores averaged with those of the (F, 3) neighbours ``SMOOTHING_ROUNDS`` times."""
-    now, then = scores, np.empty_like(scores)
+    now, then = scores.copy(), np.empty_like(scores)
     for _ in range(SMOOTHING_ROUNDS):
         for f in range(len(scores)):
             then[f] = 0.25 * (now[f] + now[beside[f, 0]] + now[beside[f, 1]] + now[beside[f, 2]])

@@ -16,13 +16,13 @@ from app.window.ui import Ui
 from pipeline.surface.findings import Explanation, RayParts
 from pipeline.types import FloatArray
 
+NONE = "none"
+LISTED_HOLES, LISTED_RIMS = 30, 10
 TEXT = Markdown(
     """**Click a red rim in the picture, or choose one here**, and read its cause. The rim of a *hole* is
 shorter than 1 m, with surface all around it; at an *outer rim* the surface ends, or the rim is longer. The
-list has the 30 largest holes and the 10 longest outer rims, also those that no camera sees."""
-)
-NONE = "none"
-LISTED_HOLES, LISTED_RIMS = 30, 10
+list has the {} largest holes and the {} longest outer rims, also those that no camera sees."""
+).format(LISTED_HOLES, LISTED_RIMS)
 LOOKING = Markdown("Looking for the cause …")
 SILENT = Markdown("There is no result: the computation was replaced or failed. Click the hole again.")
 FILL_MOST_CM = 100.0

@@ -52,7 +52,7 @@ def test_a_point_that_is_moved_says_where_to_and_how_far(capsys, folder):
     _, out, err = run(capsys, folder, *ends)
     assert out.split()[2] == "0.3606"  # to the corner of the box
     (moved,) = [line for line in err.splitlines() if "was taken for" in line]
-    assert moved == "The point 0.29,0.19,0.15 was taken for 0.3,0.2,0.15, 1.4 cm away (vertex)"
+    assert moved == "The point 0.290,0.190,0.150 was taken for 0.300,0.200,0.150, 1.4 cm away (vertex)"
 
 
 def test_planes_give_a_distance_an_angle_or_a_box(capsys, folder):
