@@ -37,26 +37,21 @@ def paint_job(store: Store, spec: Spec, request: PaintRequest) -> Generator[Prog
     """Return the surfaces of a spec, or of one ball in place of the spec's, in colours."""
     rig, placement = yield from store.stages(spec, "rig", "placement")
     whole = yield from _clouds(store, spec)
+    first = request.which[0]
+
+    def painted(surfaces: dict[Which, Surface], thin: dict[Which, PointCloud], roll_s: float) -> PaintedView:
+        meshes = {name: _painted(surface, request, rig, placement) for name, surface in surfaces.items()}
+        return PaintedView(request, meshes, len(thin[first]), len(whole[first]), roll_s)
+
     if request.radius_m is None:
         done = yield from run(spec, store, request.which)
-        thin, roll_s = whole, done[request.which[0]].elapsed_s
-        surfaces: dict[Which, Surface] = {name: done[name].value for name in request.which}
-    else:
-        thin = yield from _thinned(store, spec, request.most_points)
-        started = time.perf_counter()
-        surfaces = {name: roll_or_nothing(thin[name], (request.radius_m,)) for name in request.which}
-        roll_s = time.perf_counter() - started
-    first = request.which[0]
-    view = PaintedView(
-        request,
-        {name: _painted(surface, request, rig, placement) for name, surface in surfaces.items()},
-        len(thin[first]),
-        len(whole[first]),
-        roll_s,
-    )
-    if request.radius_m is None:
-        return view
-    spacing_m = yield from _spacing_m(store, spec, request.most_points)
+        return painted({name: done[name].value for name in request.which}, whole, done[first].elapsed_s)
+    count = yield from _count(store, spec, request)
+    thin = yield from _thinned(store, spec, count)
+    started = time.perf_counter()
+    surfaces = {name: roll_or_nothing(thin[name], (request.radius_m,)) for name in request.which}
+    view = painted(surfaces, thin, time.perf_counter() - started)
+    spacing_m = yield from _spacing_m(store, spec, count)
     unused = {
         name: unused_view(thin[name], surface, POINT_SHARE * spacing_m, QUICK_UNUSED)
         for name, surface in surfaces.items()
@@ -68,18 +63,8 @@ def ball_job(
     store: Store, spec: Spec, request: PaintRequest, ray: Ray
 ) -> Generator[Progress, None, FloatArray | None]:
     """Return (3,) the centre of a quick look's ball at rest where a ray meets the cloud; None if nowhere."""
-    thin = yield from _thinned(store, spec, request.most_points)
+    thin = yield from _thinned(store, spec, (yield from _count(store, spec, request)))
     return resting_ball_m(thin[request.which[0]], ray, request.radius_m or 0.0)
-
-
-def _spacing_m(store: Store, spec: Spec, most_points: int) -> Generator[Progress, None, float]:
-    """Return the mean distance of nearest points in the cloud of a quick look."""
-
-    def measure() -> Generator[Progress, None, float]:
-        thin = yield from _thinned(store, spec, most_points)
-        return spacing(thin["after"].points_m)[0]
-
-    return (yield from store.remember(("spacing", most_points, key(spec, "clouds")), measure))
 
 
 def _clouds(store: Store, spec: Spec) -> Generator[Progress, None, dict[Which, PointCloud]]:
@@ -87,19 +72,50 @@ def _clouds(store: Store, spec: Spec) -> Generator[Progress, None, dict[Which, P
     return {"after": clouds.fused, "before": clouds.sensor}
 
 
-def _thinned(
-    store: Store, spec: Spec, most_points: int
-) -> Generator[Progress, None, dict[Which, PointCloud]]:
-    """Return both clouds with at most about ``most_points`` points."""
+def _count(store: Store, spec: Spec, request: PaintRequest) -> Generator[Progress, None, int]:
+    """Return the number of points to which a quick look thins the cloud after fusion.
+
+    It is ``most_points``, doubled until the voxels are no larger than the ball: through larger ones the ball
+    falls where it would rest on all points, and the look would show holes that are not there.
+    """
+    whole = yield from _clouds(store, spec)
+    count = request.most_points
+    while count < len(whole["after"]) and (yield from _voxel_m(store, spec, count)) > (request.radius_m or 0):
+        count *= 2
+    return count
+
+
+def _voxel_m(store: Store, spec: Spec, count: int) -> Generator[Progress, None, float]:
+    """Return the edge of the voxels that thin the cloud after fusion to about ``count`` points."""
+
+    def measure() -> Generator[Progress, None, float]:
+        whole = yield from _clouds(store, spec)
+        return voxel_for_count(whole["after"].points_m, count)
+
+    return (yield from store.remember(("voxel", count, key(spec, "clouds")), measure))
+
+
+def _thinned(store: Store, spec: Spec, count: int) -> Generator[Progress, None, dict[Which, PointCloud]]:
+    """Return both clouds in the voxels that thin the one after fusion to about ``count`` points."""
 
     def thin() -> Generator[Progress, None, dict[Which, PointCloud]]:
         clouds = yield from _clouds(store, spec)
-        if len(clouds["after"]) <= most_points:
+        if len(clouds["after"]) <= count:
             return clouds
-        voxel_m = voxel_for_count(clouds["after"].points_m, most_points)
+        voxel_m = yield from _voxel_m(store, spec, count)
         return {name: voxel_average(cloud, voxel_m) for name, cloud in clouds.items()}
 
-    return (yield from store.remember(("quick", most_points, key(spec, "clouds")), thin))
+    return (yield from store.remember(("quick", count, key(spec, "clouds")), thin))
+
+
+def _spacing_m(store: Store, spec: Spec, count: int) -> Generator[Progress, None, float]:
+    """Return the mean distance of nearest points in the cloud after fusion, thinned to ``count`` points."""
+
+    def measure() -> Generator[Progress, None, float]:
+        thin = yield from _thinned(store, spec, count)
+        return spacing(thin["after"].points_m)[0]
+
+    return (yield from store.remember(("spacing", count, key(spec, "clouds")), measure))
 
 
 def _painted(surface: Surface, request: PaintRequest, rig: Rig, placement: Placement) -> PaintedMesh:

@@ -53,7 +53,7 @@ class PaintRequest:
     radius_m: float | None = None
     """Radius of a quick look's ball; None takes the surfaces of the settings."""
     most_points: int = QUICK_POINTS
-    """Most points in a quick look; a larger cloud is thinned to about this number."""
+    """A quick look thins a larger cloud to about this number of points; to more if the ball is small."""
 
     def key(self, spec: Spec) -> tuple[Hashable, ...]:
         """Return the answer's cache key. A quick look depends on the spec's points, not on its radii."""

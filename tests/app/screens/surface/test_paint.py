@@ -12,8 +12,10 @@ from app.screens.surface.paint_job import paint_job, vertex_colors
 from app.screens.surface.view import QUICK_POINTS, PaintRequest
 from packetmesh.progress import drain as end
 from pipeline.config import PipelineConfig
+from pipeline.kernels.rays import triangle_areas_m2
 from pipeline.sources import Demo
 from pipeline.stages import cameras_of
+from pipeline.surface.ball_pivoting import roll_or_nothing
 from pipeline.surface.truth import distances_to_truth_m
 from pipeline.types import PointSource
 from tests.app.gltf import arrays
@@ -27,6 +29,7 @@ def spec_of(points):
 
 
 SPEC = spec_of(8_000)
+SHIPPED = Spec(Demo("box-on-table"))
 
 
 @pytest.fixture(scope="module")
@@ -60,13 +63,26 @@ def test_a_quick_look_rolls_one_ball_over_what_is_shown_alone(store):
 
 def test_a_quick_look_at_a_large_cloud_thins_it(store):
     spec = spec_of(60_000)
-    view = end(paint_job(store, spec, PaintRequest(("after",), "color", 0.02)))
+    view = end(paint_job(store, spec, PaintRequest(("after",), "color", 0.08)))
     assert view.all_points > 1.2 * QUICK_POINTS
     assert view.points == pytest.approx(QUICK_POINTS, rel=0.15)
     _, read = arrays(view.meshes["after"].glb)
     assert len(read["POSITION"]) <= view.points
-    fewer = end(paint_job(store, spec, PaintRequest(("after",), "color", 0.02, QUICK_POINTS // 4)))
+    fewer = end(paint_job(store, spec, PaintRequest(("after",), "color", 0.08, QUICK_POINTS // 4)))
     assert fewer.points == pytest.approx(QUICK_POINTS // 4, rel=0.15)
+
+
+@pytest.mark.parametrize("radius_m", [0.01, 0.015, 0.02, 0.03, 0.04, 0.06])
+def test_a_quick_look_shows_no_hole_that_only_the_thinning_made(store, radius_m):
+    view = end(
+        paint_job(store, SHIPPED, PaintRequest(("after", "before"), "color", radius_m, QUICK_POINTS // 4))
+    )
+    clouds = end(store.stage(SHIPPED, "clouds"))
+    for name, cloud in (("after", clouds.fused), ("before", clouds.sensor)):
+        whole = roll_or_nothing(cloud, (radius_m,))
+        _, read = arrays(view.meshes[name].glb)
+        shown_m2 = triangle_areas_m2(read["POSITION"], read["indices"].reshape(-1, 3)).sum()
+        assert shown_m2 > 0.9 * triangle_areas_m2(whole.vertices_m, whole.triangles).sum()
 
 
 def test_colours_say_what_their_names_say(made):
