@@ -50,13 +50,13 @@ class Matching:
         if len(rows) == len(self.distances_m):
             return self
         return Matching(
-            self.source_rows[rows],
-            self.target_rows[rows],
-            self.moved_m[rows],
-            self.target_m[rows],
-            self.distances_m[rows],
-            None if self.normals is None else self.normals[rows],
-            None if self.cosines is None else self.cosines[rows],
+            self.source_rows.take(rows),
+            self.target_rows.take(rows),
+            self.moved_m.take(rows, axis=0),
+            self.target_m.take(rows, axis=0),
+            self.distances_m.take(rows),
+            None if self.normals is None else self.normals.take(rows, axis=0),
+            None if self.cosines is None else self.cosines.take(rows),
         )
 
 
@@ -157,7 +157,7 @@ class _Subset:
     def __init__(self, cloud: _Cloud, rows: IntArray) -> None:
         self.cloud, self.rows = cloud, rows
         whole = len(rows) == len(cloud.points_m)
-        self.points_m = np.ascontiguousarray(cloud.points_m if whole else cloud.points_m[rows])
+        self.points_m = np.ascontiguousarray(cloud.points_m if whole else cloud.points_m.take(rows, axis=0))
 
     @cached_property
     def features(self) -> FloatArray | None:
@@ -217,14 +217,13 @@ class _Partners:
         Returns:
             (n,) rows of the nearest points, -1 where none is within the gate.
         """
+        found = np.empty(len(rows), dtype=np.intp)
         tree, state = (*self._tree.parts, self._tree.order), (self._two, self._places_m, self._clear_m)
-        found, unsure = np.empty((2, len(rows)), dtype=np.intp)
-        count = _still_nearest(tree[0], tree[-1], rows, places_m, gate_m, *state, found, unsure)
 
         def work(first: int, last: int) -> None:
-            _nearest_again(*tree, rows, places_m, unsure[first:last], gate_m, *state, found)
+            _nearest(*tree, rows, places_m, first, last, gate_m, *state, found)
 
-        in_parts(work, count)
+        in_parts(work, len(rows))
         return found
 
 
@@ -239,35 +238,7 @@ def _moved(T: FloatArray, points: FloatArray) -> FloatArray:
 
 
 @compiled
-def _still_nearest(
-    points: FloatArray,
-    order: IntArray,
-    rows: IntArray,
-    places: FloatArray,
-    gate: float,
-    two: IntArray,
-    searched_at: FloatArray,
-    clear: FloatArray,
-    found: IntArray,
-    unsure: IntArray,
-) -> int:
-    """Write the partners that need no search, and the rows that need one; returns the number of these."""
-    count = 0
-    for i in range(len(rows)):
-        row, place = rows[i], places[i]
-        motion = np.sqrt(squared_distance(place, searched_at[row]))
-        if two[row, 0] >= 0 and 2.0 * motion < clear[row, 1] - clear[row, 0]:
-            found[i] = _within(points, order, place, two[row, 0], gate)
-        elif motion < clear[row, 0] - gate:
-            found[i] = -1
-        else:
-            unsure[count] = i
-            count += 1
-    return count
-
-
-@compiled
-def _nearest_again(
+def _nearest(
     points: FloatArray,
     axes: ByteArray,
     splits: FloatArray,
@@ -275,17 +246,26 @@ def _nearest_again(
     order: IntArray,
     rows: IntArray,
     places: FloatArray,
-    unsure: IntArray,
+    first: int,
+    last: int,
     gate: float,
     two: IntArray,
     searched_at: FloatArray,
     clear: FloatArray,
     found: IntArray,
 ) -> None:
+    """Write the partners of the points ``rows[first:last]``; those that may have changed are searched."""
     stack, bounds = working_space()
     squared, near = np.empty(2), np.empty(2, dtype=np.intp)
-    for i in unsure:
+    for i in range(first, last):
         row, place = rows[i], places[i]
+        motion = np.sqrt(squared_distance(place, searched_at[row]))
+        if two[row, 0] >= 0 and 2.0 * motion < clear[row, 1] - clear[row, 0]:
+            found[i] = _within(points, order, place, two[row, 0], gate)
+            continue
+        if motion < clear[row, 0] - gate:
+            found[i] = -1
+            continue
         within = (BEYOND_GATE * gate) ** 2
         if two[row, 1] >= 0:
             first_old, second_old = points[two[row, 0]], points[two[row, 1]]
