@@ -10,7 +10,7 @@ import tyro
 
 from app.cli.calibrate_depth import depth_lines
 from app.cli.calibrate_rig import calibrate_cameras, several_cameras
-from app.cli.text import print_json, say, say_progress
+from app.cli.text import print_json, say, say_progress, wrong_use
 from packetmesh.progress import drain
 from pipeline.config import Lens, Pattern
 
@@ -86,6 +86,8 @@ def calibrate(
     from pipeline.calibration.report import metrics, write_camera_folder
     from pipeline.calibration.shots import board_beside
 
+    if not images:
+        wrong_use("calibrate needs images of a board: files, a folder, or a pattern in quotes")
     board = board_beside(images, pattern, columns, rows, spacing_mm, dictionary, tag_spacing)
     if held_out < 0 or held_out == 1:
         raise InputError(f"--held-out {held_out} leaves no view to predict; try 2, or 0 for none")

@@ -38,6 +38,21 @@ def pair_run(tmp_path_factory):
     return out, json.loads(finished.stdout), finished.stderr
 
 
+@pytest.mark.parametrize(
+    ("command", "needs"),
+    [
+        (("calibrate", "--out", "cameras"), "needs images of a board"),
+        (("calibrate", "--out", "cameras", "--rig"), "needs images of a board"),
+        (("infer-depth", "--out", "depth"), "needs at least one photograph"),
+        (("lesson", "check"), "needs a file"),
+    ],
+)
+def test_a_command_without_its_files_names_them(capsys, tmp_path, monkeypatch, command, needs):
+    monkeypatch.chdir(tmp_path)
+    check_one_sentence(run(capsys, *command), 2, needs)
+    assert not list(tmp_path.iterdir())
+
+
 def test_json_is_the_only_thing_on_stdout_and_holds_what_is_promised(pair_run):
     _, metrics, stderr = pair_run
     assert {"scene", "preset", "nodes", "registration", "surface_before", "surface_after", "truth"} <= set(
