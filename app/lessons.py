@@ -92,10 +92,11 @@ def check_lessons(places: Iterable[Path]) -> tuple[list[OwnLesson], list[Fault]]
 
 
 def _files(place: Path) -> list[Path]:
-    """Return the file, the original of a translation, or the originals in a folder.
+    """Return the lesson files at a place: the originals in a folder, or one file, the original if it is a
+    translation.
 
     Raises:
-        InputError: there is none.
+        InputError: the place does not exist, or is a folder without a lesson.
     """
     if place.is_dir():
         found = sorted(path for path in place.glob(f"*{SUFFIX}") if _original(path) == path)

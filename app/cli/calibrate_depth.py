@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def depth_lines(report: CameraReport) -> Iterator[str]:
-    """Yield the bias of the depth sensor, and doubts about its scale."""
+    """Yield lines of text: doubts about the depth scale, then the sensor's bias or why it is unknown."""
     yield from report.depth_notes
     if report.depth is None:
         if report.depth_reason:

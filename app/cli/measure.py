@@ -137,7 +137,10 @@ def _measured(
     singles: dict[str, Place],
     factor: float,
 ) -> list[Measure]:
-    """Return all measures; the places are multiplied by the factor of the surface's scale."""
+    """Return all measures of the marks (--points) and of the places for --planes, --box and --hole.
+
+    ``factor`` is the scale of the surface and the marks over that of the places, which are multiplied by it.
+    """
     import numpy as np
 
     from pipeline.measuring import measures

@@ -76,7 +76,7 @@ def reconstruct(
 
 
 def recording_sentences(metrics: dict[str, Any]) -> list[str]:
-    """Return sentences on the frames of a recording; nothing for other images."""
+    """Return sentences on how a recording was tracked; an empty list if the images are no recording."""
     if "recording" not in metrics:
         return []
     from pipeline.folders.walk import lost_sentences

@@ -106,10 +106,14 @@ class UrgentLanes(dict[str, LatestWins]):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Submission:
-    """A step submitted to its lane. It can be submitted again while its earlier job is stopping."""
+    """One submission of a step to its lane, compared by identity.
+
+    A step can be submitted again while the job of its earlier submission is still stopping.
+    """
 
     step: Step
     key: tuple[Any, ...]
+    """Everything that the step's result depends on."""
 
 
 @dataclass(slots=True, eq=False)

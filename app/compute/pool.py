@@ -194,7 +194,10 @@ class ComputePool:
         return next((slot for slot in self._slots if slot.ticket is ticket), None)
 
     def _dispatch(self) -> None:
-        """Give waiting jobs to free processes. The caller holds the lock."""
+        """Give waiting jobs to free processes; let further processes start if jobs remain.
+
+        The caller holds the lock.
+        """
         for slot in self._slots:
             if slot.ticket is not None or not slot.ready:
                 continue

@@ -1,9 +1,9 @@
 """``python -m app.compute.prepared``: compute what a new server shows first, once, for all later servers.
 
-The results are in the environment of the installed packages, below the hash of everything that they depend
-on. After any change of code, assets or packages no server finds them, and each computes as ever. They are
-pickles: whoever can write there can also change the packages. A damaged file has a wrong checksum and counts
-as missing.
+The results are stored in the Python environment (``FOLDER``), in a folder named by the hash of everything
+that they depend on. After any change of code, assets or packages a server finds no folder of its hash and
+computes the results itself. They are pickles, which can run code when they are read; but a user who can write
+them can also change the installed packages. A damaged file has a wrong checksum and counts as missing.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def prepare() -> None:
 
 
 def take_prepared(folder: Path) -> None:
-    """Put the prepared results into the folder of a server's store, if there are any of this very program."""
+    """Put the prepared results of the same code and packages, if there are any, into a server's store."""
     with suppress(OSError):
         for path in (FOLDER / fingerprint()).iterdir():
             try:
@@ -73,5 +73,5 @@ def fingerprint() -> str:
 
 
 if __name__ == "__main__":
-    with suppress(OSError):  # packages that are not this user's
+    with suppress(OSError):  # this user may not write to the environment
         prepare()

@@ -23,13 +23,16 @@ class Turns:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="turns")
 
     def give(self, begin: Callable[[], Future[None] | None]) -> None:
-        """Queue ``begin``; the next one is called when its future is done, or after ``LONGEST_S``."""
+        """Queue ``begin``, which starts a drawing and returns its future, or None if there is none to draw.
+
+        The next in the queue is called when that future is done, or after ``LONGEST_S``.
+        """
         with contextlib.suppress(RuntimeError):  # the program is ending
             self._thread.submit(self._wait, begin)
 
     @contextlib.contextmanager
     def taken(self) -> Iterator[None]:
-        """Context in which this thread draws and no other does."""
+        """Context in which this thread draws: it waits for a queued drawing, and the queue waits for it."""
         with self._drawing:
             yield
 

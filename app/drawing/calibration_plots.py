@@ -114,7 +114,9 @@ def residuals_figure(calibration: Calibration) -> go.Figure:
 
 
 def radial_residuals_figure(residuals: RadialResiduals) -> go.Figure:
-    """Plot residuals along the radius with the mean of each band; a wave means a wrong lens model."""
+    """Plot the residuals' radial component over the distance from the principal point, with the mean of each
+    band of distances; a wave means a wrong lens model.
+    """
     figure = titled_figure(
         "Residuals along the radius", "distance from the principal point, px", "outward, px"
     )
@@ -139,7 +141,9 @@ def radial_residuals_figure(residuals: RadialResiduals) -> go.Figure:
 
 
 def uncertainty_figure(sd: ErrorMap, size_px: tuple[int, int], most_mm: float | None = None) -> go.Figure:
-    """Draw a map of the standard deviation of a point at ``sd.range_m``, in millimetres across the ray."""
+    """Draw a map of a point's standard deviation at the distance ``sd.range_m``, perpendicular to the ray, in
+    millimetres; the colours end at ``most_mm``.
+    """
     title = f"Uncertainty at {sd.range_m:g} m, one standard deviation"
     return _map_figure(sd, 1000.0 * sd.error_m, title, size_px, most_mm)
 
@@ -147,14 +151,18 @@ def uncertainty_figure(sd: ErrorMap, size_px: tuple[int, int], most_mm: float | 
 def difference_figure(
     halves: HalfDifference, size_px: tuple[int, int], most_mm: float | None = None
 ) -> go.Figure:
-    """Draw a map of the distance between the points that two halves of the views predict at the range."""
+    """Draw a map of the difference, in millimetres at ``halves.map.range_m``, between the cameras calibrated
+    from the even and from the odd views; the colours end at ``most_mm``.
+    """
     judged = "more than" if halves.beyond_noise else "no more than"
     title = f"Difference of two halves at {halves.map.range_m:g} m: {judged} noise"
     return _map_figure(halves.map, 1000.0 * halves.map.error_m, title, size_px, most_mm)
 
 
 def verdict_figure(judged: Verdict, sd: ErrorMap, size_px: tuple[int, int]) -> go.Figure:
-    """Draw a map of the 95 % error, with the line inside which a point is accurate enough."""
+    """Draw a map of the error that is not exceeded with a probability of 95 %, in millimetres, with a line at
+    the required accuracy.
+    """
     title = f"Error at {judged.range_m:g} m (95 %), required: {1000.0 * judged.accuracy_m:g} mm"
     figure = _map_figure(sd, 1000.0 * judged.error_m, title, size_px, 2000.0 * judged.accuracy_m)
     figure.add_contour(
@@ -238,7 +246,10 @@ def _dots(
 def _map_figure(
     errors: ErrorMap, values_mm: FloatArray, title: str, size_px: tuple[int, int], most_mm: float | None
 ) -> go.Figure:
-    """Draw a map of millimetres over the image; the pointer shows pixels and value."""
+    """Draw a map of (R, C) millimetres over the image; the pointer shows place, millimetres and error in px.
+
+    The colours end at ``most_mm``; None takes the 98 % quantile.
+    """
     figure = image_figure(title, size_px)
     known = values_mm[np.isfinite(values_mm)]
     most_mm = most_mm or (float(np.quantile(known, 0.98)) if len(known) else 1.0)
@@ -258,6 +269,6 @@ def _map_figure(
 
 
 def _round_number(value: float) -> float:
-    """Return the largest of 1, 2, 5, 10, 20, ... that is not above a value."""
+    """Return the largest of ..., 0.5, 1, 2, 5, 10, 20, ... that is not above a positive value."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9)))

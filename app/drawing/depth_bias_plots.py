@@ -61,8 +61,8 @@ def bias_curve(fit: DepthFit, to_m: float | None = None) -> BiasCurve:
 
 
 def bias_figure(curve: BiasCurve) -> go.Figure:
-    """Plot measured minus true depth over the distance: each view before and after the correction, the terms
-    with their 95 % band, and the noise of a pixel.
+    """Plot measured minus true depth over the distance: each view before and after the correction, the sum of
+    the fitted terms with its 95 % band, and the noise of a pixel.
     """
     figure = titled_figure("Bias of the depth sensor", "measured depth, m", "measured minus true, mm")
     z_m, off_m, sd_m = curve.z_m, curve.off_m, curve.sd_m
@@ -111,7 +111,7 @@ def bias_figure(curve: BiasCurve) -> go.Figure:
 
 
 def _add_noise(figure: go.Figure, z_m: FloatArray, noise_m: FloatArray) -> None:
-    """Add the two lines between which noise leaves 95 of 100 pixels of a sensor without bias."""
+    """Add the two lines between which 95 % of the pixels would be if the sensor had noise but no bias."""
     for side in (-BAND95, BAND95):
         figure.add_scatter(
             x=z_m,
@@ -148,7 +148,9 @@ def bias_map_figure(fit: DepthFit, at_m: float = 1.5) -> go.Figure:
 
 
 def noise_figure(fit: DepthFit) -> go.Figure:
-    """Plot the depth's standard deviation over the distance: parts of boards by tilt, and the law."""
+    """Plot the depth's standard deviation over the distance: as measured on parts of boards, coloured by
+    tilt, and by the fitted noise law at tilts of 0° and 45°.
+    """
     figure = titled_figure("Noise of the depth", "depth, m", "standard deviation, mm")
     points, law = fit.noise_points, fit.correction.noise
     angle_deg = np.degrees(np.arccos(np.clip(points.cosine, 0.0, 1.0)))
@@ -181,6 +183,6 @@ def noise_figure(fit: DepthFit) -> go.Figure:
 
 
 def depth_bias_figures(fit: DepthFit, at_m: float = 1.5) -> dict[str, go.Figure]:
-    """Return all figures by name; the map only if the fit has one."""
+    """Return all figures by name; the map, at ``at_m`` measured depth, only if the fit has one."""
     figures = {"bias": bias_figure(bias_curve(fit)), "noise": noise_figure(fit)}
     return figures | ({"map": bias_map_figure(fit, at_m)} if "map" in fit.terms else {})

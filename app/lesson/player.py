@@ -26,11 +26,14 @@ BAR = 12
 """Length of the bar for all votes, blocks."""
 TO_COME = "…"
 REPLACED = re.compile(rf"{FIELD.pattern}|!\[|\](?!\(https?://)")
-"""Parts of a file's markdown to replace: fields, and the start of an image or of a link outside the web."""
+"""Parts of a file's markdown to replace: fields, and the start of an image or of a link to no web address,
+which is then shown as text."""
 
 
 class LessonFolder(Generic[Look]):
-    """Leads through a lesson; each stop sets the screen's controls and asks before it explains."""
+    """A panel folder that leads through a lesson; each stop sets the screen's controls and asks before it
+    explains.
+    """
 
     def __init__(
         self,
@@ -45,17 +48,17 @@ class LessonFolder(Generic[Look]):
             ui: panel of the browser.
             lesson: the lesson.
             on_stop: called with the state that the stop shows.
-            numbers: returns the texts for the fields, once the screen shows the stop.
+            numbers: returns the texts for the fields; empty until the screen shows the stop.
         """
         self._written, self._on_stop, self._numbers = lesson, on_stop, numbers
         self._teaching, self._lecture = ui.teaching, ui.lecture
         self._known: dict[int, Numbers] = {}
-        """Numbers by stop."""
+        """Numbers by the index of the stop."""
         self._guesses: dict[int, int] = {}
         self._ballots: list[Ballot] = []
         """The votes on all questions that were asked, in their order."""
         self._open: dict[int, Ballot] = {}
-        """The votes since the lesson began, by stop."""
+        """The votes since the lesson began, by the index of the stop."""
         self._refused = False
         """Whether the last press of *Next* came before a guess."""
         self._translate()
@@ -103,7 +106,7 @@ class LessonFolder(Generic[Look]):
         return self._written
 
     def _add_languages(self, ui: Ui) -> None:
-        """Add the choice of the language, if there is one."""
+        """Add the choice of the language, if the lesson is translated and all its languages have a name."""
         lesson = self._written
         codes = [lesson.language, *lesson.translations]
         known = ui.teaching.languages
@@ -141,7 +144,7 @@ class LessonFolder(Generic[Look]):
             self._point_out()
 
     def reset(self) -> None:
-        """Leave the lesson, restore the settings of its stop and forget the guesses."""
+        """If a stop is shown, leave the lesson, forget the guesses and set the screen to its defaults."""
         if self._stop.value != OFF:
             self._stop.value = OFF
             self._picked()
@@ -206,7 +209,9 @@ class LessonFolder(Generic[Look]):
             self._write()
 
     def _point_out(self) -> None:
-        """Let the page show the stop in its size, give it the keys and open its folders."""
+        """Let the page show the stop in the chosen type size, open its folders, frame its controls, and give
+        the keys to the lesson; nothing without a stop.
+        """
         index = self._index()
         self._marked += 1
         if index < 0:
@@ -233,7 +238,7 @@ class LessonFolder(Generic[Look]):
             self._poll()
 
     def _voted(self, voter: int, vote: int) -> None:
-        """Count a vote of the class; each voter's last vote counts until the answer is shown."""
+        """Count a vote of the class (1: the first choice). A voter's last vote before the answer counts."""
         ballot = self._open.get(self._index())
         if self._waits() and ballot is not None:
             ballot.votes[voter] = vote - 1
@@ -266,7 +271,7 @@ class LessonFolder(Generic[Look]):
         return self._phrases.guess if self._lecture is None else self._phrases.voting
 
     def _write(self) -> None:
-        """Show the stop, and the answer once it was guessed."""
+        """Show the stop's text and question, and after a guess the answer."""
         index, phrases, waiting = self._index(), self._phrases, self._waiting()
         stop, ballot = self._lesson.stops[index], self._open.get(index)
         place = phrases.place.format(index + 1, len(self._names))
@@ -287,7 +292,9 @@ class LessonFolder(Generic[Look]):
 
     def _filled(self, text: str, index: int, fill: Callable[..., Text]) -> Text:
         """Replace the text's fields by the numbers of this stop, or those stored at another stop in the same
-        scene. Clauses about stops that the user has not visited are left out."""
+        scene. Clauses about stops that the user has not visited are left out. ``fill`` returns its text with
+        each match of a pattern replaced.
+        """
         now = self._numbers()
         if now:
             same = {at: known for at, known in self._known.items() if known[SCENE] == now[SCENE]}
@@ -317,7 +324,7 @@ def _with_texts(question: Question, read: Callable[[str], str]) -> Question:
 
 
 def keys_html(phrases: Phrases) -> Markup:
-    """Return the page's line about the keys, while they belong to the lesson and while to the dock."""
+    """Return HTML of the line about the keys: one text while they control the lesson, one while the dock."""
     names = ("→", phrases.space, "←", "1 2 3", "S")
     keys = escape(phrases.keys).format(*map(Markup("<b>{}</b>").format, names))
     dock_keys = escape(phrases.dock_keys).format(Markup("<b>Esc</b>"))

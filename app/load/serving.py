@@ -84,12 +84,14 @@ def serving(scene: str) -> Iterator[Serving]:
 
 
 def _serve(pipe: Connection, scene: str) -> None:
-    """Run as the main function of the process: serve, and answer until the other end is closed."""
+    """Run as the main function of the process: serve, send the address, then answer each "look" with the
+    server's state until the other end of the pipe is closed.
+    """
     from app.server import build_server
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     app = build_server(scene, port=0, ahead=True)
-    unused, numbers = itertools.count(), dict[object, int]()  # running jobs only: it keeps owners alive
+    unused, numbers = itertools.count(), dict[object, int]()  # running jobs only: a key keeps its owner alive
     try:
         pipe.send(app.url)
         while pipe.recv() == "look":

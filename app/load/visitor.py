@@ -59,7 +59,7 @@ class Visitor:
         self._thread.start()
 
     def leave(self) -> None:
-        """Close the connection after the current action; a mesh is not awaited."""
+        """End the thread after its current action, without waiting for a mesh, and wait for its end."""
         self._leaving.set()
         self._thread.join()
 

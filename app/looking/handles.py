@@ -16,9 +16,9 @@ from pipeline.kernels.geometry import rigid
 from pipeline.types import FloatArray
 
 ARROWS = 0.16
-"""Length of the arrows over the diagonal of the room."""
+"""Size of a plane's handle over the diagonal of the room; the handles of other cuts are half as large."""
 SHEET = 0.25
-"""Half the width of a plane's outline over the same."""
+"""Half the width of a plane's outline over the diagonal of the room."""
 LEAST_M = 0.01
 """Least length of a box's edge."""
 _CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -27,7 +27,7 @@ _SQUARE = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0,
 
 
 class CutHandles:
-    """The handles of a cut below a scene node; the page's script reads where they are."""
+    """The handles that move a cut, as children of a scene node; the page's script reads their poses."""
 
     def __init__(self, scene: viser.SceneApi, below: str, on_drag: Callable[[Cut, bool], object]) -> None:
         """Draw nothing yet; ``on_drag`` gets the cut and whether the drag has ended."""
@@ -39,7 +39,7 @@ class CutHandles:
 
     @property
     def planes(self) -> list[tuple[str, list[float]]]:
-        """For each plane of the cut (``planes_of``), its handle and its normal in the handle's frame."""
+        """Name of the handle and normal in its frame, for each plane of ``planes_of`` in the same order."""
         if isinstance(self._cut, Box):
             normals = [[-_side(row) * (axis == row // 2) for axis in range(3)] for row in range(6)]
         else:
@@ -47,7 +47,7 @@ class CutHandles:
         return [(grip.name, normal) for grip, normal in zip(self._grips, normals, strict=False)]
 
     def draw(self, cut: Cut, room: Room | None) -> None:
-        """Draw the handles of another cut; of none if it or the room is None."""
+        """Draw or move the handles so that they fit the cut; remove them if it or the room is None."""
         cut = None if room is None else cut
         if type(cut) is not type(self._cut) or not self._alive:
             self._remove()
@@ -97,7 +97,9 @@ class CutHandles:
         )
 
     def _arrange(self, box: Box, turned: bool = True) -> None:
-        """Put handles and outline where the box is; while one is dragged, leave the frame where it is."""
+        """Put handles and outline where the box is; ``turned`` is False while one is dragged, and then their
+        common frame stays.
+        """
         assert self._frame is not None
         assert self._outline is not None
         axes = box_axes(box)
@@ -117,7 +119,7 @@ class CutHandles:
         return lambda event: self._on_drag(self._dragged(row), event.phase == "end")
 
     def _dragged(self, row: int) -> Cut:
-        """Return the cut where its handles are now."""
+        """Return the cut moved to the handle ``row``, which was dragged; None if there is no cut."""
         cut, grip = self._cut, self._grips[row]
         at_m = np.asarray(grip.position, float)
         if isinstance(cut, Top):
@@ -130,7 +132,7 @@ class CutHandles:
         return None
 
     def follow(self, cut: Cut) -> None:
-        """Draw what belongs to the handle that is being dragged."""
+        """Take the cut that a handle is dragging, and move a box's other handles and outline with it."""
         self._cut = cut
         if isinstance(cut, Box) and self._alive:
             self._arrange(cut, turned=False)
@@ -165,7 +167,7 @@ def facing(normal: FloatArray) -> FloatArray:
 
 def turned(wxyz: Any) -> FloatArray:
     """Return the (3, 3) rotation of a quaternion, w first."""
-    from viser import transforms  # here, so that computing processes, which never draw, do not load it
+    from viser import transforms
 
     return np.asarray(transforms.SO3(np.asarray(wxyz, float)).as_matrix())
 

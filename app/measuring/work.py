@@ -157,7 +157,9 @@ def _rim_on_ray(
 
 
 def _scaled(surveys: Sequence[Survey], scale: Scale) -> tuple[Sequence[Survey], ScaleView]:
-    """Scale the surfaces so that a measure gets its true length; if that fails, return them unchanged."""
+    """Scale the surfaces so that a measure gets its true length. Returns them with the factor; if that fails,
+    unchanged with the reason.
+    """
     try:
         measured = _measured(surveys[scale.by.part], scale.by)[0]
         found = [survey.scaled(scale.true_m, measured) for survey in surveys]

@@ -114,7 +114,7 @@ def _agreeing(measured: dict[str, float]) -> Markup:
 
 
 def _recording(metrics: dict[str, Any]) -> Iterator[Markup]:
-    """Yield what became of a recording's frames; nothing for other images."""
+    """Yield paragraphs on how a recording was tracked; none if the images are no recording."""
     if "recording" not in metrics:
         return
     recording = metrics["recording"]

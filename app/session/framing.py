@@ -42,14 +42,14 @@ class Framing:
 
     @property
     def nodes(self) -> tuple[SceneNode, ...]:
-        """Return the camera nodes of the scene, if the scene itself is drawn and in one copy."""
+        """Return the scene's camera nodes; empty if another object is drawn, or two scenes side by side."""
         scene = self._session.results.view("scene")
         shows_scene = scene is not None and not self._by_screen and not self._wide
         return tuple(scene.nodes) if shows_scene else ()
 
     @property
     def clouds_m(self) -> list[FloatArray]:
-        """Return the (N, 3) points of each of these nodes in the world frame, with inferred ones if drawn."""
+        """Return (N, 3) thinned points of each of ``nodes``, world frame, with inferred ones if drawn."""
         nodes, depth = self.nodes, self._session.results.view("depth")
         clouds = [node.sensor for node in nodes]
         bare = self._session.current.drawn_below == BARE
@@ -62,7 +62,7 @@ class Framing:
         ]
 
     def forget_turned(self) -> None:
-        """Forget to which view the user has turned what is shown."""
+        """Forget the view to which the user has turned, and return to the app's own."""
         if self._views is not None:
             self._views.take("")
 

@@ -98,7 +98,7 @@ class Session:
         return None
 
     def _post_in_turn(self, function: Callable[..., None], *arguments: Any) -> None:
-        """Like ``post``, for a function that draws much: it waits until no other session draws."""
+        """Post a function that draws much: like ``post``, but it waits until no other session draws."""
         self._shared.turns.give(lambda: self._submit(function, *arguments))
 
     def close(self) -> None:

@@ -348,7 +348,7 @@ def _is_name(text: object) -> bool:
 
 
 def _is_picture(payload: object) -> bool:
-    """Whether this is empty, because the page could not draw, or a PNG file of a size that can be decoded."""
+    """Whether a payload is empty (the page could not draw) or a PNG file of up to ``MOST_VIEW_PX`` a side."""
     if payload == b"":
         return True
     if not isinstance(payload, bytes) or not payload.startswith(PNG) or len(payload) < 24:

@@ -52,7 +52,7 @@ _ADDRESS = re.compile(r"[A-Za-z0-9._:\[\]-]{1,260}")
 
 
 def is_own(headers: Mapping[str, str], allowed: frozenset[str] = _NOBODY) -> bool:
-    """Whether a request comes from this server's own page, or from no page.
+    """Whether a request is to this server and comes from its own page, or from no page (no ``Origin``).
 
     Args:
         headers: headers of the request; names in any case.

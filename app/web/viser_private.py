@@ -44,7 +44,7 @@ class AnyThreadEvent(asyncio.Event):
 
 
 def queue_from_any_thread(server: viser.ViserServer) -> None:
-    """Make queueing messages to all present and future browsers safe on all threads."""
+    """Make it safe to queue messages on any thread: to all browsers, and to each one that connects later."""
 
     def queue_to(connection: Any) -> None:
         connection.get_message_buffer().message_event.__class__ = AnyThreadEvent
@@ -159,7 +159,10 @@ def is_live(handle: Any) -> bool:
 
 
 def contents(container: Any, titles: tuple[str, ...] = ()) -> Iterator[tuple[Any, tuple[str, ...]]]:
-    """Yield each visible control in a folder or tab, with the titles of the folders and tabs around it."""
+    """Yield each visible control and folder in a container, also those in folders and tabs inside it.
+
+    Each comes with ``titles`` and the titles of the folders and tabs between the container and it.
+    """
     for child in list(container._children.values()):
         if not getattr(child, "visible", True):
             continue

@@ -40,7 +40,7 @@ class Piece(Generic[Kind]):
 
 
 class Gui:
-    """viser's ``GuiApi`` without methods that could put plain text into the page as markup."""
+    """viser's ``GuiApi``, with HTML and markdown methods that escape text that is not markup."""
 
     def __init__(self, gui: Any) -> None:
         """Wrap the panel of a browser, or of all browsers."""

@@ -56,7 +56,7 @@ class PictureArea:
         self._draw()
 
     def place(self) -> str:
-        """Return the pair by its pictures' names and the line in % for the address; empty for the start."""
+        """Return the two pictures' names and the line in % for the address; empty if they equal ``START``."""
         pair = PAIRS[self.chosen_pair]
         now = (pair.left, pair.right, float(self._split.value))
         return "" if now == START else place_text(*now)

@@ -261,7 +261,7 @@ def bias_of(
 
 
 def depth_file(views: BoardViews, camera: str, moment: str) -> Path | None:
-    """Return the depth image of a view, on the pixels of its photograph; None without one."""
+    """Return the file of the depth image on the pixel grid of a camera's photograph; None without one."""
     apart = camera.endswith(INFRARED)
     shots = _node(views, camera.removesuffix(INFRARED)).shots
     found = (one.depth for one in shots if one.moment == moment and (one.infrared is not None) == apart)

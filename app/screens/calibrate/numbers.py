@@ -48,7 +48,7 @@ def unseen_rms_px(camera: CameraView) -> float | None:
 
 
 def summary_table(cameras: Sequence[CameraView], names: Sequence[str] = ()) -> Markup:
-    """Return a table in HTML of errors and focal length, now and before views were dropped."""
+    """Return a table in HTML, a column per calibration: views used, errors, fx, k1 and the board's bend."""
     found = [camera.calibration for camera in cameras]
 
     def row(name: str, meaning: str, values: Sequence[str]) -> tuple[str, ...]:
@@ -196,7 +196,7 @@ def strongest_sentence(pair: Pair) -> str:
 
 
 def separating_views(pair: Pair) -> str:
-    """Return the kind of views that separates a pair of parameters."""
+    """Return the end of a sentence: which views separate two correlated parameters, often with the reason."""
     names = (pair.first, pair.second)
     if all(name in (*FOCAL, DISTANCE) for name in names):
         return (

@@ -39,7 +39,10 @@ class UseRow:
         self._text.content = Markdown.escape(sentence)
 
     def used(self, folder: str | None) -> None:
-        """Show that the chain uses a calibration's folder; None: that it uses none."""
+        """Show which calibration the chain uses, and forget the surface of an earlier calibration.
+
+        ``folder`` is the calibration's; None if the chain uses none.
+        """
         name = "" if folder is None else Path(folder).name
         in_use = Markdown("**In use** ({}): every later step uses it.").format(name)
         self._text.content = in_use if name else Markdown("")

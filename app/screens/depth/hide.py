@@ -85,7 +85,7 @@ class HideFolder:
         )
 
     def show(self, cloud: SeenSample, T_world_camera: FloatArray) -> None:
-        """Let the brush paint on this node's points, which have just been drawn."""
+        """Let the brush paint on this node's points in the scene, and draw the discs on them."""
         self._cloud, self._T_world_camera = cloud, T_world_camera
         self._drawing.draw(cloud, T_world_camera, self.discs)
 

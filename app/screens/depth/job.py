@@ -153,7 +153,9 @@ def residual_view(aligned: DepthMap, sensor: DepthMap) -> ResidualView:
 
 
 def judged_view(judged: JudgedDepth, blind: BoolArray) -> JudgedView:
-    """Return which share of the inferred depth is accepted on the pixels ``blind``, (H, W)."""
+    """Return the shares of the pixels ``blind``, (H, W), whose inferred depth is accepted, flying and out of
+    reach; NaN if there are none.
+    """
     if not blind.any():
         return JudgedView(float("nan"), float("nan"), float("nan"))
     kept, flying, far = (

@@ -1,4 +1,4 @@
-"""The folder with the depth network: the one that ships, or an uploaded one."""
+"""The panel folder that chooses the depth network: the one that ships, or an uploaded one."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class ModelFolder:
         self._advanced.visible = own is not None
 
     def load(self, view: ModelView | None) -> None:
-        """Show the tried network; None could not be used, and the previous one stays."""
+        """Show the result of trying a network; None if it could not be used and the previous one stays."""
         if view is None:
             self._status.content = KEPT
             return
@@ -114,7 +114,7 @@ class ModelFolder:
         self._table.content = model_table(view)
 
     def _picked(self) -> None:
-        """Take another file with the input size and normalisation of the file itself."""
+        """Try another file, with the input size and normalisation that the file itself states."""
         self._size.value, self._normalisation.value = (0.0, 0.0), AS_IN_FILE
         self._chosen()
 

@@ -49,7 +49,7 @@ class DepthPanel(Panel):
     drawn_below = "/depth"
 
     def build(self) -> None:
-        """Add two pictures to compare, alignment, colouring and one node's numbers; more is in folders."""
+        """Add the lesson, the main controls, two pictures to compare, one node's numbers, and the folders."""
         gui, session = self.gui, self.session
         self._look: DepthLook | None = None
         self._here, self._undrawn = False, True
@@ -102,7 +102,7 @@ class DepthPanel(Panel):
         return Controls(self.ui, fields, self.session.spec.config, self.session.edit)
 
     def on_spec(self, spec: Spec) -> None:
-        """Show the settings; remove filled depth of other settings, and painted discs of another scene."""
+        """Show the settings; remove depth filled under other settings, and discs painted in another scene."""
         for controls in self._controls:
             controls.write(spec.config)
         self._model.write(spec.config.depth)
@@ -114,7 +114,7 @@ class DepthPanel(Panel):
             self._hide.forget()
 
     def on_view(self, step: Step, view: Any) -> None:
-        """Draw new clouds."""
+        """Draw the new clouds, and show pictures and numbers of the chosen node."""
         if step != "depth":
             return
         self._node.offer(tuple(node.name for node in view.nodes))
@@ -157,7 +157,7 @@ class DepthPanel(Panel):
             self._show_canvas()
 
     def _inferred(self, node: DepthNode) -> tuple[Sample, tuple[int, int, int] | None] | None:
-        """Return the inferred points to draw, and their single colour; None for colours per point."""
+        """Return the inferred points to draw and their colour (None: each its own); None to draw none."""
         everywhere = self._drawn.value == EVERYWHERE
         if not everywhere and self._drawn.value != HOLES:
             return None
@@ -246,7 +246,7 @@ class DepthPanel(Panel):
         return numbers(scene, *shown)
 
     def _take_look(self, look: DepthLook) -> None:
-        """Set the controls for a stop of the lesson; hiding waits for the depth."""
+        """Set the controls for a stop of the lesson; its region is hidden once the depth is computed."""
         session = self.session
         with self.ui.atomic():
             self._area.set(look.left, look.right, look.split_share)
@@ -269,7 +269,7 @@ class DepthPanel(Panel):
         self._show_look()
 
     def _show_look(self) -> None:
-        """Hide what the stop hides, once the depth of its settings has been computed."""
+        """Hide and fill the region that the stop names, once the depth of its settings has been computed."""
         look, session = self._look, self.session
         if look is None or not session.results.fresh("depth", session.spec):
             return

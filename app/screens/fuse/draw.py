@@ -199,7 +199,8 @@ def in_window(
 
     Returns:
         (N,) positions from the left of the window, as shares of its width, and (N,) from the top of the
-        picture, as shares of its height; 1e9 for points behind the viewer.
+        picture, as shares of its height; 1e9 for points behind the viewer, or nearer to it than a tenth of
+        the distance to the middle of the lane.
     """
     right_m, up_m, away_m = points_m.T
     nearer = 1.0 + 2.0 * away_m * np.tan(0.5 * FOV_RAD) / picture_m

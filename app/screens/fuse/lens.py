@@ -133,11 +133,12 @@ class Distances:
     points_m: FloatArray
     """(N, 3) source frame."""
     T_home: FloatArray | None
+    """(4, 4) reference pose of the source in the target frame; None if it is unknown."""
     tree: cKDTree
     """Search tree of the target."""
 
     def at(self, T_target_source: FloatArray) -> tuple[FloatArray, float]:
-        """Return (N,) distances in metres at a pose, and their median (NaN for reference positions)."""
+        """Return (N,) distances at a pose and their median (NaN if ``T_home`` is known), in metres."""
         places_m = apply(T_target_source, self.points_m)
         if self.T_home is not None:
             return np.linalg.norm(places_m - apply(self.T_home, self.points_m), axis=1), float("nan")

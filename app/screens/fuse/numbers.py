@@ -23,7 +23,7 @@ _OFF: dict[Reference, tuple[str, str]] = {
 
 
 def winner(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markdown:
-    """Return a sentence on which method ends nearest to the reference position."""
+    """Return a sentence on which method ends nearest to the reference position, or on why that is unknown."""
     if reference == "cloud":
         return Markdown(
             "The truth of this scene is not known. RMSE alone does not show which method is better, "
@@ -56,7 +56,7 @@ def _alike(one_m: float, other_m: float) -> bool:
 
 
 def _loss(ranking: list[tuple[float, str]]) -> str:
-    """Return a sentence if a method other than CEICP ends before the best CEICP in the race, else nothing."""
+    """Return a sentence if another method ends clearly nearer than the best CEICP; empty otherwise."""
     best_m, best = ranking[0]
     ours_m = [error_m for error_m, label in ranking if "CEICP" in label]
     return " So CEICP loses here." if ours_m and "CEICP" not in best and not _alike(best_m, ours_m[0]) else ""
@@ -146,7 +146,7 @@ def _stop_word(reason: str) -> str:
 
 
 def places_table(view: FuseView) -> Markup:
-    """Return a table of the chain's own registrations."""
+    """Return sentences on the chain's own registrations and a table of them; empty if there are none."""
     if not view.rows:
         return Markup("")
     rows = [_place_row(row) for row in view.rows]

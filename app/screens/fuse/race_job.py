@@ -202,7 +202,7 @@ class Watch:
     lens: Lens | None
 
     def seen(self, T_target_source: FloatArray) -> dict[str, Any]:
-        """Return the fields of a ``RaceStep`` that depend on the points' positions at a pose."""
+        """Return the fields ``gap_m``, ``shades`` and ``lens`` of a ``RaceStep`` at a pose, by name."""
         distances_m, gap_m = self.distances.at(T_target_source)
         lens = np.empty((0, 3), np.uint8) if self.lens is None else self.lens.at(T_target_source)
         return {"gap_m": gap_m, "shades": shades_of(distances_m), "lens": lens}

@@ -49,7 +49,11 @@ SEEN_DRIFT = 0.2
 
 
 def enlarging(view: WalkView) -> int:
-    """Return the largest factor at which the drift is drawn no larger than ``SEEN_DRIFT`` allows."""
+    """Return the factor by which the drift is enlarged in the drawing.
+
+    This is the largest of ``ENLARGED`` at which the drawn drift is at most ``SEEN_DRIFT`` times the path's
+    extent; 1 if none is.
+    """
     drift_m = float(np.nanmax(view.drift_m))
     most_m = SEEN_DRIFT * float(np.linalg.norm(np.nanmax(view.at_m, axis=0) - np.nanmin(view.at_m, axis=0)))
     return max((times for times in ENLARGED if times * drift_m <= most_m), default=1)

@@ -1,4 +1,4 @@
-"""Drawing of a delivery in the room: cameras with their arrived pictures, moving frames, and the mesh."""
+"""Drawing of a delivery in the room: cameras with their arrived pictures, packets in flight, and the mesh."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from network_sim.types import Cause
 from pipeline.types import FloatArray
 
 FRUSTUM = 0.08
-"""Depth of a frustum over the distance from the cameras to what they see."""
+"""viser's ``scale`` of a frustum over D, the distance from the cameras' mean to the middle of their view."""
 BESIDE = 0.5
-"""Distance from the cameras to the drawn sink, in the same unit: the real sink may be far outside."""
+"""Distance at which the sink is drawn to the left of the cameras, over D; the real one may be far away."""
 ELEVATION_RAD = np.radians(40.0)
 FILLED = 0.8
 """Share of the window that the drawing fills."""
 PACKET_M, POINT_M = 0.011, 0.008
-"""Sizes of a packet and of a point, in the same unit."""
+"""Size of a packet over D, and size of a point in metres."""
 NAME_BELOW = 0.05
-"""Distance of a name below its camera, in the same unit: there it covers neither pictures nor mesh."""
+"""Distance of a name below its camera over D: there it covers neither pictures nor mesh."""
 NARROW_PX = 600.0
 """Width below which only the cameras' names are shown, without data and energy."""
 LONGEST = 8
-"""Letters of the energy that can still be added after a node's name and share."""
+"""Number of letters reserved for the energy, which is written after a node's name and share."""
 LIT = (255, 230, 0)
 BUSY, DOWN = BRAND, LOSS
 FULL, EMPTY = DELIVERED, SOURCE
@@ -38,7 +38,7 @@ Number = tuple[int, int, int]
 
 
 class DeliveryDrawing:
-    """A delivery below a scene node, at any time."""
+    """Drawing of a delivery below a scene node; it can show any time of the delivery."""
 
     def __init__(self, scene: viser.SceneApi, below: str, view: DeliveryView) -> None:
         clear(scene, below)
@@ -148,14 +148,14 @@ class DeliveryDrawing:
         self._show_causes(now_ns, shown_ns)
 
     def show_moment(self, moment: MomentView | None, most_j: float = 0.0) -> bool:
-        """Show pictures, clouds and mesh of a moment; None is before anything has arrived.
+        """Show pictures, clouds and mesh of a moment; None shows the state before anything has arrived.
 
         Args:
             moment: the moment.
             most_j: energy at which a node's battery has the colour of an empty one.
 
         Returns:
-            Whether a new mesh stands over the one before, which goes when the moment is shown once more.
+            Whether the previous mesh is still drawn with the new one; showing the moment again removes it.
         """
         self._show_batteries(moment, most_j)
         if moment is self._shown:
@@ -176,14 +176,14 @@ class DeliveryDrawing:
         self._show_mesh(b"" if moment is None else moment.glb)
 
     def _stand(self, row: int, T_world_camera: FloatArray) -> None:
-        """Put a camera where its cloud is: a rig may not know its poses before registration."""
+        """Move a camera's frustum and name to a pose (registration may change it), and update the name."""
         place(self._frusta[row], T_world_camera)
         below_m = np.array((0.0, 0.0, NAME_BELOW * self._size_m))
         self._names[row].position = T_world_camera[:3, 3] - below_m + self._lifts_m[row]
         self._names[row].text = self._name(row)
 
     def _name(self, row: int) -> str:
-        """Return a camera's name with the data that it has sent and the energy that it has used."""
+        """Return a camera's label: its name and, in a wide window, the arrived share and used energy."""
         node, shown = self._view.nodes[row], self._shown
         if node.row < 0:
             return f"{node.name} · off"
@@ -317,7 +317,7 @@ class DeliveryDrawing:
             self._names[-1].anchor = "top-center"
 
     def _add_moved(self, cameras_m: FloatArray) -> None:
-        """Draw radios that are not at their cameras."""
+        """Draw a line from each camera to its radio if the radio is elsewhere."""
         for node, camera_m in zip(self._view.nodes, cameras_m, strict=True):
             radio_m = self.place_m(node.name)
             if np.linalg.norm(radio_m - camera_m) > 1e-3:
@@ -349,7 +349,7 @@ class DeliveryDrawing:
             self._lines("to-client", np.array([[sink_m, cloud_m], [cloud_m, client_m]]))
 
     def _add_routes(self) -> None:
-        """Draw a line between each pair of nodes that sent a frame."""
+        """Draw a line from each sender to each receiver of its frames."""
         frames = self._flights.frames
         frames = frames.where(frames.what == What.AIR)
         pairs = np.unique(np.column_stack([frames.node, frames.peer]), axis=0)

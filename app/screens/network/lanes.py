@@ -23,7 +23,10 @@ HALTS = (What.AIR, What.LOSS, What.DROP, What.ARRIVE, What.EXPIRE)
 def lanes_of(
     delivery: DeliveryView | None, runs: Sequence[NetworkView], frames: Sequence[Frames]
 ) -> list[Lane]:
-    """Return the lanes of a delivery, or of runs on streets, each with its frames."""
+    """Return the dock's lanes: the frames and the growth of a delivery, or the frames of each street run.
+
+    A single street run also has a lane of curves. ``frames`` are the delivery's, or each run's.
+    """
     if delivery is not None:
         return [frames_lane(delivery.run, frames[0]), growth_lane(delivery)]
     lanes: list[Lane] = [frames_lane(*one) for one in zip(runs, frames, run_names(runs), strict=True)]

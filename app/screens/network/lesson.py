@@ -212,7 +212,7 @@ def _frame_numbers(view: DeliveryView, frames: Frames) -> dict[str, str]:
 
 
 def _worst(view: DeliveryView, end: MomentView) -> dict[str, str]:
-    """Return the camera with the least depth, and the share of its depth that arrived."""
+    """Return the camera of whose measured depth the smallest share arrived, and that share, as texts."""
     name, node = min(
         zip((one.name for one in view.nodes), end.nodes, strict=True), key=lambda one: one[1].depth_share
     )

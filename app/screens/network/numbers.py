@@ -45,7 +45,7 @@ SHARES = ("ratio", "share", "coverage", "redundancy")
 
 
 def metric_tables(views: Sequence[NetworkView]) -> tuple[Markup, Markup]:
-    """Return HTML of the main metrics, and of the others, without those that are zero in all runs."""
+    """Return two HTML tables: the main metrics, and the others except those that are zero in all runs."""
     by_name: dict[str, list[Metric | None]] = {}
     for index, view in enumerate(views):
         for name, metric in view.metrics.items():
@@ -62,7 +62,7 @@ def metric_tables(views: Sequence[NetworkView]) -> tuple[Markup, Markup]:
 
 
 def verdict(views: Sequence[NetworkView]) -> Markdown:
-    """Return a sentence on what the second of two runs gains and loses; empty if not comparable."""
+    """Return a sentence that compares images and coverage of two runs; empty unless both runs have both."""
     nothing = Markdown("")
     if len(views) != 2:
         return nothing
@@ -104,7 +104,7 @@ def value_text(name: str, metric: Metric | None) -> str:
 
 
 def runs_summary(views: Sequence[NetworkView]) -> Markdown:
-    """Return a sentence on what was simulated, and on a timeline that is cut."""
+    """Return sentences on what was simulated and, if a timeline is cut, on the part that it shows."""
     sentences: list[str] = []
     for view in views:
         name = Markdown("**{}**: ").format(view.label) if len(views) > 1 else Markdown("")

@@ -93,7 +93,7 @@ class NetworkSetup:
             ui.when_changed(handle, on_change)
 
     def add_what_if(self, below: str) -> None:
-        """Add the faults of nodes; they are drawn below this scene node."""
+        """Add the controls of the nodes' faults; the faults are drawn below this scene node."""
         self.what_if = WhatIf(self._ui, below, self._on_change)
 
     def add_advanced(self) -> None:

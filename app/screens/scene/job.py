@@ -28,7 +28,10 @@ def scene_job(store: Store, spec: Spec) -> Generator[Progress, None, SceneView]:
 
 
 def averaged_view(rig: Rig) -> AveragedView | None:
-    """Return the numbers of cameras that stand, the mean over them; None for single images."""
+    """Return numbers on the averaged depth of cameras that stand; None if no depth is averaged.
+
+    Over several cameras, counts are the largest, shares the mean, and the standard deviation the median.
+    """
     frames = [frame for frame in rig.frames if frame.averaging is not None]
     found = [frame.averaging for frame in frames if frame.averaging is not None]
     if not found:

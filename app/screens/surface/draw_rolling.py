@@ -1,4 +1,4 @@
-"""Drawing of the rolling ball: the mesh is sent once, in pieces; then its newest part, front and ball."""
+"""Drawing of the rolling ball: the mesh is sent once, in pieces; steps send the newest part, front, ball."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from app.screens.surface.walk_view import WalkView
 from pipeline.types import FloatArray, IntArray
 
 PIECES = 100
-"""Approximate number of meshes into which the whole is split."""
+"""Approximate number of pieces into which the whole mesh is split."""
 POINT_SHARE = 0.3
 """Size of a point over the smallest radius."""
 BALL_OPACITY = 0.45
@@ -20,7 +20,7 @@ WIRE = (70, 84, 104)
 
 
 class RollingDrawing:
-    """One walk below a scene node, at any of its steps.
+    """Drawing of one walk of the ball below a scene node; it can show any step.
 
     The browser remembers a node's state by its name, so every walk needs a node of its own.
     """
@@ -45,7 +45,7 @@ class RollingDrawing:
         )
 
     def show(self, done: int, place: int) -> None:
-        """Show the mesh after ``done`` steps, and the ball at rest or at a place (from 1) on its next arc."""
+        """Show the mesh after ``done`` steps, and the ball at rest (``place`` 0) or on its next arc."""
         view = self._view
         if done != self._done:
             self._done = done
@@ -102,7 +102,10 @@ class RollingDrawing:
     def _add_mesh(
         self, name: str, triangles: IntArray, ball: int, points_m: FloatArray | None = None
     ) -> list[viser.MeshHandle]:
-        """Add a hidden mesh, in a close-up with its edges below; with all points if it will change."""
+        """Add a hidden mesh and, in a close-up, its edges as a child node. Returns their handles.
+
+        A mesh whose triangles will change gets all points (``points_m``), others only those that they use.
+        """
         if points_m is None:
             used, corners = np.unique(triangles, return_inverse=True)
             points_m, triangles = self._view.points_m[used], corners.reshape(-1, 3)
@@ -118,7 +121,7 @@ class RollingDrawing:
 
 
 def pieces(view: WalkView) -> tuple[IntArray, IntArray]:
-    """Return (P,) the end of each piece of the triangles, and (P,) the index of the ball that made it."""
+    """Return (P,) end index of each piece of the triangles, and (P,) index of the ball that made it."""
     count = len(view.triangles)
     ball = np.repeat(view.step_radius, np.diff(view.step_ends, prepend=0))
     size = -(-count // PIECES)

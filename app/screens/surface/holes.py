@@ -36,7 +36,7 @@ WHICH: tuple[Which, ...] = ("after", "before")
 
 
 class HolesFolder:
-    """A list of the holes, the chosen one in the scene, and its cause."""
+    """Folder with the list of holes, the cause of the chosen one, and a slider that fills small holes."""
 
     def __init__(
         self,

@@ -86,7 +86,10 @@ def fill_job(store: Store, spec: Spec, longest_cm: float) -> Generator[Progress,
 
 
 def _marked_glb(filled: Filled) -> bytes:
-    """Return the surface with every invented triangle in one colour, on vertices of its own."""
+    """Return the surface as binary glTF, with all triangles that fill holes in one colour.
+
+    Each of them gets its own three vertices, so that its colour does not spread to its neighbours.
+    """
     surface = filled.surface
     count, corners = len(surface.vertices_m), surface.triangles[filled.filled].ravel()
     own = count + np.arange(len(corners), dtype=np.int32).reshape(-1, 3)

@@ -71,7 +71,7 @@ def _textured_view(surface: SurfaceResult, in_photographs: Callable[[Surface], T
 
 
 def spacing_of(clouds: FusedCloud) -> SpacingView:
-    """Return the histogram of nearest-point distances, up to five standard deviations over the mean."""
+    """Return the histogram of the fused cloud's nearest-neighbour distances, from 0 to r_F + 5 sigma_D."""
     r_F_m, sigma_D_m = clouds.r_F_m, clouds.sigma_D_m
     distances_m = nearest_distances_m(clouds.fused.points_m)
     counts, edges_m = np.histogram(distances_m, bins=HISTOGRAM_BINS, range=(0.0, r_F_m + 5 * sigma_D_m))

@@ -50,7 +50,7 @@ def on_slider_mm(radius_m: float) -> float:
 
 
 def slider_range_mm(spacing: SpacingView, radii_m: Sequence[float]) -> tuple[float, float]:
-    """Return the slider's range: from half the points' spacing to clearly too large balls."""
+    """Return the radius slider's range, mm: half the mean spacing (>= 0.5) to clearly too large balls."""
     widest_m = 1.5 * (spacing.r_F_m + 4.0 * spacing.sigma_D_m)
     most_m = max(*radii_m, widest_m, 6.5 * spacing.r_F_m)
     return max(0.5, math.floor(500.0 * spacing.r_F_m)), math.ceil(1000.0 * most_m)

@@ -18,7 +18,7 @@ within which another point is as near."""
 
 
 def unused_view(cloud: PointCloud, surface: Surface, size_m: float, most: int = MOST_POINTS) -> UnusedView:
-    """Return the points of a cloud that no triangle of its surface uses.
+    """Return the points of a cloud that no triangle of its surface uses; all if the surface is nearly empty.
 
     Args:
         cloud: the cloud over which the ball rolled.

@@ -29,8 +29,9 @@ DRAWS = 3
 """Further draws of the points that must lead to the same pose, …"""
 MOST_SPREAD_VOXELS = 0.5
 """… within so many fiftieths of the target's extent: 3 cm in a view of 3 m."""
-MORE_POINTS = 4 * QUICK_POINTS
-"""Points of an answer and its draws where those of quick registrations differ by more."""
+MORE_POINTS = (4 * QUICK_POINTS, 16 * QUICK_POINTS)
+"""Points of an answer and its draws where those of quick registrations differ by more: first so many, then so
+many."""
 LEAST_TURN_DEG = 10.0
 """A rival turned by less is described by its distance."""
 
@@ -73,8 +74,9 @@ class Checks:
             return Checked(answer, (self._rival_text(answer, before),), float("nan"), settled=False)
         doubts: tuple[str, ...] = ()
         spread_m, most_m = self._spread_m(answer), MOST_SPREAD_VOXELS * default_voxel_m(self.target)
-        if most_m < spread_m < np.inf:
-            answer, spread_m = self._with_more_points(answer)
+        for points in MORE_POINTS:
+            if most_m < spread_m < np.inf:
+                answer, spread_m = self._with_more_points(answer, points)
         if spread_m <= most_m and np.isnan(answer.evidence.color_correlation):
             best, doubts = self._unless_rivalled(way, answer)
             if best is not answer:
@@ -90,14 +92,14 @@ class Checks:
         """Whether no free space can refute a pose, since a cloud has no viewpoint."""
         return self.judge.source.view is None or self.judge.target.view is None
 
-    def _with_more_points(self, answer: Candidate) -> tuple[Candidate, float]:
+    def _with_more_points(self, answer: Candidate, points: int) -> tuple[Candidate, float]:
         """Return the answer with more points, and its spread; as it was, with infinity, if that fails."""
         try:
-            T = self._again(answer, self.config.seed, MORE_POINTS)
+            T = self._again(answer, self.config.seed, points)
         except ReconstructionError:
             return answer, float("inf")
         better = replace(answer, T_target_source=T, evidence=self.judge(T))
-        return better, self._spread_m(better, MORE_POINTS)
+        return better, self._spread_m(better, points)
 
     def _spread_m(self, answer: Candidate, points: int = QUICK_POINTS) -> float:
         """Return the largest point error between an answer and further draws of the points from its start."""

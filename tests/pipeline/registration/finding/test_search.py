@@ -121,7 +121,7 @@ def test_where_few_points_lead_apart_more_points_decide(monkeypatch, clouds, ans
     """An answer 5 cm from where the draws of its points lead is registered again, with more of them."""
     source, target = clouds
     checks = Checks(source, target, Judge(Surface(source), Surface(target)), CONFIG)
-    monkeypatch.setattr(doubts, "MORE_POINTS", 2000)
+    monkeypatch.setattr(doubts, "MORE_POINTS", (2000,))
     rough = Candidate(
         np.eye(4), rigid(np.eye(3), [0.05, 0.0, 0.0]) @ T_TRUE, 0.3, "p2q", answer.candidate.evidence
     )
