@@ -19,7 +19,7 @@ def import_rig(
     intrinsics: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Convert a recording to a rig: of a data set, COLMAP, nerfstudio, ROS or a telephone.
+    """Convert a recording from a data set, COLMAP, nerfstudio, ROS or a telephone to a rig.
 
     Data sets: TUM, ICL-NUIM, 7-Scenes, ScanNet, SUN RGB-D, Redwood and Open3D. Telephones: Stray Scanner,
     Polycam, Record3D and 3D Scanner App. Depth cameras: Azure Kinect and Femto.
@@ -32,7 +32,7 @@ def import_rig(
             several cameras gives one node for each camera. With `all`, the folder gets every frame of one
             camera in TUM's form instead, for `packetmesh reconstruct --recording` and other programs.
         depth_scale: Depth units per metre; without it, the value of the kind of recording.
-        intrinsics: Intrinsics of the colour camera, if the recording has no file of them or another file is
+        intrinsics: File with the intrinsics of the colour camera, if the recording has none or another one is
             meant.
         json: Print the frames that were found and used as one JSON object.
     """

@@ -124,9 +124,11 @@ class JudgedView:
 
 @dataclass(frozen=True, slots=True)
 class DepthNode:
-    """Sensor depth and inferred depth of one node."""
+    """Sensor depth and inferred depth of one node; points are in the camera frame."""
 
     name: str
+    T_world_camera: FloatArray
+    """(4, 4) pose that the rig gives the camera."""
     pictures: dict[str, Picture]
     """Pictures by ``app.screens.depth.view.PictureName``, all of one size."""
     sensor: Sample

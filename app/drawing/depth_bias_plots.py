@@ -31,8 +31,8 @@ class BiasCurve:
     """(K,) measured depth."""
     off_m: FloatArray
     """(K,) measured minus true depth, without the map term."""
-    sd_m: FloatArray
-    """(K,) standard error of ``off_m``."""
+    band_m: FloatArray
+    """(K,) half-width of the 95 % interval of ``off_m``."""
     noise_m: FloatArray | None
     """(K,) standard deviation of the depth of a board that faces the sensor; None if unknown."""
     far_m: float
@@ -54,10 +54,12 @@ def bias_curve(fit: DepthFit, to_m: float | None = None) -> BiasCurve:
     """
     near_m, far_m = fit.correction.range_m
     z_m = np.linspace(min(near_m, 0.4), to_m or 1.25 * far_m, STEPS)
-    off_m, sd_m = fit.bias_m(z_m)
+    off_m, band_m = fit.bias_m(z_m)
     law, points = fit.correction.noise, fit.points
     noise_m = None if law is None else law.sd_m(z_m, np.ones(STEPS))
-    return BiasCurve(fit.terms, z_m, off_m, sd_m, noise_m, far_m, points.z_m, points.before_m, points.after_m)
+    return BiasCurve(
+        fit.terms, z_m, off_m, band_m, noise_m, far_m, points.z_m, points.before_m, points.after_m
+    )
 
 
 def bias_figure(curve: BiasCurve) -> go.Figure:
@@ -65,10 +67,10 @@ def bias_figure(curve: BiasCurve) -> go.Figure:
     the fitted terms with its 95 % band, and the noise of a pixel.
     """
     figure = titled_figure("Bias of the depth sensor", "measured depth, m", "measured minus true, mm")
-    z_m, off_m, sd_m = curve.z_m, curve.off_m, curve.sd_m
+    z_m, off_m, band_m = curve.z_m, curve.off_m, curve.band_m
     figure.add_scatter(
         x=np.concatenate([z_m, z_m[::-1]]),
-        y=1000.0 * np.concatenate([off_m - BAND95 * sd_m, (off_m + BAND95 * sd_m)[::-1]]),
+        y=1000.0 * np.concatenate([off_m - band_m, (off_m + band_m)[::-1]]),
         fill="toself",
         fillcolor=faint(TARGET),
         line={"width": 0},

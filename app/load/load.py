@@ -93,7 +93,7 @@ class Load:
             "store by quarters: "
             + ", ".join(f"{quarter['files']} files {quarter['bytes'] / 1e6:.0f} MB" for quarter in quarters),
             f"lost: {len(record['lost'])} of {record['browsers']} browsers; jobs of browsers that had left: "
-            f"{record['strays_beyond_patience']} beyond {PATIENCE_S:g} s, the longest "
+            f"{record['strays_beyond_patience']} beyond {PATIENCE_S + 2.0 * LOOK_S:g} s, the longest "
             f"{record['longest_stray_s']:.1f} s",
         )
 

@@ -167,9 +167,7 @@ def facing(normal: FloatArray) -> FloatArray:
 
 def turned(wxyz: Any) -> FloatArray:
     """Return the (3, 3) rotation of a quaternion, w first."""
-    from viser import transforms
-
-    return np.asarray(transforms.SO3(np.asarray(wxyz, float)).as_matrix())
+    return np.asarray(viser.transforms.SO3(np.asarray(wxyz, float)).as_matrix())
 
 
 def _side(row: int) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 import viser
 
-from app.compute.records import SceneNode
+from app.compute.records import DepthNode, SceneNode
 from app.drawing.cameras import VIEW_FOV_RAD, look, stage_of
 from app.session.views import View, Views
 from app.window.panel import PanelSession
@@ -53,7 +53,7 @@ class Framing:
         nodes, depth = self.nodes, self._session.results.view("depth")
         clouds = [node.sensor for node in nodes]
         bare = self._session.current.drawn_below == BARE
-        if depth is not None and not bare and len(depth.nodes) == len(nodes):
+        if depth is not None and not bare and _same_cameras(nodes, depth.nodes):
             clouds = [one.fused for one in depth.nodes]
         thinned = [one.points_m[:: max(1, len(one.points_m) // MOST_POINTS)] for one in clouds]
         return [
@@ -111,3 +111,11 @@ def _view_of(clients: Iterable[viser.ClientHandle]) -> View | None:
     """Return the view of the first browser; None if there is none."""
     camera = next((client.camera for client in clients), None)
     return None if camera is None else np.array([camera.position, camera.look_at])
+
+
+def _same_cameras(nodes: tuple[SceneNode, ...], depths: tuple[DepthNode, ...]) -> bool:
+    """Return whether a scene's nodes have this depth, which may still be that of the scene before."""
+    return len(nodes) == len(depths) and all(
+        np.array_equal(node.T_world_camera, depth.T_world_camera)
+        for node, depth in zip(nodes, depths, strict=True)
+    )

@@ -18,6 +18,7 @@ from pipeline.calibration.depth_terms import (
     Problem,
     chosen_terms,
     columns_of,
+    half_width,
     map_directions,
     robust_problem,
     rows_of_views,
@@ -72,14 +73,14 @@ class DepthFit:
     """Sentence on terms that the views cannot separate, and on views to take; empty if there are none."""
 
     def bias_m(self, z_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return (N,) measured minus true depth at (N,) depths, without the map, and its standard error."""
+        """Return (N,) measured minus true depth at (N,) depths without the map, and half its 95 % interval."""
         powers = {"offset": np.ones_like(z_m), "scale": z_m, "curvature": z_m**2}
         used = [powers[term] for term in self.terms if term in powers]
         columns = np.array(used).reshape(len(used), len(z_m))
         variance_m2 = np.einsum("in,ij,jn->n", columns, self.covariance[: len(used), : len(used)], columns)
         plain = self.correction
         off_m = plain.offset_m + (plain.scale - 1.0) * z_m + plain.curvature_per_m * z_m**2
-        return -off_m, np.sqrt(variance_m2)
+        return -off_m, half_width(len(self.points.z_m)) * np.sqrt(variance_m2)
 
     def metrics(self) -> dict[str, Any]:
         """Return the block ``depth`` of ``packetmesh calibrate --json``."""

@@ -109,6 +109,11 @@ def rows_of_views(samples: DepthSamples) -> list[IntArray]:
     return [np.flatnonzero(samples.view == view) for view in np.unique(samples.view)]
 
 
+def half_width(views: int, together: int = 1) -> float:
+    """Return the half-width of a 95 % interval of ``together`` parameters, in standard errors (Student's t)."""
+    return float(stdtrit(views - 1, 1.0 - 0.025 / together))
+
+
 @dataclass(frozen=True, slots=True)
 class Problem:
     """Weighted problem y = X x + L e, where e are the lens's errors with mean 0 and variance 1.
@@ -179,8 +184,8 @@ class Problem:
         return (len(each) - 1) / len(each) * off.T @ off + shifts @ shifts.T
 
     def wide(self, together: int = 1) -> float:
-        """Return the half-width of a 95 % interval, in standard errors, for ``together`` parameters."""
-        return float(stdtrit(len(self.views) - 1, 1.0 - 0.025 / together))
+        """Return ``half_width`` for the views of this problem."""
+        return half_width(len(self.views), together)
 
     def residuals_m(self, columns: IntArray) -> FloatArray:
         """Return (N,) true minus corrected depth."""

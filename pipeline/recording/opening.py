@@ -199,7 +199,7 @@ def _photographs(recording: Recording, numbers: Sequence[int]) -> tuple[list[Rgb
         try:
             found.append(recording.frame(number))
         except InputError as error:
-            notes.append(f"{error}: frame {number} gives no colours")
+            notes.append(f"frame {number} gives no colours: {error}")
     if not found:
         raise InputError(notes[0])
     return found, notes

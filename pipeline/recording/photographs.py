@@ -63,7 +63,7 @@ def iterate_photographs(
         try:
             frame = replace(recording.frame(number), T_world_camera=T, pose_known=True)
         except InputError as error:
-            notes.append(f"{error}: frame {number} gives no colours")
+            notes.append(f"frame {number} gives no colours: {error}")
             continue
         blend.add(frame)
         if number in views:

@@ -197,19 +197,21 @@ def strongest_sentence(pair: Pair) -> str:
 
 def separating_views(pair: Pair) -> str:
     """Return the end of a sentence: which views separate two correlated parameters, often with the reason."""
-    names = (pair.first, pair.second)
-    if all(name in (*FOCAL, DISTANCE) for name in names):
+    names = {pair.first, pair.second}
+    if names == set(FOCAL):
+        return "both are too long if the board is thought too far away; more tilted views tell its distance"
+    if names <= {*FOCAL, DISTANCE}:
         return (
             "a longer focal length with a board farther away looks nearly the same; more tilted views "
             "separate them"
         )
-    if all(name in (*CENTER, *LEANING) for name in names):
+    if names & set(CENTER) and names & set(LEANING):
         return (
             "a tilted lens looks nearly like a shifted one; boards in all corners, some of them turned "
             "by 90°, separate them"
         )
-    if any(name in (*CENTER, *LEANING) for name in names):
+    if names & {*CENTER, *LEANING}:
         return "views tilted to opposite sides separate them"
-    if DISTANCE in names or any(name in FOCAL for name in names):
+    if names & {*FOCAL, DISTANCE}:
         return "points from the centre to the corners of the image separate them"
     return "both bend the edge of the image; points nearer to its corners separate them"

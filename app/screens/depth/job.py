@@ -61,6 +61,7 @@ def _depth_node(rig: Rig, index: int, clouds: NodeClouds, config: DepthConfig, s
     filled = fused.select(_inferred_rows(fused))
     return DepthNode(
         name=clouds.name,
+        T_world_camera=frame.T_world_camera,
         pictures=_pictures(frame, clouds, judged),
         sensor=_seen(clouds.sensor, frame, step),
         inferred=_thinned(clouds.inferred, frame, step),

@@ -138,15 +138,14 @@ class DepthPanel(Panel):
 
     def _draw(self) -> None:
         self._undrawn = False
-        scene: SceneView | None = self.session.results.view("scene")
         depth: DepthView | None = self.session.results.view("depth")
-        if scene is None or depth is None or len(scene.nodes) != len(depth.nodes):
+        if depth is None:
             return
         own = COLORINGS[self._coloring.value] == "photo"
         with self.ui.atomic():
             clear(self.scene, "/depth")
-            for place, node in zip(scene.nodes, depth.nodes, strict=True):
-                below, T = f"/depth/{node.name}", place.T_world_camera
+            for node in depth.nodes:
+                below, T = f"/depth/{node.name}", node.T_world_camera
                 add_sensor_cloud(self.scene, f"{below}/sensor", node.sensor, T, None if own else TARGET)
                 chosen = self._inferred(node)
                 if chosen is not None:
@@ -199,12 +198,11 @@ class DepthPanel(Panel):
 
     def _show_canvas(self) -> None:
         """Let the brush paint on the chosen node's points."""
-        scene: SceneView | None = self.session.results.view("scene")
         shown = self._shown()
-        if scene is not None and shown is not None:
-            index, node = shown
+        if shown is not None:
+            node = shown[1]
             assert isinstance(node.sensor, SeenSample)
-            self._hide.show(node.sensor, scene.nodes[index].T_world_camera)
+            self._hide.show(node.sensor, node.T_world_camera)
 
     def _request_filling(self, request: HideRequest) -> None:
         session, spec, shown = self.session, self.session.spec, self._shown()

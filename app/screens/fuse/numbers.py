@@ -76,9 +76,9 @@ def race_table(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markup:
         row("Iterations", "Matchings and pose updates until it stopped.", lambda x: str(x.iterations)),
         row(
             "Stopped",
-            "converged: it moves less than 0.1 mm and 0.1 mrad; stalled: no change of the error; limit: "
-            "all allowed iterations done; degenerate: too few pairs to go on; lost: no pair within the "
-            "gate.",
+            "converged: it moves less than 0.1 mrad and a 3000th of the gate; stalled: no change of the "
+            "error; limit: all allowed iterations done; degenerate: too few pairs to go on; lost: no pair "
+            "within the gate.",
             lambda x: _stop_word(x.stop_reason),
         ),
         row(
@@ -167,10 +167,10 @@ def _agreeing(view: FuseView) -> str:
 
 
 def _place_row(row: RegistrationRow) -> Row:
+    known = "Errors: RMS distance of the points from the truth. " if row.error_after_m is not None else ""
     return (
         f"{row.source} → {row.target}",
-        f"{row.method.upper()}: {row.stop_reason}. Errors: RMS distance of the points from the truth. "
-        f"{_loop(row)}",
+        f"{row.method.upper()}: {row.stop_reason}. {known}{_loop(row)}",
         str(row.iterations),
         number(row.error_before_m, 1, "cm", 100),
         number(row.error_after_m, 2, "cm", 100),

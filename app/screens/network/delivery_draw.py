@@ -23,7 +23,7 @@ BESIDE = 0.5
 ELEVATION_RAD = np.radians(40.0)
 FILLED = 0.8
 """Share of the window that the drawing fills."""
-PACKET_M, POINT_M = 0.011, 0.008
+PACKET, POINT_M = 0.011, 0.008
 """Size of a packet over D, and size of a point in metres."""
 NAME_BELOW = 0.05
 """Distance of a name below its camera over D: there it covers neither pictures nor mesh."""
@@ -74,7 +74,7 @@ class DeliveryDrawing:
             f"{below}/packets",
             np.zeros((capacity, 3), np.float32),
             np.zeros((capacity, 3), np.uint8),
-            point_size=PACKET_M * self._size_m,
+            point_size=PACKET * self._size_m,
             point_shape="circle",
             point_shading="flat",
             precision="float32",

@@ -119,3 +119,18 @@ def test_a_page_that_an_earlier_session_had_narrowed_gets_its_field_of_view_back
     eye.camera.fov = np.radians(25.0)  # of a race, when the server went away
     Framing(SimpleNamespace(target=eye), eye.views)
     assert eye.camera.fov == pytest.approx(np.radians(75.0))
+
+
+def test_the_view_is_fitted_to_depth_of_its_own_scene_only():
+    """The depth of the scene before stays until the new scene's has been computed."""
+    at, there = np.eye(4), np.eye(4) + 2.0 * np.eye(4, k=3)
+    sensor = SimpleNamespace(points_m=np.zeros((4, 3)))
+    fused = SimpleNamespace(points_m=np.ones((4, 3)))
+    views = {"scene": SimpleNamespace(nodes=[SimpleNamespace(T_world_camera=at, sensor=sensor)])}
+    session = SimpleNamespace(
+        results=SimpleNamespace(view=views.get), current=SimpleNamespace(drawn_below="/depth")
+    )
+    framing = Framing(session, None)
+    for pose, seen in ((at, fused), (there, sensor)):
+        views["depth"] = SimpleNamespace(nodes=[SimpleNamespace(T_world_camera=pose, fused=fused)])
+        np.testing.assert_array_equal(framing.clouds_m[0], seen.points_m)

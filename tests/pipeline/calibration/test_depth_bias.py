@@ -84,10 +84,13 @@ def test_the_bias_at_a_depth_is_what_the_correction_takes_off_and_as_sure_as_its
     fit = fit_depth(quick_samples(CURVED, seed=0))
     assert fit.terms == ("offset", "scale", "curvature")
     z_m = np.array([0.6, 1.0, 1.7])
-    bias_m, sd_m = fit.bias_m(z_m)
+    bias_m, half_m = fit.bias_m(z_m)
     np.testing.assert_allclose(bias_m, z_m - fit.correction.corrected_m(z_m, np.zeros((3, 2))), atol=1e-12)
     by_terms = np.stack([z_m**0, z_m, z_m**2])
-    np.testing.assert_allclose(sd_m**2, np.diag(by_terms.T @ fit.covariance @ by_terms), rtol=1e-9)
+    variances_m2 = np.diag(by_terms.T @ fit.covariance @ by_terms)
+    np.testing.assert_allclose(half_m**2 / half_m[0] ** 2, variances_m2 / variances_m2[0], rtol=1e-9)
+    low_m, high_m = fit.correction.ci95["offset_m"]  # the same interval as that of the offset, which is at 0
+    assert fit.bias_m(np.zeros(1))[1][0] == pytest.approx(0.5 * (high_m - low_m), rel=1e-9)
 
 
 def test_a_sensor_without_bias_is_left_alone_most_times():

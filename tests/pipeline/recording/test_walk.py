@@ -150,7 +150,7 @@ def test_a_photograph_that_cannot_be_read_is_named_and_the_others_give_the_colou
     monkeypatch.setattr(type(recording), "frame", damaged)
     again = drain(iterate_walk(recording))
     assert [frame.name for frame in again.frames] == [frame.name for frame in rig.frames[1:]]
-    assert again.notes == (f"color.png is no image: frame {first} gives no colours",)
+    assert again.notes == (f"frame {first} gives no colours: color.png is no image",)
 
 
 def test_points_that_no_view_measured_are_grey(recording):

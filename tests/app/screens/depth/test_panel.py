@@ -233,3 +233,25 @@ def test_every_stop_of_the_lesson_sets_the_screen_as_it_says(session):
     session.edit(lambda config: replace(config, depth=replace(config.depth, alignment="median")))
     assert not gui.all("image", HIDE)
     assert FILLS["ours"] not in gui.text(HIDE)
+
+
+def test_while_another_scene_has_come_and_its_depth_has_not_the_clouds_keep_their_places(session):
+    results, node = session.results, node_of(session)
+    scene, depth = results.view("scene"), results.view("depth")
+    before = session.ui.scene.get_handle_by_name(f"/depth/{node.name}/sensor")
+    place = before.wxyz.copy(), before.position.copy()
+    moved = [replace(one, T_world_camera=np.eye(4), name="other") for one in scene.nodes[:1]]
+    results.put("scene", session.spec.key("scene"), replace(scene, nodes=tuple(moved)))
+    results.put("depth", "the scene before", depth)
+    try:
+        last = depth.nodes[-1].name
+        session.gui.set("Node", last)  # the other scene has no such node
+        session.gui.set("Colours", session.gui.find("Colours").options[-1])
+        again = session.ui.scene.get_handle_by_name(f"/depth/{node.name}/sensor")
+        np.testing.assert_array_equal(again.wxyz, place[0])
+        np.testing.assert_array_equal(again.position, place[1])
+        assert session.ui.scene.names(f"/depth/{last}/sensor")
+    finally:
+        results.put("scene", session.spec.key("scene"), scene)
+        results.put("depth", session.spec.key("depth"), depth)
+        session.gui.set("Node", node.name)
