@@ -73,7 +73,7 @@ class DepthFit:
     """Sentence on terms that the views cannot separate, and on views to take; empty if there are none."""
 
     def bias_m(self, z_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return (N,) measured minus true depth at (N,) depths without the map, and half its 95 % interval."""
+        """Return (N,) measured minus true depth without the map, at (N,) depths, and its 95 % half-width."""
         powers = {"offset": np.ones_like(z_m), "scale": z_m, "curvature": z_m**2}
         used = [powers[term] for term in self.terms if term in powers]
         columns = np.array(used).reshape(len(used), len(z_m))

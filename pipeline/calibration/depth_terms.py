@@ -110,7 +110,7 @@ def rows_of_views(samples: DepthSamples) -> list[IntArray]:
 
 
 def half_width(views: int, together: int = 1) -> float:
-    """Return the half-width of a 95 % interval of ``together`` parameters, in standard errors (Student's t)."""
+    """Return half a 95 % interval of ``together`` parameters, in standard errors (Student's t)."""
     return float(stdtrit(views - 1, 1.0 - 0.025 / together))
 
 
