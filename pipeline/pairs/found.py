@@ -91,6 +91,7 @@ def judged(answer: Answer, place: Place) -> Answer:
     evidence = place.judge(T)
     verdict = verdict_on(evidence)
     if _same(T, found.candidate.T_target_source, place.pair):
+        verdict = verdict_on(evidence, held=found.settled)
         if not np.isnan(found.spread_m):
             answer = replace(answer, draws=1 + DRAWS, spread_m=found.spread_m)
         verdict = found.verdict if verdict.sure else verdict

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.types import FloatArray
 
 OPEN_SHARE = 2e-3
@@ -38,10 +39,28 @@ def stiffness(points_m: FloatArray, normals: FloatArray) -> float:
     return max(0.0, float(values[0] / values[-1]))
 
 
+def weakest_motion(points_m: FloatArray, normals: FloatArray, length_m: float) -> FloatArray:
+    """Return the (4, 4) motion that (N, 3) points with (N, 3) unit normals hold least (see ``stiffness``).
+
+    It moves the points by about ``length_m``; ``-length_m`` gives the motion to the other side.
+    """
+    weakest = np.linalg.eigh(_normal_matrix(points_m, normals))[1][:, 0]
+    center_m, spread_m = _center_and_spread(points_m)
+    turn = rotation_exp(length_m / spread_m * weakest[:3])
+    return rigid(turn, center_m - turn @ center_m + length_m * weakest[3:])
+
+
+def _center_and_spread(points_m: FloatArray) -> tuple[FloatArray, float]:
+    """Return the (3,) mean of (N, 3) points, and their root mean square distance from it."""
+    center_m = points_m.mean(axis=0)
+    arms_m = points_m - center_m
+    return center_m, max(float(np.sqrt(np.mean(np.sum(arms_m**2, axis=1)))), np.finfo(float).tiny)
+
+
 def _normal_matrix(points_m: FloatArray, normals: FloatArray) -> FloatArray:
     """Return the (6, 6) Gauss-Newton matrix about the centre, with lengths in units of the points' spread."""
-    arms = points_m - points_m.mean(axis=0)
-    arms = arms / max(float(np.sqrt(np.mean(np.sum(arms**2, axis=1)))), np.finfo(float).tiny)
+    center_m, spread_m = _center_and_spread(points_m)
+    arms = (points_m - center_m) / spread_m
     jacobian = np.concatenate([np.cross(arms, normals), normals], axis=1)
     return jacobian.T @ jacobian / len(points_m)
 

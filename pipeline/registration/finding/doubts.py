@@ -29,9 +29,12 @@ DRAWS = 3
 """Further draws of the points that must lead to the same pose, …"""
 MOST_SPREAD_VOXELS = 0.5
 """… within so many fiftieths of the target's extent: 3 cm in a view of 3 m."""
-MORE_POINTS = (4 * QUICK_POINTS, 16 * QUICK_POINTS)
-"""Points of an answer and its draws where those of quick registrations differ by more: first so many, then so
-many."""
+LITTLE_STIFFNESS, BESIDE_VOXELS = 0.01, 1.2
+"""Where the stiffness is below the first, registrations must come back, too, that begin so many fiftieths of
+the extent to both sides along the motion that is held least."""
+CLOSE_VOXELS, MORE_POINTS = 0.3, (4 * QUICK_POINTS, 16 * QUICK_POINTS)
+"""Where the draws of quick registrations end farther apart than the first, the answer and its draws are
+registered with more points: first so many, then so many."""
 LEAST_TURN_DEG = 10.0
 """A rival turned by less is described by its distance."""
 
@@ -42,8 +45,8 @@ class Checked(NamedTuple):
     candidate: Candidate
     doubts: tuple[str, ...]
     spread_m: float
-    """Largest point error between the pose and those of other draws of the points; infinite if one failed,
-    NaN if another pose had the better score."""
+    """Largest point error between the pose and those of further registrations; infinite if one failed, NaN if
+    another pose had the better score."""
     settled: bool
     """Whether the draws agree; then the pose is sure, unless ``doubts`` name a rival."""
 
@@ -73,18 +76,20 @@ class Checks:
         if self._bare and (before := self._scored_better(answer, tried)) is not None:
             return Checked(answer, (self._rival_text(answer, before),), float("nan"), settled=False)
         doubts: tuple[str, ...] = ()
-        spread_m, most_m = self._spread_m(answer), MOST_SPREAD_VOXELS * default_voxel_m(self.target)
+        voxel_m = default_voxel_m(self.target)
+        close_m, most_m = CLOSE_VOXELS * voxel_m, MOST_SPREAD_VOXELS * voxel_m
+        spread_m = self._spread_m(answer)
         for points in MORE_POINTS:
-            if most_m < spread_m < np.inf:
-                answer, spread_m = self._with_more_points(answer, points)
+            if close_m < spread_m < np.inf:
+                answer, spread_m = self._with_more_points(answer, spread_m, points)
         if spread_m <= most_m and np.isnan(answer.evidence.color_correlation):
             best, doubts = self._unless_rivalled(way, answer)
             if best is not answer:
                 answer, spread_m = best, self._spread_m(best)
         if np.isinf(spread_m):
-            doubts = (*doubts, "another draw of the points finds no pose")
+            doubts = (*doubts, "registered again with other points, the source finds no pose")
         elif spread_m > most_m:
-            doubts = (*doubts, f"other draws of the points end up to {length(spread_m)} away")
+            doubts = (*doubts, f"registered again with other points, it ends up to {length(spread_m)} away")
         return Checked(answer, doubts, spread_m, settled=spread_m <= most_m)
 
     @property
@@ -92,22 +97,33 @@ class Checks:
         """Whether no free space can refute a pose, since a cloud has no viewpoint."""
         return self.judge.source.view is None or self.judge.target.view is None
 
-    def _with_more_points(self, answer: Candidate, points: int) -> tuple[Candidate, float]:
-        """Return the answer with more points, and its spread; as it was, with infinity, if that fails."""
+    def _with_more_points(self, answer: Candidate, spread_m: float, points: int) -> tuple[Candidate, float]:
+        """Return the answer with more points, and its spread.
+
+        Both stay as they were if its evidence then has doubts; the spread is infinite if it finds no pose.
+        """
         try:
             T = self._again(answer, self.config.seed, points)
         except ReconstructionError:
             return answer, float("inf")
         better = replace(answer, T_target_source=T, evidence=self.judge(T))
+        if not verdict_on(better.evidence, held=True).sure:
+            return answer, spread_m
         return better, self._spread_m(better, points)
 
     def _spread_m(self, answer: Candidate, points: int = QUICK_POINTS) -> float:
-        """Return the largest point error between an answer and further draws of the points from its start."""
+        """Return the largest point error between an answer and registrations of further draws of the points.
+
+        They begin at its start, and beside the answer if its evidence hardly holds it there.
+        """
+        starts = [answer.T_start] * DRAWS
+        if answer.evidence.stiffness < LITTLE_STIFFNESS:
+            starts += self.judge.beside(answer.T_target_source, BESIDE_VOXELS * default_voxel_m(self.target))
         some_m = compared_points_m(self.source)
         farthest_m = 0.0
-        for seed in range(self.config.seed + 1, self.config.seed + 1 + DRAWS):
+        for seed, T_start in enumerate(starts, start=self.config.seed + 1):
             try:
-                T = self._again(answer, seed, points)
+                T = self._again(replace(answer, T_start=T_start), seed, points)
             except ReconstructionError:
                 return float("inf")
             farthest_m = max(farthest_m, point_error_m(T, answer.T_target_source, some_m))
@@ -130,7 +146,7 @@ class Checks:
         others = [
             one
             for one in tried
-            if verdict_on(one.evidence).sure and not same(one.T_target_source, T, *clouds)
+            if verdict_on(one.evidence, held=True).sure and not same(one.T_target_source, T, *clouds)
         ]
         best = min([answer, *others], key=lambda one: one.evidence.against_share)
         if not best.evidence.clearly_better(answer.evidence):

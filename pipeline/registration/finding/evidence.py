@@ -14,7 +14,7 @@ import numpy as np
 
 from pipeline.kernels.geometry import apply
 from pipeline.registration.finding.surface import Judgement, Surface
-from pipeline.registration.observability import open_motions, stiffness
+from pipeline.registration.observability import open_motions, stiffness, weakest_motion
 from pipeline.types import FloatArray
 
 CLEARLY, CLEARLY_MORE = 2.0, 0.005
@@ -111,6 +111,14 @@ class Judge:
             open_motions=open_motions(places_m, normals) if len(heights) else "any motion",
             color_correlation=self._color_correlation(there, back),
         )
+
+    def beside(self, T_target_source: FloatArray, length_m: float) -> tuple[FloatArray, FloatArray]:
+        """Return the two (4, 4) poses so far from a pose along the motion that its evidence holds least."""
+        there = self.target.judge(self.source, T_target_source)
+        back = self.source.judge(self.target, np.linalg.inv(T_target_source))
+        surface = self._overlap(there, back, T_target_source)
+        ahead, behind = (weakest_motion(*surface, way_m) for way_m in (length_m, -length_m))
+        return ahead @ T_target_source, behind @ T_target_source
 
     def _overlap(self, there: Judgement, back: Judgement, T: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return places and unit normals, in the target frame, of the points on the other's surface."""

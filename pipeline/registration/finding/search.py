@@ -82,11 +82,10 @@ def search(
 
 def _found(way: Way, candidate: Candidate, tried: Sequence[Candidate], checks: Checks) -> Found:
     """Return a candidate with its verdict, or a better one that its checks find."""
-    verdict = verdict_on(candidate.evidence)
-    if not verdict.sure:
-        return Found(way, candidate, verdict, ())
+    if not verdict_on(candidate.evidence, held=True).sure:
+        return Found(way, candidate, verdict_on(candidate.evidence), ())
     checked = checks(way, candidate, tried)
-    verdict = verdict_on(checked.candidate.evidence, checked.doubts)
+    verdict = verdict_on(checked.candidate.evidence, checked.doubts, held=checked.settled)
     return Found(way, checked.candidate, verdict, (), checked.spread_m, checked.settled)
 
 

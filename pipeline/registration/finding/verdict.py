@@ -13,7 +13,7 @@ from pipeline.registration.finding.evidence import Evidence
 
 Word = Literal["sure", "doubtful", "none"]
 
-LEAST_OVERLAP = 0.08
+LEAST_OVERLAP = 1.0 / 6.0
 """Least share of a cloud's points that the other can judge."""
 LEAST_ON, LEAST_ON_COLORED, LEAST_ON_BARE = 0.75, 0.7, 0.95
 """Least share of the judged points on the other's surface: where free space or colours could refute the pose,
@@ -24,7 +24,8 @@ LITTLE_THROUGH, MOST_THROUGH = 0.01, 0.02
 """Shares of the judged points in free space: a few are already a sign of a wrong pose. Above the first, poses
 nearby are tried; the second is the largest that may be sure."""
 LEAST_STIFFNESS = 0.006
-"""Least stiffness of the points on the surfaces; below it, noise decides along the weakest motion."""
+"""Least stiffness of the points on the surfaces; below it, noise may decide along the weakest motion, unless
+registrations from both sides of this motion come back."""
 MOST_HEIGHT = 1.7
 """Largest ratio of the distances from the surfaces to the noise of the points."""
 LEAST_CORRELATION = 0.75
@@ -52,20 +53,21 @@ class Verdict:
         return f"{self.word}: {'; '.join(self.reasons)}" if self.reasons else self.word
 
 
-def verdict_on(evidence: Evidence, more: tuple[str, ...] = ()) -> Verdict:
+def verdict_on(evidence: Evidence, more: tuple[str, ...] = (), held: bool = False) -> Verdict:
     """Judge a pose by its evidence.
 
     Args:
         evidence: what the clouds say of the pose.
         more: further reasons for doubt, from other poses that were tried.
+        held: whether registrations from both sides of the weakest motion came back to the pose.
     """
     if evidence.overlap_share < NO_POSE_OVERLAP or evidence.on_share < NO_POSE_ON:
-        return Verdict("none", (*_reasons(evidence), *more))
-    reasons = (*_reasons(evidence), *more)
+        return Verdict("none", (*_reasons(evidence, held), *more))
+    reasons = (*_reasons(evidence, held), *more)
     return Verdict("doubtful" if reasons else "sure", reasons)
 
 
-def _reasons(evidence: Evidence) -> tuple[str, ...]:
+def _reasons(evidence: Evidence, held: bool) -> tuple[str, ...]:
     """Return the tests that the evidence does not pass."""
     reasons = []
     if evidence.overlap_share < LEAST_OVERLAP:
@@ -84,7 +86,7 @@ def _reasons(evidence: Evidence) -> tuple[str, ...]:
         reasons.append(f"the colours there do not match (correlation {evidence.color_correlation:.2f})")
     if evidence.open_motions:
         reasons.append(f"{evidence.open_motions} changes nothing where the clouds meet")
-    elif evidence.stiffness < LEAST_STIFFNESS:
+    elif evidence.stiffness < LEAST_STIFFNESS and not held:
         reasons.append("the surfaces where the clouds meet hardly hold the pose in one direction")
     return tuple(reasons)
 

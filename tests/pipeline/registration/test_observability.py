@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from pipeline.kernels.geometry import apply
 from pipeline.registration.neighbourhood import pca_normals
-from pipeline.registration.observability import open_motions
+from pipeline.registration.observability import open_motions, weakest_motion
 
 RNG = np.random.default_rng(2)
 A, B, C = RNG.uniform(-1.0, 1.0, (3, 2000))
@@ -46,3 +47,18 @@ def test_an_oblique_direction_is_given_by_its_coordinates():
     turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
     points_m, normals, _ = SHAPES["corridor"]
     assert open_motions(points_m @ turn.T, normals @ turn.T) == "sliding along (-0.60, 0.80, 0.00)"
+
+
+@pytest.mark.parametrize("length_m", [0.05, -0.05])
+def test_the_weakest_motion_of_a_corridor_leads_along_it(length_m):
+    points_m, normals, _ = SHAPES["corridor"]
+    moved_m = apply(weakest_motion(points_m + 10.0, normals, length_m), points_m + 10.0) - points_m - 10.0
+    np.testing.assert_allclose(np.abs(moved_m), np.tile([0.0, 0.05, 0.0], (4000, 1)), atol=1e-9)
+    assert abs(moved_m.sum()) == pytest.approx(0.05 * 4000)  # all to one side
+
+
+def test_the_weakest_motion_of_a_ball_turns_it_on_the_spot():
+    moved_m = apply(weakest_motion(BALL + 5.0, BALL, 0.05), BALL + 5.0)
+    np.testing.assert_allclose(np.linalg.norm(moved_m - 5.0, axis=1), 1.0, atol=1e-3)
+    apart_m = np.linalg.norm(moved_m - BALL - 5.0, axis=1)
+    assert np.sqrt(np.mean(apart_m**2)) == pytest.approx(0.05 * np.sqrt(2 / 3), rel=0.02)

@@ -131,6 +131,24 @@ def test_where_few_points_lead_apart_more_points_decide(monkeypatch, clouds, ans
     assert point_error_m(checked.candidate.T_target_source, T_TRUE, source.points_m) < 0.01
 
 
+def test_more_points_replace_no_answer_whose_evidence_was_better(monkeypatch, clouds, answer):
+    """A judge that sees through what it is asked again leaves the answer and its spread as they were."""
+    source, target = clouds
+    found, judge = answer.candidate, Judge(Surface(source), Surface(target))
+
+    class Stern(Judge):
+        def __call__(self, T_target_source):
+            return replace(found.evidence, through=sum(found.evidence.judged))
+
+    monkeypatch.setattr(doubts, "CLOSE_VOXELS", 0.0)
+    monkeypatch.setattr(doubts, "MORE_POINTS", (1000,))
+    kept = Checks(source, target, Stern(judge.source, judge.target), CONFIG)("given", found, [found])
+    np.testing.assert_array_equal(kept.candidate.T_target_source, found.T_target_source)
+    assert 0.0 < kept.spread_m < 0.03
+    again = Checks(source, target, judge, CONFIG)("given", found, [found])
+    assert point_error_m(again.candidate.T_target_source, found.T_target_source, source.points_m) > 0.0
+
+
 @pytest.mark.parametrize("part", ["source", "target"])
 def test_a_part_finds_its_place_in_the_whole(part):
     source, target = pair(0, 2 * COUNT)
@@ -205,6 +223,27 @@ def test_a_shape_with_an_open_motion_is_never_sure(name, says):
     verdict = verdict_on(Judge(source, target)(np.eye(4)))
     assert verdict.word == "doubtful"
     assert says in verdict.text
+
+
+def test_only_a_pose_to_which_both_sides_come_back_is_settled_with_little_stiffness(
+    monkeypatch, clouds, answer
+):
+    """In a corridor a registration that begins a little farther along stays there."""
+    monkeypatch.setattr(doubts, "DRAWS", 0)
+    source, target = (PointCloud(surface("corridor", seed)) for seed in (1, 2))
+    judge = Judge(Surface(source), Surface(target))
+    T_wrong = rigid(np.eye(3), [0.3, 0.0, 0.0])
+    along = Candidate(T_wrong, T_wrong, 0.2, "p2q", judge(T_wrong))
+    assert along.evidence.stiffness < doubts.LITTLE_STIFFNESS
+    assert not along.evidence.open_motions
+    checked = Checks(source, target, judge, CONFIG)("given", along, [along])
+    assert not checked.settled
+    assert "registered again" in checked.doubts[-1]
+    found = answer.candidate
+    loose = replace(found, evidence=replace(found.evidence, stiffness=along.evidence.stiffness))
+    held = Checks(*clouds, Judge(*map(Surface, clouds)), CONFIG)("given", loose, [loose])
+    assert held.settled
+    assert 0.0 < held.spread_m < 0.01
 
 
 def test_clouds_far_apart_have_no_start(clouds):

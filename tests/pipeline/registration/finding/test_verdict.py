@@ -43,6 +43,12 @@ def test_each_fault_has_its_words(change, word, says):
     assert verdict.text.startswith(f"{word}: ")
 
 
+def test_less_stiffness_is_enough_where_registrations_from_both_sides_came_back():
+    assert not verdict_on(replace(GOOD, stiffness=0.004)).sure
+    assert verdict_on(replace(GOOD, stiffness=0.004), held=True).sure
+    assert not verdict_on(replace(GOOD, open_motions="sliding along y"), held=True).sure
+
+
 def test_other_poses_are_a_reason_too():
     verdict = verdict_on(GOOD, ("turned by 90 degrees, the source fits as well",))
     assert verdict.word == "doubtful"
