@@ -54,7 +54,7 @@ def place(views: PlacesPair, with_color: bool) -> Placed:
         starts.insert(0, by_colour(lifted_features(views.source), lifted_features(views.target)))
     else:
         source, target = replace(source, colors=None), replace(target, colors=None)
-    judge = Judge(Surface(source), Surface(target))
+    judge = Judge(Surface(source, from_camera=True), Surface(target, from_camera=True))
     try:
         found = search(source, target, starts, judge, RegistrationConfig())
     except PacketMeshError:

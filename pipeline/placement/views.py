@@ -30,7 +30,7 @@ class Views:
         self.features = lru_cache(None)(self._features)
 
     def _surface(self, node: int) -> Surface:
-        return Surface(back_project(self._frames[node]), self._seed)
+        return Surface(back_project(self._frames[node]), self._seed, from_camera=True)
 
     def _features(self, node: int) -> LiftedFeatures:
         return lifted_features(self._frames[node])

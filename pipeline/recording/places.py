@@ -102,7 +102,7 @@ class Places:
             return None
         moving, fixed = (back_project(self._frame(number)) for number in (source, target))
         try:
-            judge = Judge(Surface(moving), Surface(fixed))
+            judge = Judge(*(Surface(cloud, from_camera=True) for cloud in (moving, fixed)))
             start = by_colour(one, other) if way == "colour" else by_surfaces(moving, fixed, True)
             found = search(moving, fixed, [start], judge, RegistrationConfig())
         except PacketMeshError:

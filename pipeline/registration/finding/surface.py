@@ -49,8 +49,14 @@ class Judgement(NamedTuple):
 class Surface:
     """A sampled cloud with all that is needed to judge another's points."""
 
-    def __init__(self, cloud: PointCloud, seed: int = 0) -> None:
-        """Sample the cloud; normals it lacks, and its noise, are estimated from its points."""
+    def __init__(self, cloud: PointCloud, seed: int = 0, from_camera: bool = False) -> None:
+        """Sample the cloud; normals it lacks, and its noise, are estimated from its points.
+
+        Args:
+            cloud: any cloud.
+            seed: seed of the sample.
+            from_camera: whether a camera at the origin measured it; if unknown, its points may tell.
+        """
         sample = draw(cloud, REFERENCE_POINTS, seed, "cloud").cloud
         self.points_m = sample.points_m
         self.tree: KdTree = tree_of(self.points_m)
@@ -66,7 +72,7 @@ class Surface:
         count = min(len(sample), JUDGED_POINTS)
         self.asked: IntArray = np.sort(np.random.default_rng(seed).choice(len(sample), count, replace=False))
         """(n,) rows of the points that the other cloud judges."""
-        self.view: RangeImage | None = range_image(cloud.points_m)
+        self.view: RangeImage | None = range_image(cloud.points_m, from_camera)
         """Free space, if the cloud was seen from its origin."""
         self.middle_m: FloatArray = np.median(self.points_m, axis=0)
 

@@ -48,10 +48,14 @@ class RangeImage:
         return in_view, in_view & (ranges_m < self.nearest_m[cell] - slack_m)
 
 
-def range_image(points_m: FloatArray) -> RangeImage | None:
+def range_image(points_m: FloatArray, from_camera: bool = False) -> RangeImage | None:
     """Return the ranges of a cloud that was seen from the origin of its frame; None if it was not.
 
     From its viewpoint one surface is seen in each direction; from elsewhere some points hide others.
+
+    Args:
+        points_m: (N, 3) points.
+        from_camera: whether a camera at the origin is known to have measured them.
     """
     ranges_m = np.linalg.norm(points_m, axis=1)
     cells = _LEAST_CELLS
@@ -64,7 +68,7 @@ def range_image(points_m: FloatArray) -> RangeImage | None:
     nearest_m, farthest_m = np.full(6 * cells**2, np.inf), np.full(6 * cells**2, -np.inf)
     np.minimum.at(nearest_m, cell, ranges_m)
     np.maximum.at(farthest_m, cell, ranges_m)
-    if np.mean(ranges_m > HIDDEN_RATIO * nearest_m[cell]) > MOST_HIDDEN:
+    if not from_camera and np.mean(ranges_m > HIDDEN_RATIO * nearest_m[cell]) > MOST_HIDDEN:
         return None
     empty = ~np.isfinite(nearest_m)
     nearest_m[empty] = farthest_m[empty] = np.nan

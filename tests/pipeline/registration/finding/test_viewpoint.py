@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from lab.worlds import box_room
+from pipeline.registration.finding.surface import Surface
 from pipeline.registration.finding.viewpoint import range_image
+from pipeline.types import PointCloud
 from tests.pipeline.registration.finding.places import room, scan
 from tests.pipeline.registration.rooms import seen_by
 
@@ -36,6 +38,18 @@ def test_a_whole_room_is_not_seen_from_outside(from_m):
 
 def test_two_views_in_one_frame_are_not_one_view(camera_view):
     assert range_image(np.concatenate([camera_view, camera_view * 0.6])) is None
+
+
+def test_a_cloud_known_to_be_a_cameras_keeps_its_free_space_even_if_its_points_do_not_tell(camera_view):
+    """The clutter of a close view fills one cell in front and behind."""
+    both = np.concatenate([camera_view, camera_view * 0.6])
+    view = range_image(both, from_camera=True)
+    way = camera_view[:100]
+    in_view, through = view.compare(np.concatenate([0.5 * way, 0.8 * way, way]), np.zeros(300))
+    assert in_view.mean() > 0.95
+    np.testing.assert_allclose([part.mean() for part in np.split(through, 3)], [1.0, 0.0, 0.0], atol=0.05)
+    assert Surface(PointCloud(both), from_camera=True).view is not None
+    assert Surface(PointCloud(both)).view is None
 
 
 def test_the_viewpoint_knows_no_unit(camera_view):
