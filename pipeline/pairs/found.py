@@ -75,7 +75,7 @@ def settled_answer(name: str, place: Place) -> Answer:
     assert answer.verdict is not None
     assert answer.evidence is not None
     if not answer.verdict.sure and (more := _other_clouds(place, T)):
-        return replace(answer, verdict=verdict_on(answer.evidence, more))
+        return replace(answer, verdict=replace(answer.verdict, reasons=(*answer.verdict.reasons, *more)))
     return answer
 
 
@@ -91,7 +91,7 @@ def judged(answer: Answer, place: Place) -> Answer:
     evidence = place.judge(T)
     verdict = verdict_on(evidence)
     if _same(T, found.candidate.T_target_source, place.pair):
-        verdict = verdict_on(evidence, held=found.settled)
+        verdict = verdict_on(evidence, tried=True)
         if not np.isnan(found.spread_m):
             answer = replace(answer, draws=1 + DRAWS, spread_m=found.spread_m)
         verdict = found.verdict if verdict.sure else verdict

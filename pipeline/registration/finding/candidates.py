@@ -95,10 +95,15 @@ def quick_registration(
         gate_m=gate_m,
         direction="both" if config.with_scale else direction,
         sigma_decay=QUICK_DECAY,
-        max_points=min(points, max(6, int(DRAWN_SHARE * min(len(source), len(target))))),
+        max_points=drawn_points(source, target, points),
         seed=config.seed if seed is None else seed,
     )
     result = register(source, target, quick, T_start)
     if not result.steps:
         raise ReconstructionError(result.stop_reason)
     return result.T_target_source
+
+
+def drawn_points(source: PointCloud, target: PointCloud, points: int) -> int:
+    """Return how many points of each cloud are drawn if ``points`` are asked for: fewer of small clouds."""
+    return min(points, max(6, int(DRAWN_SHARE * min(len(source), len(target)))))

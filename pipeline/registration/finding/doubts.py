@@ -14,13 +14,14 @@ from pipeline.registration.finding.candidates import (
     QUICK_POINTS,
     Candidate,
     candidates,
+    drawn_points,
     quick_registration,
 )
 from pipeline.registration.finding.evidence import Judge
 from pipeline.registration.finding.poses import compared_points_m, length, same, turn_deg
 from pipeline.registration.finding.rivals import better_slide, quarter_turns
 from pipeline.registration.finding.starts import Way, by_surfaces, default_gates_m
-from pipeline.registration.finding.verdict import verdict_on
+from pipeline.registration.finding.verdict import LITTLE_STIFFNESS, verdict_on
 from pipeline.registration.global_start import default_voxel_m
 from pipeline.registration.metrics import point_error_m
 from pipeline.types import FloatArray, PointCloud
@@ -29,12 +30,14 @@ DRAWS = 3
 """Further draws of the points that must lead to the same pose, …"""
 MOST_SPREAD_VOXELS = 0.5
 """… within so many fiftieths of the target's extent: 3 cm in a view of 3 m."""
-LITTLE_STIFFNESS, BESIDE_VOXELS = 0.01, 1.2
-"""Where the stiffness is below the first, registrations must come back, too, that begin so many fiftieths of
-the extent to both sides along the motion that is held least."""
-CLOSE_VOXELS, MORE_POINTS = 0.3, (4 * QUICK_POINTS, 16 * QUICK_POINTS)
-"""Where the draws of quick registrations end farther apart than the first, the answer and its draws are
-registered with more points: first so many, then so many."""
+SIDE_VOXELS, SIDE_OF_GATE = 1.2, 0.9
+"""Where the stiffness is little, registrations from both sides must lead to the same pose, too. They begin so
+many fiftieths of the target's extent away, along the motion that is held least, but within this share of the
+gate."""
+CLOSE_VOXELS = 0.3
+"""Where the registrations end farther apart, they are repeated with more points."""
+MORE_POINTS = (4 * QUICK_POINTS, 16 * QUICK_POINTS)
+"""Numbers of points of the first and of the second repetition."""
 LEAST_TURN_DEG = 10.0
 """A rival turned by less is described by its distance."""
 
@@ -78,18 +81,20 @@ class Checks:
         doubts: tuple[str, ...] = ()
         voxel_m = default_voxel_m(self.target)
         close_m, most_m = CLOSE_VOXELS * voxel_m, MOST_SPREAD_VOXELS * voxel_m
-        spread_m = self._spread_m(answer)
+        spread_m, drawn = self._spread_m(answer), drawn_points(*clouds, QUICK_POINTS)
         for points in MORE_POINTS:
-            if close_m < spread_m < np.inf:
+            more = drawn_points(*clouds, points)
+            if more > drawn and close_m < spread_m < np.inf:
                 answer, spread_m = self._with_more_points(answer, spread_m, points)
+                drawn = more
         if spread_m <= most_m and np.isnan(answer.evidence.color_correlation):
             best, doubts = self._unless_rivalled(way, answer)
             if best is not answer:
                 answer, spread_m = best, self._spread_m(best)
         if np.isinf(spread_m):
-            doubts = (*doubts, "registered again with other points, the source finds no pose")
+            doubts = (*doubts, "registered again, the source finds no pose")
         elif spread_m > most_m:
-            doubts = (*doubts, f"registered again with other points, it ends up to {length(spread_m)} away")
+            doubts = (*doubts, f"registered again, the source ends up to {length(spread_m)} away")
         return Checked(answer, doubts, spread_m, settled=spread_m <= most_m)
 
     @property
@@ -107,18 +112,19 @@ class Checks:
         except ReconstructionError:
             return answer, float("inf")
         better = replace(answer, T_target_source=T, evidence=self.judge(T))
-        if not verdict_on(better.evidence, held=True).sure:
+        if not verdict_on(better.evidence, tried=True).sure:
             return answer, spread_m
         return better, self._spread_m(better, points)
 
     def _spread_m(self, answer: Candidate, points: int = QUICK_POINTS) -> float:
         """Return the largest point error between an answer and registrations of further draws of the points.
 
-        They begin at its start, and beside the answer if its evidence hardly holds it there.
+        They begin at its start, and also on both sides of an answer of little stiffness.
         """
         starts = [answer.T_start] * DRAWS
         if answer.evidence.stiffness < LITTLE_STIFFNESS:
-            starts += self.judge.beside(answer.T_target_source, BESIDE_VOXELS * default_voxel_m(self.target))
+            away_m = min(SIDE_VOXELS * default_voxel_m(self.target), SIDE_OF_GATE * answer.gate_m)
+            starts += self.judge.both_sides(answer.T_target_source, away_m)
         some_m = compared_points_m(self.source)
         farthest_m = 0.0
         for seed, T_start in enumerate(starts, start=self.config.seed + 1):
@@ -146,7 +152,7 @@ class Checks:
         others = [
             one
             for one in tried
-            if verdict_on(one.evidence, held=True).sure and not same(one.T_target_source, T, *clouds)
+            if verdict_on(one.evidence, tried=True).sure and not same(one.T_target_source, T, *clouds)
         ]
         best = min([answer, *others], key=lambda one: one.evidence.against_share)
         if not best.evidence.clearly_better(answer.evidence):

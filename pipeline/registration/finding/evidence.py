@@ -112,8 +112,8 @@ class Judge:
             color_correlation=self._color_correlation(there, back),
         )
 
-    def beside(self, T_target_source: FloatArray, length_m: float) -> tuple[FloatArray, FloatArray]:
-        """Return the two (4, 4) poses so far from a pose along the motion that its evidence holds least."""
+    def both_sides(self, T_target_source: FloatArray, length_m: float) -> tuple[FloatArray, FloatArray]:
+        """Return both (4, 4) poses ``length_m`` from a pose along the motion that the surfaces hold least."""
         there = self.target.judge(self.source, T_target_source)
         back = self.source.judge(self.target, np.linalg.inv(T_target_source))
         surface = self._overlap(there, back, T_target_source)

@@ -21,7 +21,7 @@ from pipeline.registration.finding.candidates import (
 from pipeline.registration.finding.evidence import Evidence, Judge
 from pipeline.registration.finding.starts import default_gates_m
 from pipeline.registration.finding.surface import Surface
-from pipeline.registration.finding.verdict import LITTLE_THROUGH, verdict_on
+from pipeline.registration.finding.verdict import LITTLE_STIFFNESS, LITTLE_THROUGH, verdict_on
 from pipeline.registration.global_start import default_voxel_m
 from pipeline.registration.loop import register
 from pipeline.types import FloatArray, PointCloud
@@ -75,7 +75,7 @@ def better_slide(
     config: RegistrationConfig,
 ) -> Candidate | None:
     """Return the pose nearby that passes all tests with a better score than an answer of which a little is in
-    free space; else None.
+    free space, or whose surfaces hold it little; else None.
 
     Shelves and chairs in a row fit one place farther along, too: the source is shifted to both sides along
     the place's own axes and registered.
@@ -88,7 +88,7 @@ def better_slide(
         judge: judge of these clouds.
         config: settings of the registrations.
     """
-    if evidence.through_share <= LITTLE_THROUGH:
+    if evidence.through_share <= LITTLE_THROUGH and evidence.stiffness >= LITTLE_STIFFNESS:
         return None
     step_m = SLIDE_VOXELS * default_voxel_m(target)
     gate_m = default_gates_m(target, "surfaces", config.seed)[0]
@@ -97,7 +97,7 @@ def better_slide(
         T_start = rigid(np.eye(3), shift_m) @ T
         for other in candidates(source, target, T_start, [gate_m], judge, config):
             least = evidence if best is None else best.evidence
-            if verdict_on(other.evidence).sure and other.evidence.score > least.score:
+            if verdict_on(other.evidence, tried=True).sure and other.evidence.score > least.score:
                 best = other
     return best
 

@@ -25,8 +25,8 @@ class Found:
     tried: tuple[Candidate, ...]
     """All registrations that were compared, in their order."""
     spread_m: float = float("nan")
-    """Largest point error between the pose and those of other draws of the points; infinite if one failed,
-    NaN of a pose that was in doubt before."""
+    """Largest point error between the pose and those of the registrations that checked it; infinite if one
+    failed, NaN of a pose that was in doubt before."""
     settled: bool = False
     """Whether no other start can change the answer: it is sure, or in doubt only because of a rival."""
 
@@ -82,10 +82,10 @@ def search(
 
 def _found(way: Way, candidate: Candidate, tried: Sequence[Candidate], checks: Checks) -> Found:
     """Return a candidate with its verdict, or a better one that its checks find."""
-    if not verdict_on(candidate.evidence, held=True).sure:
+    if not verdict_on(candidate.evidence, tried=True).sure:
         return Found(way, candidate, verdict_on(candidate.evidence), ())
     checked = checks(way, candidate, tried)
-    verdict = verdict_on(checked.candidate.evidence, checked.doubts, held=checked.settled)
+    verdict = verdict_on(checked.candidate.evidence, checked.doubts, tried=checked.settled)
     return Found(way, checked.candidate, verdict, (), checked.spread_m, checked.settled)
 
 

@@ -23,9 +23,9 @@ LEAST_ONE_SIDE = 0.6
 LITTLE_THROUGH, MOST_THROUGH = 0.01, 0.02
 """Shares of the judged points in free space: a few are already a sign of a wrong pose. Above the first, poses
 nearby are tried; the second is the largest that may be sure."""
-LEAST_STIFFNESS = 0.006
-"""Least stiffness of the points on the surfaces; below it, noise may decide along the weakest motion, unless
-registrations from both sides of this motion come back."""
+LITTLE_STIFFNESS, LEAST_STIFFNESS = 0.01, 0.006
+"""Stiffness of the points on the surfaces. Below the first, other poses along the motion that is held least
+are tried; below the second, noise may decide along it, so that no pose is sure without these trials."""
 MOST_HEIGHT = 1.7
 """Largest ratio of the distances from the surfaces to the noise of the points."""
 LEAST_CORRELATION = 0.75
@@ -53,21 +53,21 @@ class Verdict:
         return f"{self.word}: {'; '.join(self.reasons)}" if self.reasons else self.word
 
 
-def verdict_on(evidence: Evidence, more: tuple[str, ...] = (), held: bool = False) -> Verdict:
+def verdict_on(evidence: Evidence, more: tuple[str, ...] = (), tried: bool = False) -> Verdict:
     """Judge a pose by its evidence.
 
     Args:
         evidence: what the clouds say of the pose.
         more: further reasons for doubt, from other poses that were tried.
-        held: whether registrations from both sides of the weakest motion came back to the pose.
+        tried: leaves out the test of the stiffness, in whose place other poses are tried.
     """
     if evidence.overlap_share < NO_POSE_OVERLAP or evidence.on_share < NO_POSE_ON:
-        return Verdict("none", (*_reasons(evidence, held), *more))
-    reasons = (*_reasons(evidence, held), *more)
+        return Verdict("none", (*_reasons(evidence, tried), *more))
+    reasons = (*_reasons(evidence, tried), *more)
     return Verdict("doubtful" if reasons else "sure", reasons)
 
 
-def _reasons(evidence: Evidence, held: bool) -> tuple[str, ...]:
+def _reasons(evidence: Evidence, tried: bool) -> tuple[str, ...]:
     """Return the tests that the evidence does not pass."""
     reasons = []
     if evidence.overlap_share < LEAST_OVERLAP:
@@ -86,7 +86,7 @@ def _reasons(evidence: Evidence, held: bool) -> tuple[str, ...]:
         reasons.append(f"the colours there do not match (correlation {evidence.color_correlation:.2f})")
     if evidence.open_motions:
         reasons.append(f"{evidence.open_motions} changes nothing where the clouds meet")
-    elif evidence.stiffness < LEAST_STIFFNESS and not held:
+    elif evidence.stiffness < LEAST_STIFFNESS and not tried:
         reasons.append("the surfaces where the clouds meet hardly hold the pose in one direction")
     return tuple(reasons)
 

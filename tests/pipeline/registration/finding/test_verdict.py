@@ -45,8 +45,8 @@ def test_each_fault_has_its_words(change, word, says):
 
 def test_less_stiffness_is_enough_where_registrations_from_both_sides_came_back():
     assert not verdict_on(replace(GOOD, stiffness=0.004)).sure
-    assert verdict_on(replace(GOOD, stiffness=0.004), held=True).sure
-    assert not verdict_on(replace(GOOD, open_motions="sliding along y"), held=True).sure
+    assert verdict_on(replace(GOOD, stiffness=0.004), tried=True).sure
+    assert not verdict_on(replace(GOOD, open_motions="sliding along y"), tried=True).sure
 
 
 def test_other_poses_are_a_reason_too():
