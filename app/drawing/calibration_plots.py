@@ -165,7 +165,8 @@ def verdict_figure(judged: Verdict, sd: ErrorMap, size_px: tuple[int, int]) -> g
     """
     title = f"Error at {judged.range_m:g} m (95 %), required: {1000.0 * judged.accuracy_m:g} mm"
     figure = _map_figure(sd, 1000.0 * judged.error_m, title, size_px, 2000.0 * judged.accuracy_m)
-    figure.update_traces(hovertemplate="(%{x:.0f}, %{y:.0f}): %{z:.2f} mm<extra></extra>")  # sd has other px
+    # Without the px of ``sd``, which are one standard deviation.
+    figure.update_traces(hovertemplate="(%{x:.0f}, %{y:.0f}): %{z:.2f} mm<extra></extra>")
     figure.add_contour(
         x=sd.columns_px,
         y=sd.rows_px,

@@ -114,7 +114,7 @@ def _view_of(clients: Iterable[viser.ClientHandle]) -> View | None:
 
 
 def _same_cameras(nodes: tuple[SceneNode, ...], depths: tuple[DepthNode, ...]) -> bool:
-    """Return whether a scene's nodes have this depth, which may still be that of the scene before."""
+    """Return whether the depth has the poses of the scene's nodes; it may still be that of another scene."""
     return len(nodes) == len(depths) and all(
         np.array_equal(node.T_world_camera, depth.T_world_camera)
         for node, depth in zip(nodes, depths, strict=True)

@@ -64,9 +64,10 @@ class Answer:
     step_times_s: tuple[float, ...] = ()
     """Time since the start at each step."""
     draws: int = 1
-    """Number of draws of the points that were registered; this is the answer of one of them."""
+    """Number of draws of the points that were registered from one start; this answer is of one of them."""
     spread_m: float = float("nan")
-    """Largest point error between this and another draw's answer; infinite if one failed, NaN of one draw."""
+    """Largest point error between this and the registrations that checked it; infinite if one failed, NaN
+    without any."""
     verdict: Verdict | None = None
     """Whether to believe the pose; None of answers that were not judged."""
     evidence: Evidence | None = None

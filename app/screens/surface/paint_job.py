@@ -75,8 +75,8 @@ def _clouds(store: Store, spec: Spec) -> Generator[Progress, None, dict[Which, P
 def _count(store: Store, spec: Spec, request: PaintRequest) -> Generator[Progress, None, int]:
     """Return the number of points to which a quick look thins the cloud after fusion.
 
-    It is ``most_points``, doubled until the voxels are no larger than the ball: through larger ones the ball
-    falls where it would rest on all points, and the look would show holes that are not there.
+    It is ``most_points``, doubled until the voxel's edge is at most the ball's radius: with larger voxels the
+    ball falls through where it would rest on all points, and the look would show holes that are not there. With as many points as the cloud has, it is not thinned.
     """
     whole = yield from _clouds(store, spec)
     count = request.most_points

@@ -95,7 +95,10 @@ class QuickLook:
 
 
 class Detail:
-    """The number of points of a quick look, adapted to the browser's speed."""
+    """The number of points to which quick looks thin a cloud, adapted to the browser's speed.
+
+    Looks at small balls need more points and tell nothing of it.
+    """
 
     def __init__(self) -> None:
         self.points = QUICK_POINTS
