@@ -76,7 +76,8 @@ def _count(store: Store, spec: Spec, request: PaintRequest) -> Generator[Progres
     """Return the number of points to which a quick look thins the cloud after fusion.
 
     It is ``most_points``, doubled until the voxel's edge is at most the ball's radius: with larger voxels the
-    ball falls through where it would rest on all points, and the look would show holes that are not there. With as many points as the cloud has, it is not thinned.
+    ball falls through where it rests on all points, and the look would show holes that are not there.
+    With as many points as the cloud has, it is not thinned.
     """
     whole = yield from _clouds(store, spec)
     count = request.most_points
