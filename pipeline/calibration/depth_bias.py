@@ -193,7 +193,7 @@ def _correction(
         "curvature_per_m": (values[2], spread[2, 2]),
         "map_coefficients": (coefficients, map_variance.reshape(MAP_SHAPE)),
     }
-    wide = problem.wide()
+    wide = half_width(len(problem.views))
     ci95 = {
         name: np.stack([value - wide * np.sqrt(variance), value + wide * np.sqrt(variance)], axis=-1)
         for (name, (value, variance)), term in zip(middle.items(), GROUPS, strict=True)

@@ -183,10 +183,6 @@ class Problem:
         off, shifts = each - each.mean(axis=0), self.lens_shifts(columns)
         return (len(each) - 1) / len(each) * off.T @ off + shifts @ shifts.T
 
-    def wide(self, together: int = 1) -> float:
-        """Return ``half_width`` for the views of this problem."""
-        return half_width(len(self.views), together)
-
     def residuals_m(self, columns: IntArray) -> FloatArray:
         """Return (N,) true minus corrected depth."""
         return self.y_m - self.X[:, columns] @ self.solve(columns)
@@ -277,6 +273,7 @@ def _certain(problem: Problem, model: tuple[str, ...], added: Iterable[str]) -> 
     sds = np.abs(problem.solve(columns)) / np.sqrt(np.diag(problem.covariance(columns)))
     by_column = dict(zip(columns.tolist(), sds.tolist(), strict=True))
     return all(
-        max(by_column[column] for column in GROUPS[term]) > problem.wide(len(GROUPS[term]) * len(LADDER))
+        max(by_column[column] for column in GROUPS[term])
+        > half_width(len(problem.views), len(GROUPS[term]) * len(LADDER))
         for term in added
     )

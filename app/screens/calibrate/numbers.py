@@ -199,7 +199,7 @@ def separating_views(pair: Pair) -> str:
     """Return the end of a sentence: which views separate two correlated parameters, often with the reason."""
     names = {pair.first, pair.second}
     if names == set(FOCAL):
-        return "both are too long if the board is thought too far away; more tilted views tell its distance"
+        return "both depend on the distance of the board; more tilted views determine it"
     if names <= {*FOCAL, DISTANCE}:
         return (
             "a longer focal length with a board farther away looks nearly the same; more tilted views "

@@ -76,7 +76,7 @@ class QuickLook:
     def _came(self, view: PaintedView | None) -> None:
         self._rolling = False
         if view is not None:
-            if view.points > 2 * self._detail.points:  # a small ball needs them, whatever time they take
+            if view.points > 1.5 * self._detail.points:  # a small ball needs them, whatever time they take
                 self._submitted_s = None
             self._on_view(view)
         if not self._acknowledgement.waiting:

@@ -1,4 +1,6 @@
-"""Doubts about an answer whose evidence has none: other draws of the points, and other poses that fit."""
+"""Doubts about an answer that passes the tests of its evidence: registrations that lead elsewhere, and other
+poses that fit.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +53,7 @@ class Checked(NamedTuple):
     """Largest point error between the pose and those of further registrations; infinite if one failed, NaN if
     another pose had the better score."""
     settled: bool
-    """Whether the draws agree; then the pose is sure, unless ``doubts`` name a rival."""
+    """Whether these registrations agree; then the pose is sure, unless ``doubts`` name a rival."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +66,7 @@ class Checks:
     config: RegistrationConfig
 
     def __call__(self, way: Way, answer: Candidate, tried: Sequence[Candidate]) -> Checked:
-        """Check an answer whose evidence has no doubts, by draws of the points and rival poses.
+        """Check an answer, whose evidence may only doubt its stiffness, by registrations and rival poses.
 
         Where both clouds have colours, no rivals are tried: colours refute quarter turns, except in a room of
         one colour.

@@ -95,8 +95,7 @@ class Judge:
 
     def __call__(self, T_target_source: FloatArray) -> Evidence:
         """Return the evidence at a (4, 4) pose, rigid or with a scale."""
-        there = self.target.judge(self.source, T_target_source)
-        back = self.source.judge(self.target, np.linalg.inv(T_target_source))
+        there, back = self._judgements(T_target_source)
         heights = np.concatenate([there.heights[there.on], back.heights[back.on]])
         places_m, normals = self._overlap(there, back, T_target_source)
         return Evidence(
@@ -114,11 +113,13 @@ class Judge:
 
     def both_sides(self, T_target_source: FloatArray, length_m: float) -> tuple[FloatArray, FloatArray]:
         """Return both (4, 4) poses ``length_m`` from a pose along the motion that the surfaces hold least."""
-        there = self.target.judge(self.source, T_target_source)
-        back = self.source.judge(self.target, np.linalg.inv(T_target_source))
-        surface = self._overlap(there, back, T_target_source)
+        surface = self._overlap(*self._judgements(T_target_source), T_target_source)
         ahead, behind = (weakest_motion(*surface, way_m) for way_m in (length_m, -length_m))
         return ahead @ T_target_source, behind @ T_target_source
+
+    def _judgements(self, T: FloatArray) -> tuple[Judgement, Judgement]:
+        """Return what the target says of the source's points, and the source of the target's."""
+        return self.target.judge(self.source, T), self.source.judge(self.target, np.linalg.inv(T))
 
     def _overlap(self, there: Judgement, back: Judgement, T: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return places and unit normals, in the target frame, of the points on the other's surface."""

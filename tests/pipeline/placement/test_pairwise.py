@@ -9,12 +9,15 @@ import pytest
 from lab.worlds import box_room
 from lab.worlds.demos import disturbed
 from lab.worlds.render import Renderer
+from pipeline.acquisition import back_project
 from pipeline.config import PRESETS, RegistrationConfig
 from pipeline.kernels.geometry import inverse, rigid, rotation_exp
 from pipeline.placement import attempt
 from pipeline.placement.pairwise import place_nodes
+from pipeline.placement.views import Views
 from pipeline.registration import point_error_m, register
-from pipeline.types import DepthMap, RgbdFrame
+from pipeline.registration.finding.surface import Surface
+from pipeline.types import CameraIntrinsics, DepthMap, RgbdFrame
 from tests.pipeline.registration.rooms import seen_by
 
 CONFIG = PRESETS["packetmesh"].node_registration
@@ -115,3 +118,12 @@ def test_nodes_that_do_not_know_where_they_are_find_out():
     registrations, poses = placed(lost, works, RegistrationConfig(start="global"))
     assert len(registrations) == 3
     assert worst_error_m(scene, works, poses) < 0.02
+
+
+def test_a_nodes_points_are_seen_from_its_camera_even_in_clutter():
+    """In this view near and far pixels alternate, so that the points alone do not tell who saw them."""
+    z_m = np.where(np.indices((120, 160)).sum(axis=0) % 2, 1.0, 2.0)
+    camera = CameraIntrinsics.pinhole(150.0, 150.0, 79.5, 59.5, 160, 120)
+    frame = RgbdFrame("node_00", np.zeros((120, 160, 3), np.uint8), DepthMap(z_m), camera, np.eye(4))
+    assert Surface(back_project(frame)).view is None
+    assert Views([frame], 0).surface(0).view is not None

@@ -53,7 +53,7 @@ def test_the_thesis_is_shown_at_the_nearest_noise_and_not_without_any():
         (Pair("cy", "k1", 0.9), ("opposite sides",)),
         (Pair("cx", "cy", 0.9), ("(.90): views tilted to opposite sides separate them",)),
         (Pair("p1", "p2", 0.9), ("(.90): views tilted to opposite sides separate them",)),
-        (Pair("fx", "fy", 0.98), ("(.98): both are too long if the board is thought too far away",)),
+        (Pair("fx", "fy", 0.98), ("(.98): both depend on the distance of the board",)),
         (Pair("fx", "k1", 0.9), ("to the corners of the image",)),
         (Pair("fx", "k1", -0.5), ("separate all parameters", "is .50")),
     ],

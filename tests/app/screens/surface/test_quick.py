@@ -33,9 +33,9 @@ class Browser:
     def answer(self):
         self.ui.gui.press("Say that all is drawn")
 
-    def finish(self):
+    def finish(self, points=1):
         request, on_end = self.jobs[-1]
-        on_end(PaintedView(request, {}, 1, 1, 0.0))
+        on_end(PaintedView(request, {}, points, points, 0.0))
 
 
 def request(radius_m):
@@ -166,6 +166,19 @@ def test_what_is_asked_for_follows_the_browsers_answers(scene, monkeypatch):
     look.want(request(0.02))
     asked = [asked.most_points for asked, _ in browser.jobs]
     assert asked == [QUICK_POINTS] * LOOKS + [QUICK_POINTS // 2] * LOOKS + [QUICK_POINTS // 4]
+
+
+def test_a_look_that_needed_more_points_does_not_make_the_next_ones_coarser(scene, monkeypatch):
+    """Its ball is small; the time would not be shorter with fewer points asked for."""
+    browser, look, _ = scene
+    now_s = 0.0
+    monkeypatch.setattr(quick, "time", SimpleNamespace(monotonic=lambda: now_s))
+    for _ in range(4 * LOOKS):
+        look.want(request(0.01))
+        now_s += 2.0 * SLOW_S
+        browser.finish(2 * QUICK_POINTS)
+        browser.answer()
+    assert {asked.most_points for asked, _ in browser.jobs} == {QUICK_POINTS}
 
 
 def test_the_view_is_held_from_the_first_move_until_the_radius_rests(scene):
