@@ -1,1 +1,1 @@
-"""The command line, the web app and the written reports: the only place that knows viser and plotly."""
+"""The command line, the web app and the written reports. No other package imports viser or plotly."""

@@ -1,5 +1,5 @@
-"""The page that a browser gets: viser's, with the app's scripts and styles, and over it the landing, which
-offers lessons, scenes and the folder for one's own images while the first scene loads.
+"""The page that a browser gets: viser's page with the app's scripts and styles. The landing covers it and
+offers lessons, scenes and the upload of own images while the first scene loads.
 
 The landing is part of the page itself, so it is shown before viser starts. An address with a query skips it;
 in a lecture only the teacher's link shows it, without the scenes.
@@ -22,7 +22,7 @@ from app.window.teaching import ENGLISH
 from pipeline.io.demos import DEMOS
 
 PICTURES = Path(__file__).resolve().parents[1] / "assets" / "landing"
-"""Folder of ``NAME.jpg`` of every lesson and scene."""
+"""Folder with the picture ``NAME.jpg`` of each shipped lesson and each demo scene."""
 SHIPPED = (
     "can-a-picture-measure",
     "icp-against-ceicp",
@@ -32,7 +32,7 @@ SHIPPED = (
     "how-good-is-my-calibration",
     "how-a-walk-becomes-a-room",
 )
-"""The lessons that ship, in the order in which they are offered."""
+"""Names of the lessons that ship, in the order in which they are offered."""
 OwnCards = Sequence[tuple[Lesson[Any], str]]
 """A teacher's own lessons, each with the query of its scene and screen."""
 OWN_FOLDER = "Use your own images"
@@ -102,7 +102,7 @@ def _place(lesson: str) -> str:
 
 
 def _languages(own: OwnCards) -> Markup:
-    """Return the options of the language in which the lessons are shown."""
+    """Return the HTML options of the drop-down for the lessons' language."""
     options = ((code, code, name) for code, name in languages(lesson for lesson, _ in own).items())
     return Markup("").join(Markup('<option value="{}" lang="{}">{}</option>').format(*one) for one in options)
 
@@ -118,7 +118,14 @@ def _own_card(lesson: Lesson[Any], place: str) -> Markup:
 
 
 def _card(name: str, title: str, place: str, titles: Mapping[str, str] | None = None) -> Markup:
-    """Return a button that opens a place by its address and, for a lesson, the lesson of these titles."""
+    """Return a button with the picture ``name`` that opens a place.
+
+    Args:
+        name: name of the lesson or scene.
+        title: text on the button.
+        place: query of the address to open.
+        titles: titles of the lesson by language, by which the page then begins it; None for a scene.
+    """
     picture = base64.b64encode((PICTURES / f"{name}.jpg").read_bytes()).decode()
     image = Markup('<img alt="" src="data:image/jpeg;base64,{}">').format(picture)
     data = Markup('data-place="{}"').format(place)

@@ -1,4 +1,4 @@
-"""All lessons by their screens, and a teacher's own: found, read and checked before the app starts."""
+"""Kinds of lessons by screen, and a teacher's own lessons: found, read and checked before the app starts."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from packetmesh.errors import InputError
 from pipeline.io.demos import DEMO_WALKS, DEMOS
 
 KINDS: dict[str, Kind[Any]] = {kind.name: kind for kind in (CALIBRATE, DEPTH, FUSE, WALK, SURFACE, NETWORK)}
-"""By the names of the screens in lesson files; ``walk`` is Fuse with a recording."""
+"""Kinds of lessons by the names of their screens in lesson files; ``walk`` is Fuse with a recording."""
 SUFFIX = ".md"
 _HERE = Path(__file__).parent
 _SHARED = ("window", "looking", "measuring", "dock")
@@ -45,6 +45,7 @@ class OwnLesson:
 
     path: Path
     kind: str
+    """Name of its kind, a key of ``KINDS``."""
     lesson: Lesson[Any]
 
     @property
@@ -118,6 +119,7 @@ def _original(path: Path) -> Path:
 
 
 def _check(path: Path) -> tuple[OwnLesson | None, list[Fault]]:
+    """Return the lesson in a file and all faults; None instead of a lesson with faults."""
     named = TRANSLATION.fullmatch(path.stem)
     if named is not None and named[2] in NAMES:
         sentence = f"translates {named[1]}{SUFFIX}, which does not exist; write that file first"
@@ -144,7 +146,7 @@ def _check(path: Path) -> tuple[OwnLesson | None, list[Fault]]:
 
 
 def _scene_faults(path: Path, head: Mapping[str, tuple[int, str]], kind: Kind[Any]) -> Sequence[Fault]:
-    """Return a fault if the head names a scene that is no demo, or none for this screen."""
+    """Return a fault if the head names a scene that is not a demo scene; for a walk, not a demo recording."""
     line, scene = head.get("scene", (0, ""))
     scenes = DEMO_WALKS if kind is WALK else DEMOS
     if line == 0 or scene in scenes:
@@ -172,7 +174,7 @@ def _unknown_names(path: Path, text: str, kind: Kind[Any]) -> list[Fault]:
 
 @cache
 def names_on(screen: str) -> tuple[frozenset[str], frozenset[str]]:
-    """Return the titles of a screen's folders and tabs, and all texts in its code, its labels among them."""
+    """Return the titles of a screen's folders and tabs, and all texts in its code, labels included."""
     folders, texts = set[str](), set[str]()
     for path in (path for place in (f"screens/{screen}", *_SHARED) for path in (_HERE / place).glob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

@@ -66,7 +66,7 @@ FULL = (
 TRY_AGAIN = 1013
 """Websocket close code after which a page tries again to connect."""
 PANELS = (ScenePanel, CalibratePanel, DepthPanel, FusePanel, SurfacePanel, NetworkPanel, ExportPanel)
-"""The app's steps in order."""
+"""Panels of the app's screens, in their order."""
 
 
 @dataclass(slots=True)
@@ -77,9 +77,11 @@ class AppServer:
     pool: ComputePool
     folder: OwnFolder
     sessions: dict[int, Session] = field(default_factory=dict)
+    """Sessions by the numbers of their browsers; a lecture has one session, -1."""
     entrance: Entrance = field(default_factory=Entrance)
     crowd: Crowd = field(default_factory=Crowd)
     ahead: WorkAhead | None = None
+    """Computes likely results while no session requests any; None if that is off."""
 
     @property
     def url(self) -> str:
@@ -145,10 +147,10 @@ def build_server(
         lecture: share one session among all browsers, steered by those that open ``teacher_url``.
         with_token: admit only browsers that open ``class_link``, if other machines can reach the host.
         pool: a pool that is already started; None starts one. It stops with the server.
-        allow_hosts: further names of this server, which a proxy in front of it has.
+        allow_hosts: further host names of this server, such as that of a proxy in front of it.
         lessons: a teacher's own lessons.
-        ahead: begin with the results of the set-up, and compute the surfaces of the shown scene at all radii
-            while nobody asks for anything.
+        ahead: take the results that were computed at installation, and while no job runs compute the surfaces
+            of the shown demo scene at all radii.
 
     Raises:
         InputError: the port is taken, the address is not this machine's, a name is no host name, or the
@@ -204,7 +206,7 @@ def build_server(
 
 
 def _working_ahead(pool: ComputePool, store: Store, shared: SharedViews) -> WorkAhead:
-    """Return the work that begins with the first surface that somebody sees of a demo scene."""
+    """Return the work ahead, which is planned for each demo scene whose surface is known to the sessions."""
     work = WorkAhead(pool, store)
 
     def plan(spec: Spec, view: Any) -> None:

@@ -134,7 +134,8 @@ class NodesConfig:
     images: int = 1
     """Images of each node; 0 takes them until the horizon."""
     interval_s: float = 0.0
-    """Time between captures; 0 takes the next image when the last is delivered or given up."""
+    """Time between captures; 0 takes the next image when the last is delivered or given up, or,
+    without nodes.retransmit, when all its fragments were sent."""
     image_bytes: int = 921_615
     """Size of a colour image as encoded; a 640 x 480 PPM file by default."""
     depth_bytes: int = 0

@@ -53,7 +53,10 @@ def replications(config: NetworkConfig, count: int) -> list[NetworkConfig]:
 def iterate_runs(
     configs: Sequence[NetworkConfig], scheduler: str | None = None
 ) -> Generator[Progress, None, list[dict[str, Metric]]]:
-    """Simulate every config in parallel; returns their metrics in the same order."""
+    """Simulate all configs in parallel; returns the metrics of each, in the order of the configs.
+
+    ``scheduler`` is the address of a Dask scheduler; None uses this machine's cores.
+    """
     answers: dict[int, dict[str, Metric]] = {}
     for index, answer in run_batch(measured, configs, scheduler):
         answers[index] = answer
@@ -64,7 +67,10 @@ def iterate_runs(
 def iterate_sweep(
     config: NetworkConfig, key: str, values: Sequence[str], count: int, scheduler: str | None = None
 ) -> Generator[Progress, None, dict[str, Estimates]]:
-    """Estimate the metrics for each value of a setting such as ``"scheme.k"``; all values share seeds."""
+    """Estimate the metrics for each value of a setting such as ``"scheme.k"``; returns them by value.
+
+    Each value has ``count`` runs, with the same seeds for all values; ``scheduler`` as in ``iterate_runs``.
+    """
     cases = [with_settings(config, [f"{key}={value}"]) for value in values]
     runs = yield from iterate_runs([run for case in cases for run in replications(case, count)], scheduler)
     return {value: estimates_of(runs[i * count : (i + 1) * count]) for i, value in enumerate(values)}

@@ -76,7 +76,7 @@ class Cause(IntEnum):
 
     NONE = 0
     COLLISION = 1
-    """Another transmission overlapped and was not weak enough to be captured."""
+    """Another transmission overlapped and was too strong for this one to be captured."""
     NOISE = 2
     """Bit errors: the signal-to-noise ratio was too low."""
     RANGE = 3
@@ -124,9 +124,10 @@ class Delivery(NamedTuple):
     """Result of ``Mac.send`` for one packet."""
 
     ok: bool
+    """Whether the packet was delivered, as far as its sender knows."""
     cause: Cause
     """Why the packet was not delivered; ``NONE`` if it was."""
     attempts: int
-    """Number of frames sent for the packet."""
+    """Number of attempts to send the packet: data frames, and RTS frames that no data frame followed."""
     under_way: bool = False
     """True if the packet is still on its way; the medium access reports later whether it arrived."""

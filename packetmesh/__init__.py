@@ -6,8 +6,9 @@
     result = pm.reconstruct(rig, pm.PRESETS["packetmesh"])
     pm.write_mesh("room.glb", result.after)
 
-Lengths are in metres, times in seconds, angles in radians. Each name's module is imported at its first use,
-so that ``import packetmesh`` does not import numpy.
+Lengths are in metres, times in seconds and angles in radians, unless a name ends in another unit (``t_ns``,
+``rotation_deg``). Each name's module is imported at its first use, so that ``import packetmesh`` does not
+import numpy.
 """
 
 from importlib import import_module

@@ -31,16 +31,17 @@ def run_batch(
     """Call ``function`` with each task; yield each task's index and answer in the order of completion.
 
     At most about twice as many tasks are submitted as can run. When the iterator is closed or a task raises
-    an error, waiting tasks are dropped and running ones are completed; Ctrl-C stops these, too, and a cluster
-    drops them.
+    an error, waiting tasks are dropped; running ones are completed on this machine and dropped on a cluster.
+    Ctrl-C also stops the running tasks.
 
     Args:
         function: importable by name, because other processes call it.
         tasks: arguments of ``function``, one per call.
         scheduler: address of a Dask scheduler; None uses processes on this machine.
-        processes: largest number of processes, by default one per core; 1 runs the tasks in this process.
-        killed: returns the answer for a task whose process was killed even when it ran alone; the other
-            tasks continue. None raises an error instead.
+        processes: largest number of processes, by default one per core. With 1, or for a single task, the
+            tasks run in this process, and ``killed`` is not used.
+        killed: called with a task whose process was killed also when the task ran alone; returns the task's
+            answer, and the other tasks continue. None raises an error instead.
 
     Raises:
         InputError: the scheduler cannot be reached, or ``distributed`` is not installed.
@@ -74,7 +75,7 @@ def run_batch(
 
 
 def _alone(function: Callable[[Task], Answer], task: Task, killed: Callable[[Task], Answer] | None) -> Answer:
-    """Run a task again, alone in a new process, after a process was killed; returns its answer."""
+    """Run a task again, alone in a new process; return its answer, or ``killed(task)`` if it is killed."""
     with process_pool(1) as pool:
         try:
             return pool.submit(function, task).result()
@@ -84,14 +85,14 @@ def _alone(function: Callable[[Task], Answer], task: Task, killed: Callable[[Tas
 
 
 def process_pool(processes: int, begin: Callable[..., None] | None = None, *given: Any) -> Executor:
-    """Start processes that share the cores: each limits the threads of its libraries to its share of
-    the cores, except those that the program's main file imports, because a new process imports that first.
+    """Return a pool of new processes that share the cores. Each process limits its libraries' threads to its
+    share of the cores, except for libraries that the program's main file imports: it imports that file first.
 
     At Ctrl-C they exit silently, unless this process ignores interrupts (nohup): then they ignore them too.
 
     Args:
         processes: number of processes.
-        begin: importable by name; called with ``given`` when a process starts.
+        begin: importable by name; each process calls it with ``given`` at its start. None calls nothing.
         given: arguments of ``begin``.
     """
     heeded = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN

@@ -1,13 +1,14 @@
 """Errors whose messages users see: one sentence that names the thing, its value and what to try."""
 
 MOST_LETTERS = 1000
-"""Longest message, in characters; a message may quote a file."""
+"""Longest sentence that a message holds in full, in characters; a message may quote a file."""
 
 
 class PacketMeshError(Exception):
     """Base of the errors of which the app and the command line show only the message, without a stack trace.
 
-    The message is cut to ``MOST_LETTERS`` and kept to one printable line, because it may quote a file.
+    A sentence over ``MOST_LETTERS`` loses its middle, and every character that cannot be printed becomes a
+    blank, because the sentence may quote a file.
     """
 
     def __init__(self, sentence: str) -> None:

@@ -20,7 +20,7 @@ from typing import Any
 from packetmesh.errors import InputError
 
 MAX_TEXT_BYTES = 1_000_000
-"""Largest intrinsics or pose file that is read."""
+"""Largest text file that is read where no other limit is given, such as intrinsics and poses."""
 MAX_IMAGE_BYTES = 64_000_000
 MAX_IMAGE_PIXELS = 25_000_000
 MAX_GEOMETRY_BYTES = 1_000_000_000
@@ -53,7 +53,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     If the body raises, no partial file remains and an older ``path`` is unchanged.
 
     Raises:
-        InputError: the folder or the file cannot be written.
+        InputError: the folder or the file cannot be written, or the body raises an OSError.
     """
     path = Path(path)
     sibling = path.with_name(f".{path.stem}-{secrets.token_hex(4)}{path.suffix}")
@@ -73,7 +73,8 @@ def path_below(folder: Path, *names: str) -> Path:
     """Join a folder with names that come from a browser, an archive or a file.
 
     Raises:
-        InputError: a name is empty or absolute, or has ``..``, a drive or a null character.
+        InputError: a name is empty or absolute, or has ``..``, a drive or a null character; or the names
+            lead to the folder itself.
 
     >>> path_below(Path("runs"), "node_00", "color.png").as_posix()
     'runs/node_00/color.png'
@@ -125,7 +126,7 @@ def file_trouble(error: OSError) -> str:
 
 
 def remedy(error: OSError) -> str:
-    """Return what to try when a file cannot be written."""
+    """Return the part of a sentence that says what to try when a file cannot be written."""
     full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
     return "delete something there, as the disk is full" if full else "try another folder"
 
@@ -174,10 +175,10 @@ def read_bytes(path: str | os.PathLike[str], max_bytes: int, what: str) -> bytes
 def read_text(path: str | os.PathLike[str], what: str, max_bytes: int | None = None) -> str:
     """Return the content of a text file of at most ``max_bytes`` (None means ``MAX_TEXT_BYTES``).
 
-    It is UTF-8, or UTF-16 with a byte order mark, as Windows writes it; all line ends become ``\\n``.
+    The text is UTF-8, or UTF-16 with a byte order mark, as Windows writes it; all line ends become ``\\n``.
 
     Raises:
-        InputError: as for ``read_bytes``, or it is no such text.
+        InputError: as for ``read_bytes``, or the file has another encoding.
     """
     data = read_bytes(path, MAX_TEXT_BYTES if max_bytes is None else max_bytes, what)
     try:
@@ -192,7 +193,7 @@ def text_in(data: bytes, errors: str = "strict") -> str:
     """Decode UTF-8, or UTF-16 with a byte order mark; drop the mark, make all line ends ``\\n``.
 
     Raises:
-        UnicodeDecodeError: it is neither, and ``errors`` is "strict".
+        UnicodeDecodeError: ``data`` has another encoding, and ``errors`` is "strict".
     """
     marked = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))  # never the beginning of UTF-8
     text = data.decode("utf-16" if marked else "utf-8-sig", errors)

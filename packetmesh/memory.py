@@ -68,13 +68,16 @@ _limits_change = threading.Lock()
 
 
 def share_arenas(count: int = 2) -> None:
-    """Make all threads allocate from ``count`` arenas: one per thread leaves many half empty; glibc only."""
+    """Make all threads allocate from ``count`` arenas, as one arena per thread leaves many half empty.
+
+    Only glibc has arenas; with other libraries nothing happens.
+    """
     with suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).mallopt(_M_ARENA_MAX, count)
 
 
 def give_back_memory() -> None:
-    """Return free memory to the system; glibc only."""
+    """Return free memory to the system; nothing happens without glibc."""
     with suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)
 

@@ -1,4 +1,4 @@
-"""The base of all results that a notebook shows as a table."""
+"""Base class of the results that a notebook shows as a table."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from importlib import import_module
 
 
 class ShownInNotebooks:
-    """A result whose table a notebook shows; ``pipeline.notebook`` makes it, and is imported only then."""
+    """A result that a notebook shows as a table; ``pipeline.notebook`` is imported when the table is made."""
 
     __slots__ = ()
 

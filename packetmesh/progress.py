@@ -9,7 +9,7 @@ from typing import TypeVar
 Step = TypeVar("Step")
 Result = TypeVar("Result")
 REPORTS = 100
-"""Progress reports of a long loop, about."""
+"""Approximate number of progress reports of a long loop."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class Progress:
 
 
 def spaced(count: int, least: int) -> int:
-    """Return after how many of ``count`` steps to report progress: ``least`` or more, at most 101 times."""
+    """Return after how many of ``count`` steps to report progress: ``least`` or more, below 200 reports."""
     return max(least, count // REPORTS)
 
 

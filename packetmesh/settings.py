@@ -41,7 +41,7 @@ def config_named(preset: str, presets: Mapping[str, Config]) -> Config:
 
 
 def with_settings(config: Config, changes: Iterable[str]) -> Config:
-    """Return ``config`` with settings such as ``"depth.alignment=median"`` applied.
+    """Return ``config`` with settings such as ``"depth.alignment=median"`` applied; of equal keys the last.
 
     Raises:
         InputError: an unknown key (the message offers the nearest known ones) or a value that is invalid for
@@ -96,7 +96,10 @@ _hints_of = functools.cache(typing.get_type_hints)
 
 
 def _replaced(config: Any, values: dict[str, str], known: list[str], prefix: str = "") -> Any:
-    """Return ``config`` with ``values``, whose keys lack ``prefix``; ``known`` are all keys of the config."""
+    """Return ``config`` with ``values`` applied, whose keys are without ``prefix``.
+
+    ``known`` has all keys of the outermost config, from which errors offer the nearest.
+    """
     hints = _hints_of(type(config))  # type: ignore[arg-type]
     changes: dict[str, Any] = {}
     for key in {key.partition(".")[0] for key in values}:
@@ -126,7 +129,7 @@ def _unknown(key: str, known: list[str]) -> InputError:
 
 
 def _parsed(hint: Any, text: str, key: str) -> Any:
-    """Parse ``text`` as a value of type ``hint``."""
+    """Parse ``text`` as a value of type ``hint``, or raise an ``InputError`` that names ``key``."""
     if typing.get_origin(hint) is Literal:
         if text not in typing.get_args(hint):
             raise InputError(f"{key}={text} is not possible; try one of {', '.join(typing.get_args(hint))}")

@@ -31,7 +31,7 @@ UNITS = {
 """Unit of a setting, by the last part of its name."""
 
 UNITLESS = {"nakagami_m"}
-"""Names that have no unit although they end in one of these parts."""
+"""Names that have no unit although their last part is a key of ``UNITS``."""
 
 
 class Setting(NamedTuple):

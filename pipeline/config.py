@@ -10,7 +10,8 @@ from packetmesh.errors import InputError
 Pattern = Literal["circles", "circles-asymmetric", "chessboard", "charuco", "aprilgrid"]
 """Pattern that is printed on a calibration board."""
 Lens = Literal["thesis", "brown", "rational", "fisheye"]
-"""Distortion of a camera: k1, k2 (SPEC 1.1); also p1, p2, k3; also k4 to k6; or a fisheye's."""
+"""Distortion model: k1, k2 (thesis, SPEC 1.1); also p1, p2, k3 (brown); also k4 to k6 (rational); or k1 to k4
+of a fisheye lens."""
 OutlierMode = Literal["thesis", "depth_normalised", "robust", "flying"]
 AlignmentMode = Literal["none", "median", "affine_depth", "affine_inverse", "local"]
 ModelKind = Literal["metric", "relative", "inverse"]
@@ -49,7 +50,7 @@ Fill = Literal["auto", "completion", "network"]
 RadiusRule = Literal["thesis", "thesis+", "manual"]
 NodePoints = Literal["sensor", "fused"]
 MOST_AVERAGED = 64
-"""Most depth images of a camera that stands that are averaged: 79 MB at 640 x 480 pixels."""
+"""Largest number of depth images that are averaged if the camera stands: 79 MB at 640 x 480 pixels."""
 
 
 def _at_least(key: str, value: float, least: float) -> None:
@@ -64,7 +65,7 @@ def _above(key: str, value: float, bound: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class RecordingConfig:
-    """Recording to rig (SPEC 10)."""
+    """Settings that turn a recording into a rig (SPEC 10)."""
 
     frames: int = MOST_AVERAGED
     """Frames of a camera that stands, from the first one, that are averaged, 1 to 64; recordings of a camera
@@ -82,7 +83,7 @@ class AcquisitionConfig:
     outlier_mode: OutlierMode = "flying"
     """flying removes points between two surfaces or alone, by the sensor's noise. Others compare a point's
     mean neighbour distance with mu + t sigma of the cloud (thesis), with the same after division by depth
-    (depth_normalised), or with median + 3 robust sigma (robust)."""
+    (depth_normalised), or after that division with median + 3 robust sigma (robust)."""
     outlier_neighbours: int = 4
     """Neighbours N over which the mean distance is taken (eq. 3.5); the flying mode does not use it."""
     outlier_t: float = 1.0

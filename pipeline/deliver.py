@@ -81,7 +81,7 @@ def iterate_delivery(
     Args:
         spec: the source, the network, the coding, and the number of moments.
         processes: number of moments that are rebuilt in parallel; it does not change the results.
-        cache: results of stages that are known, such as the rig of a recording; None for none.
+        cache: stored results of stages, such as the rig of a recording; None starts an empty one.
 
     Yields:
         The moments in order of time; closing the generator cancels those not yet rebuilt.
@@ -128,7 +128,7 @@ def _moment_there(index: int) -> Moment:
 
 
 def _last(sending: Sending, lossless: Reconstruction) -> Reconstruction | None:
-    """Run the whole chain on all that arrived."""
+    """Reconstruct from all that arrived: ``lossless`` if nothing is missing, None if it is too little."""
     frames = frames_at_sink(sending, received_at(sending, int(sending.times_ns[-1])))
     if all(_same(*both) for both in zip(frames, sending.rig.frames, strict=True)):
         return lossless

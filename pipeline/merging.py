@@ -29,14 +29,14 @@ from pipeline.types import (
 )
 
 SIZING_POINTS = 2_000_000
-"""About the most points from which the voxels' size is chosen; of more, every k-th is used."""
+"""About the largest number of points from which the voxel edge is chosen; of more, every k-th is used."""
 NOISE_VOXELS = 2.0
-"""Least voxel edge over the median noise of the averaged points: smaller voxels only reproduce the noise."""
+"""Least ratio of the voxel edge to the measured points' median noise: smaller voxels reproduce the noise."""
 
 SPLAT = 2.0
 """Side of the square that a point of the map covers, in voxels."""
 IN_FRONT = 0.1
-"""Share of the depth by which a guess is clearly in front of the map."""
+"""Share of the map's depth by which an inferred point must be in front of the map to be kept."""
 LEAST_GUESSED = 30
 """Views with fewer inferred points are left out: too few for normals."""
 
@@ -83,8 +83,8 @@ def merge_fused(
         frames: the nodes' images.
         nodes: their clouds, each in its node's frame.
         T_world_camera: (4, 4) registered pose of each node.
-        mode: ``fill`` drops inferred points that another node's sensor can judge, and those close to
-            measured ones, so that no measurement is averaged with a guess.
+        mode: ``union`` averages all points; ``fill`` drops inferred points that another node's sensor can
+            judge, and those close to measured ones, so that no measurement is averaged with a guess.
         max_points: the voxels are chosen to leave about this many points, or fewer if they would be too small
             for the sensors' noise.
         smoothing_passes: how many times every point is moved onto the plane of its neighbours.
@@ -120,7 +120,8 @@ def merge_map(
 ) -> FusedCloud:
     """Add the nodes' inferred points to the map of a recording, where no frame measured.
 
-    A view's guess stands only where the view sees nothing of the map, or clearly in front of it.
+    An inferred point is kept only if its view sees no point of the map at its pixel, or if it is clearly in
+    front of the map there (``IN_FRONT``).
 
     Args:
         walk: the recording, with its map.

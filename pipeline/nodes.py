@@ -23,7 +23,7 @@ from pipeline.types import DepthMap, PointCloud, PointSource, RegistrationResult
 
 Cloud = TypeVar("Cloud", FilterResult, PointCloud)
 KEPT_NODES = 6
-"""Nodes whose whole clouds are kept after use."""
+"""Number of nodes, those used last, whose whole clouds are kept."""
 COLOR_REACH_PX = 8
 """Largest distance from a pixel that has arrived at which a filled-in colour is used."""
 
@@ -44,8 +44,8 @@ class InferredDepth:
 class NodeClouds:
     """Clouds and depth from one node's images, in its own camera frame.
 
-    Whole clouds are computed at first use and kept for the nodes used last (``KEPT_NODES``): those of a rig
-    of many nodes would take 30 MB each.
+    Whole clouds are computed at first use and kept only for the nodes used last (``KEPT_NODES``), because
+    they take 30 MB per node.
     """
 
     frame: RgbdFrame
@@ -59,6 +59,7 @@ class NodeClouds:
     inferred: PointCloud
     """Points of the accepted depth; in ``union`` mode of all inferred depth, as in the thesis."""
     inferred_registration: RegistrationResult | None
+    """Registration that moved ``inferred`` onto the measured points; None if it was not moved."""
     mode: FusionMode
     """How ``fused`` joins the measured and the inferred points."""
 

@@ -1,8 +1,8 @@
 """Sources of rigs: each has a title and knows its command-line arguments.
 
-``stages.open_rig`` loads the rig of any; rigs of images have ``load``. Equal sources give equal rigs, so that
-results are cached by source. Reading images needs large libraries, so they are imported only when a source is
-loaded.
+``stages.open_rig`` loads the rig of any source; sources of images have ``load``. Equal sources give equal
+rigs, so that results are cached by source. Reading images needs large libraries, so they are imported only
+when a source is loaded.
 """
 
 from __future__ import annotations
@@ -88,6 +88,7 @@ class ImagePair:
     depth_intrinsics: str | None = None
     """Intrinsics of the depth camera if the depth image is not registered to colour; needs ``extrinsics``."""
     extrinsics: str | None = None
+    """File with ``T_color_depth``, the pose of the depth camera in the colour camera."""
 
     @property
     def title(self) -> str:

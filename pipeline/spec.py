@@ -63,7 +63,7 @@ class Needs:
 
 
 def _averaged(spec: Spec) -> int:
-    """Return the frames to average; the most for sources without frames, whose rig is the same for all."""
+    """Return the number of frames to average; ``MOST_AVERAGED`` if the source's rig does not depend on it."""
     return spec.config.recording.frames if isinstance(spec.source, Recorded | RigFolder) else MOST_AVERAGED
 
 

@@ -58,7 +58,7 @@ from pipeline.types import DepthMap, PointCloud, Rig, Surface, SurfaceResult
 
 Result = TypeVar("Result")
 _NODES_AT_A_TIME = 3
-"""Nodes in parallel: with two on two cores, the last of three would run alone; more need more memory."""
+"""Nodes computed in parallel: with two, the last node of three would run alone; more need more memory."""
 Steps = Generator[Progress, None, Result]
 
 
@@ -146,7 +146,7 @@ def _ready(stage: StageName, results: dict[StageName, Done]) -> bool:
 def open_rig(source: Source, frames: int = MOST_AVERAGED) -> Steps[Rig]:
     """Load the images and, if it is known, the truth; a recording is averaged, or tracked and mapped.
 
-    ``frames`` is the number that is averaged if its camera stands.
+    ``frames`` is the number of a recording's frames that are averaged if its camera stands.
     """
     yield Progress(f"loading {source.title}", 0.0)
     if isinstance(source, Recorded):
@@ -229,7 +229,7 @@ def fused_cloud(
     nodes: tuple[NodeClouds, ...],
     placement: Placement,
 ) -> Steps[FusedCloud]:
-    """Merge the nodes' clouds, or those of a recording's map, into the one that the surface is made of."""
+    """Merge the nodes' clouds, or a recording's map and its nodes' inferred points, into one cloud."""
     yield Progress("merging the clouds", 0.6)
     if rig.walk is not None:
         return merge_map(rig.walk, rig.frames, nodes, placement.T_world_camera, smoothing_passes)

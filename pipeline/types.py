@@ -118,11 +118,11 @@ class Averaging:
     frames: int
     """Number of depth images that were averaged."""
     available: int
-    """Most that could be averaged."""
+    """Number that could be averaged: all frames of the recording, at most ``MOST_AVERAGED``."""
     moving_share: float
     """Share of the pixels that moved, which have no depth."""
     flickering_share: float
-    """Share of the pixels that few of the images measured."""
+    """Share of the pixels that some of the images measured, but less than a quarter of them."""
 
     @property
     def median_sd_m(self) -> float:
@@ -186,7 +186,7 @@ class Rig(ShownInNotebooks):
     frames: tuple[RgbdFrame, ...]
     truth: RigTruth | None = None
     walk: Walk | None = None
-    """The recording of which the nodes are a few frames, at their final poses."""
+    """The recording of which the nodes are keyframes, at their final poses; None for any other rig."""
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -254,10 +254,11 @@ class Link:
     T_target_source: FloatArray
     """(4, 4) pose of the source's depth camera in the target's."""
     information: FloatArray
-    """(6, 6) inverse covariance of the small motion (turn in rad, then shift in m) that the pose lacks."""
+    """(6, 6) inverse covariance of the pose's error, a motion of the source: turn in rad, then shift in m."""
     overlap_share: float
+    """Share of the source's points that the target's image can judge."""
     agreeing_share: float
-    """Share of the points that both measured and at about the same depth."""
+    """Share of the judged points whose depths agree; the smaller of source to target and back."""
     loop: bool = False
     """Whether it closes a loop; else tracking made it."""
     used: bool = True
@@ -282,9 +283,9 @@ class Walk:
     """Measured points of all frames, with normals and ``sigma_m``, in the world frame."""
     voxel_m: float
     first_frames: IntArray
-    """(N,) frame that measured each point of the map first."""
+    """(N,) number of the frame that first measured each point of the map."""
     T_world_tracked: tuple[FloatArray | None, ...]
-    """Pose of the colour camera at each frame by tracking alone; the same at the first keyframe."""
+    """Pose of the colour camera by tracking alone; equal to ``T_world_camera`` at the first keyframe."""
     notes: tuple[str, ...] = ()
     """Assumptions and doubts, one sentence each."""
 
@@ -335,7 +336,7 @@ class RegistrationResult(ShownInNotebooks):
 
 @dataclass(frozen=True, slots=True)
 class Gaps:
-    """Gaps that the cameras see in a mesh; a gap seen by two cameras counts twice."""
+    """Gaps in a mesh, counted in each camera's image; an image without any of the mesh has none."""
 
     count: int
     """Connected groups of pixels whose rays miss the mesh, of any size."""
@@ -352,10 +353,10 @@ class SurfaceQuality:
     no_hit_ray_share: float
     """Rays without a surface: share of the cameras' pixel rays that meet no triangle, 0 to 1."""
     boundary_loops: int
-    """Number of rims: connected components of the graph of edges with exactly one face."""
+    """Holes and outer rims: number of connected components of the graph of edges with exactly one face."""
     boundary_length_m: float
     hole_area_m2: float
-    """Fan-triangulated area of loops shorter than 1 m, except those around a whole component."""
+    """Area of the holes: loops under 1 m, without each component's longest loop and islands (``Hole``)."""
     non_manifold_edges: int
     """Edges with more than two faces."""
     components: int

@@ -88,7 +88,7 @@ def _solve(folder: Path, out: Path) -> dict[str, object]:
 
 
 def _browsers(kind: Literal["load", "soak"], seconds: float) -> Benchmark:
-    """Return a benchmark of thirty browsers at once; its time is the median from a click to its answer."""
+    """Run the load test of thirty browsers; its time is the median from a click to its answer."""
     from app.load.load import put_load, soak
     from lab.benchmarks.benchmark import Benchmark
 

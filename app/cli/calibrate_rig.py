@@ -26,8 +26,8 @@ def several_cameras(images: Sequence[str], rig: bool = False) -> tuple[NodeShots
         rig: whether the images of one folder are of several cameras, which their names tell.
 
     Raises:
-        InputError: folders without images, more cameras than a rig has, only one camera below a folder, or
-            names that do not tell cameras apart.
+        InputError: folders without images, more cameras than a rig may have, only one camera below a folder,
+            or names that do not tell cameras apart.
     """
     from packetmesh.errors import InputError
     from pipeline.calibration.from_images import image_files
@@ -70,10 +70,10 @@ def calibrate_cameras(
         lens: distortion model of all cameras.
         held_out: number of folds in which moments are left out and predicted; 0 leaves out none.
         range_m: distance at which the cameras will measure.
-        accuracy_m: largest allowed error of a point there.
+        accuracy_m: largest allowed error of a point at that distance.
         without: images to leave out, as node_01/color_03.png.
         like: a rig in whose world frame the cameras are placed, by the pose of its first node.
-        depth_scale: depth units per metre; None takes whole numbers as millimetres.
+        depth_scale: depth units per metre; None takes whole numbers as millimetres, others as metres.
         json: print everything as one JSON object.
     """
     from app.reports.calibration import write_calibration_report
@@ -101,7 +101,7 @@ def calibrate_cameras(
 
 
 def _lines(report: RigReport, trust: Mapping[str, Trust]) -> Iterator[str]:
-    """Yield a line per camera, then a line per pair."""
+    """Yield a line per camera and per pair, then depth sensors, verdicts, RMS error and unused images."""
     for name, one in report.cameras.items():
         found = one.calibration
         errors = found.standard_errors

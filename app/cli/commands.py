@@ -1,4 +1,4 @@
-"""All commands by their names, and the exit code of a run."""
+"""The commands by name, and the function that runs one and exits with its code."""
 
 from __future__ import annotations
 

@@ -89,7 +89,7 @@ def _settings(
 ) -> tuple[NetworkConfig, NetworkConfig, PipelineConfig, list[str]]:
     """Return the network before and after its changes, the chain's settings, and the network's changes.
 
-    A change whose key is one of the chain's goes to the chain, every other to the network.
+    A change whose key belongs to a part of the chain's settings is for the chain, any other for the network.
     """
     from network_sim.presets import PRESETS as NETWORKS
     from pipeline.config import PRESETS
@@ -102,7 +102,7 @@ def _settings(
 
 
 def _with_link(network: NetworkConfig, link_trace: Path, changes: list[str]) -> NetworkConfig:
-    """Return the network over the recorded link, and say which given settings it replaces."""
+    """Return the network with a recorded link for every node; print which given settings it replaces."""
     replayed = replace(network, mac=replace(network.mac, kind="replay", trace=str(link_trace)))
     for change in changes:
         key, value = key_of(change), change.partition("=")[2].strip()
@@ -112,7 +112,7 @@ def _with_link(network: NetworkConfig, link_trace: Path, changes: list[str]) -> 
 
 
 def _say_notes(network: NetworkConfig, before: NetworkConfig, preset: str, changes: list[str]) -> None:
-    """Say which of the network's settings change nothing, and how recorded links were read."""
+    """Print which of the network's settings change nothing, and how recorded links were read."""
     from app.cli.simulate import say_network_notes
     from pipeline.delivery.plan import replaced_settings
 

@@ -49,7 +49,7 @@ def doctor(json: bool = False) -> None:
 
 
 def examine() -> list[Finding]:
-    """Check everything that the program needs; a failed check raises no error."""
+    """Check everything that the program needs; a failed check is a finding, not an error."""
     return [
         finding
         for look in (_python, _machine, _packages, _open3d, _network, _scenes, _port, _browser)

@@ -124,7 +124,7 @@ def _infer_photos(
 
 
 def _alignment(result: AlignmentResult) -> dict[str, Any]:
-    """Return the alignment of depth to the sensor's metres (SPEC 3.5); disparity has its own line."""
+    """Return a record of the alignment of the inferred depth to the sensor's (SPEC 3.5)."""
     return {
         "mode": result.mode,
         "coefficients": result.coefficients,
@@ -140,7 +140,11 @@ def _fill_holes(
     network: DepthNetwork,
     completion: Path | None,
 ) -> tuple[DepthMap, dict[str, Any]]:
-    """Fill the holes of measured depth by completion, or with the user's own network (SPEC 3.6)."""
+    """Fill the holes of measured depth by completion, or with the user's own network (SPEC 3.6).
+
+    Returns:
+        The filled depth; the share of pixels that were filled, and their mean confidence (None without any).
+    """
     import numpy as np
 
     from pipeline.config import DepthConfig
@@ -183,7 +187,7 @@ def _write_depth(depth: DepthMap, kind: ModelKind, out: Path, stem: str) -> dict
 
 
 def _colored(depth: DepthMap) -> Any:
-    """Return (H, W, 3) the nearness 1/z: light where near, magenta where unknown."""
+    """Return a picture (H, W, 3) of the nearness 1/z: light where near, magenta where unknown."""
     import numpy as np
 
     from app.drawing.colors import HOLE

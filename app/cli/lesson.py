@@ -1,4 +1,4 @@
-"""``packetmesh lesson``: checks a teacher's own lessons."""
+"""``packetmesh lesson``: checks of a teacher's own lessons."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ def measure(
 
 
 def _places(texts: tuple[str, ...], option: str) -> list[Place]:
-    """Return the places of an option; exit if a text is not three numbers."""
+    """Return the places of an option; exit with 2 if a text is not three numbers."""
     places = []
     for text in texts:
         try:
@@ -98,7 +98,7 @@ def _places(texts: tuple[str, ...], option: str) -> list[Place]:
 
 
 def _check(places: dict[str, list[Place]], singles: dict[str, Place]) -> None:
-    """Exit if the places make no measure."""
+    """Exit with 2 if the places make no measure."""
     points, planes = len(places["points"]), len(places["planes"])
     if not (points or planes or singles):
         wrong_use("say what to measure: --points, --planes, --box or --hole")
@@ -111,7 +111,7 @@ def _check(places: dict[str, list[Place]], singles: dict[str, Place]) -> None:
 
 
 def _marks(surface: MeasuredSurface, places: dict[str, list[Place]], snap: Snap, factor: float) -> list[Mark]:
-    """Return the points of the surface for --points, times the factor of the surface's scale."""
+    """Return the points of the surface for --points, whose coordinates are multiplied by ``factor``."""
     import numpy as np
 
     from pipeline.measuring.marks import mark
@@ -120,7 +120,7 @@ def _marks(surface: MeasuredSurface, places: dict[str, list[Place]], snap: Snap,
 
 
 def _moved(marks: list[Mark], places: dict[str, list[Place]], factor: float) -> Iterator[str]:
-    """Yield a sentence for each of --points from which the measured point is a millimetre away or more."""
+    """Yield a sentence for each of --points that is ``LEAST_AWAY_M`` or more from its measured point."""
     import numpy as np
 
     for one, place in zip(marks, places["points"], strict=True):
@@ -139,7 +139,7 @@ def _measured(
 ) -> list[Measure]:
     """Return all measures of the marks (--points) and of the places for --planes, --box and --hole.
 
-    ``factor`` is the scale of the surface and the marks over that of the places, which are multiplied by it.
+    The places are multiplied by ``factor``, by which the surface and the marks are already scaled.
     """
     import numpy as np
 
@@ -166,7 +166,7 @@ def _measured(
 
 
 def _row(one: Measure, value: Value) -> tuple[str, ...]:
-    """Return a line of the table; millimetres where the interval has them."""
+    """Return a row of the table: name, value with unit, 95 % interval, and whether an end is guessed."""
     unit = {"m": "m", "deg": "°", "m2": "m²"}[value.unit]
     digits = {"m": 4, "deg": 2, "m2": 5}[value.unit]
     low, high = (f"{end:.{digits}f}" for end in value.ci95)

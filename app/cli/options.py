@@ -48,7 +48,7 @@ class SourceOptions:
     """Folder of a calibration; its node_00/{intrinsics.json, pose.txt, ...} replace those of the images."""
 
     def source(self) -> FileSource:
-        """Return the source that the options name; exit if they name none or more than one."""
+        """Return the source that the options name; exit with 2 if they name none or more than one."""
         if self.recording is not None:
             return self._recorded()
         from pipeline.sources import Calibrated, Recorded
@@ -61,12 +61,12 @@ class SourceOptions:
         return Calibrated(source, str(self.calibration))
 
     def nothing_but_scale(self, option: str) -> None:
-        """Exit if they name any images; only the depth scale may be given with this option."""
+        """Exit with 2 if the options name images; only the depth scale may be given with ``option``."""
         if replace(self, depth_scale=None) != SourceOptions():
             wrong_use(f"{option} takes no other images: leave out --scene, --rig, --color and their options")
 
     def _recorded(self) -> Recorded:
-        """Return the recording; exit if there are other images."""
+        """Return the recording; exit with 2 if other images are given."""
         alone = SourceOptions(intrinsics=self.intrinsics, depth_scale=self.depth_scale)
         if replace(self, recording=None) != alone:
             wrong_use("--recording takes no other images: besides it only --intrinsics and --depth-scale")

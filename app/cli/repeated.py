@@ -1,7 +1,7 @@
-"""Arguments that the parser would misunderstand.
+"""Rewriting of arguments that the parser would misunderstand.
 
-Of an option with several values that is given more than once, such as ``--set a=1 --set b=2``, it would keep
-the last one's values only; a place such as ``-0.2,1,1.5`` it would take for an option.
+If an option with several values is given more than once, such as ``--set a=1 --set b=2``, the parser would
+keep only the values of the last. It would take a place such as ``-0.2,1,1.5`` for an option.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ REPEATABLE = ("--set", "--down", "--only", "--without")
 
 
 _NEGATIVE_PLACE = re.compile(r"-[\d.][^\s,]*,")
-"""Beginning of coordinates, the first of them negative."""
+"""Beginning of coordinates of which the first is negative."""
 
 
 def with_negative_places(argv: Sequence[str]) -> list[str]:
@@ -22,7 +22,7 @@ def with_negative_places(argv: Sequence[str]) -> list[str]:
 
 
 def joined(argv: Sequence[str]) -> list[str]:
-    """Return the arguments with all values of a repeated option after its last occurrence."""
+    """Return the arguments with each repeated option once, at the end, followed by all its values."""
     arguments = list(argv)
     for option in REPEATABLE:
         if sum(_is(option, argument) for argument in arguments) > 1:

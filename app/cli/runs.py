@@ -1,4 +1,4 @@
-"""One reconstruction with its folder and report, and many of them, each in its own process."""
+"""Reconstruction of one rig into a folder with a report, and of many rigs in parallel processes."""
 
 from __future__ import annotations
 
@@ -55,13 +55,13 @@ class RigTask:
 
 @dataclass(frozen=True, slots=True)
 class RigOutcome:
-    """Result of one task; shares from 0 to 1, NaN if it failed or has no such value."""
+    """Result of one task. Shares are from 0 to 1; a share or time is NaN if the task failed or has none."""
 
     name: str
     state: State
-    """``kept``: an earlier run with the same settings is complete."""
+    """``kept``: the folder has a complete earlier run of the same path with the same settings."""
     sentence: str
-    """The error, or the nodes that are left out; empty if there is neither."""
+    """The error, or notes on the import, nodes without a place and doubtful images; empty without any."""
     nodes: int = 0
     no_hit_before: float = float("nan")
     no_hit_after: float = float("nan")
@@ -76,7 +76,7 @@ def iterate_run(
 ) -> Generator[Progress, None, tuple[Reconstruction, dict[str, Any]]]:
     """Reconstruct and write a run folder with its report; unusable images leave no folder.
 
-    A recording that is named as a rig is first imported to ``out/imported``. With a baseline, its surface is
+    A recording that is given as a rig is first imported to ``out/imported``. With a baseline, its surface is
     written, too.
 
     Returns:
@@ -113,8 +113,10 @@ def iterate_run(
 def iterate_imported(
     source: FileSource, out: Path
 ) -> Generator[Progress, None, tuple[FileSource, ImportReport | None]]:
-    """Return the source itself, or the rig in ``out/imported`` to which a recording is imported, with the
-    import report.
+    """Import a recording that is given as a rig to ``out/imported``; return any other source unchanged.
+
+    Returns:
+        The source to reconstruct, and the import report; None if nothing was imported.
 
     Raises:
         PacketMeshError: a recording or a folder that cannot be used.
@@ -165,6 +167,9 @@ def iterate_rigs(
 
     Returns:
         The outcomes in the order of the tasks.
+
+    Raises:
+        PacketMeshError: the cluster cannot be reached or was lost.
     """
     outcomes: dict[int, RigOutcome] = {}
     try:
@@ -184,9 +189,9 @@ def _killed_outcome(task: RigTask) -> RigOutcome:
 
 
 def reconstruct_one(task: RigTask) -> RigOutcome:
-    """Do one task unless an earlier run is complete; errors in its images are returned, not raised.
+    """Do one task, unless its folder has a complete run of the same inputs; errors are returned, not raised.
 
-    An error of the program itself is written to ``NAME.log`` next to the run's folder.
+    The traceback of an error of the program itself is written to ``NAME.log`` next to the run's folder.
     """
     out = Path(task.out)
     log = out.with_name(f"{out.name}.log")
@@ -212,7 +217,7 @@ def reconstruct_one(task: RigTask) -> RigOutcome:
 
 
 def _source_of(task: RigTask) -> FileSource:
-    """Return the source of a task: a recording, or a rig. One of a single frame is imported as a rig.
+    """Return the source of a task: a rig, or a recording. A recording of a single frame counts as a rig.
 
     Raises:
         InputError: a recording that cannot be used.
@@ -224,7 +229,7 @@ def _source_of(task: RigTask) -> FileSource:
 
 
 def _record(task: RigTask) -> dict[str, Any]:
-    """Return the inputs of a run; written last as a file, they mark the run as complete."""
+    """Return the inputs of a run. They are written as the run's last file, which marks it as complete."""
     return {"path": task.path, "depth_scale": task.depth_scale, "settings": settings(task.config)}
 
 
@@ -240,7 +245,7 @@ def _kept_outcome(task: RigTask) -> RigOutcome | None:
 
 
 def _outcome(task: RigTask, state: State, metrics: dict[str, Any]) -> RigOutcome:
-    """Return the numbers of a run for the table."""
+    """Return the outcome of a run from its metrics: failed if it has several nodes and no two agree."""
     before, after, measured = metrics["surface_before"], metrics["surface_after"], metrics["measured"]
     numbers = (
         before["no_hit_ray_share"],

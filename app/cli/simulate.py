@@ -60,14 +60,14 @@ def simulate(
 def say_network_notes(
     config: NetworkConfig, before: NetworkConfig, preset: str, changes: Sequence[str], placed: bool = True
 ) -> None:
-    """Say which given settings change nothing, and how recorded links were read.
+    """Print which given settings change nothing, and how recorded links were read.
 
     Args:
         config: the network, with the changes.
-        before: the preset or the config file without them.
+        before: the preset or the config file without the changes.
         preset: name of the preset, or path of the file, whose settings count as given.
         changes: settings as ``key=value``.
-        placed: whether the config has the nodes' places.
+        placed: whether the nodes' places are those of the config, so that links can be compared.
 
     Raises:
         InputError: a recorded link cannot be read.
@@ -167,7 +167,7 @@ def _sweep(
 
 
 def _without_swept(changes: Sequence[str], sweep: str) -> list[str]:
-    """Say which given settings the sweep replaces, and return the others."""
+    """Print which given settings the sweep replaces, and return the others."""
     from packetmesh.settings import key_of
 
     swept = [change for change in changes if key_of(change) == key_of(sweep)]
@@ -177,7 +177,7 @@ def _without_swept(changes: Sequence[str], sweep: str) -> list[str]:
 
 
 def _say_idle_sweep(config: NetworkConfig, key: str, values: Sequence[str]) -> None:
-    """Say why a swept setting changes nothing, if no value of it does."""
+    """Print why the swept setting has no effect, if none of its values changes anything."""
     from network_sim.advice.no_effect import without_effect
     from packetmesh.settings import with_settings
 
@@ -188,7 +188,7 @@ def _say_idle_sweep(config: NetworkConfig, key: str, values: Sequence[str]) -> N
 
 
 def _run_with_progress(steps: Generator[Progress, None, Result]) -> Result:
-    """Run a computation and return its result; print every tenth of its progress."""
+    """Run a computation and return its result; print its progress at each tenth of the way."""
     printed = 0
     while True:
         try:

@@ -22,13 +22,13 @@ def say_progress(progress: Progress) -> None:
 
 
 def wrong_use(sentence: str) -> NoReturn:
-    """Print the error in the options and exit with 2."""
+    """Print what is wrong with the options, and exit with 2."""
     say(f"packetmesh: {sentence}")
     sys.exit(2)
 
 
 def print_json(value: Any) -> None:
-    """Print one strict JSON object on stdout."""
+    """Print a value as strict JSON on one line of stdout (NaN and infinity become null)."""
     from packetmesh.files import finite
 
     sys.stdout.write(f"{json.dumps(finite(value), allow_nan=False)}\n")

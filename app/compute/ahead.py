@@ -1,4 +1,4 @@
-"""Compute results before a session needs them: the chain of the start settings, then likely ones at rest."""
+"""Compute results before a session needs them: first the start settings' chain, later likely jobs."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from app.compute.state import CHAIN, Spec, Step
 from app.compute.store import Store
 
 REST_S = 3.0
-"""Time without any job after which work ahead begins, seconds: a page that just got its surface draws it."""
+"""Time without any job after which work ahead begins, seconds: a page needs it to draw a new surface."""
 LOOK_S = 0.5
-"""Time between two checks of whether it may begin, seconds."""
+"""Time between two checks of whether work ahead may begin, seconds."""
 
 
 def compute_ahead(pool: ComputePool, store: Store, shared: SharedViews, spec: Spec, owner: object) -> None:
@@ -68,7 +68,7 @@ class LikelyJob:
     """A job whose answer a session will probably need."""
 
     key: Hashable
-    """What the answer depends on, as sessions ask for it."""
+    """Everything that the answer depends on: the key by which sessions look it up."""
     function: Callable[..., Any]
     """``app.compute.jobs.run_step`` or ``run_kept``, so that the answer is kept in the store."""
     arguments: tuple[Any, ...]
@@ -91,7 +91,7 @@ class WorkAhead:
         return self._plan is not None and self._thread is None
 
     def plan(self, name: Hashable, likely: Callable[[], Iterable[LikelyJob]]) -> None:
-        """Compute these jobs in place of those before; nothing changes if the present plan has this name."""
+        """Compute the jobs of ``likely()`` instead of those of the present plan, unless it has this name."""
         with self._lock:
             if name == self._plan or self._closing.is_set():
                 return
@@ -102,7 +102,7 @@ class WorkAhead:
                 self._thread.start()
 
     def close(self) -> None:
-        """Begin nothing more."""
+        """Start no further job."""
         self._closing.set()
         self._ended.set()
 
@@ -146,7 +146,7 @@ class WorkAhead:
         return ends != ["stopped"]
 
     def _drop(self, likely: LikelyJob) -> None:
-        """Remove a job that is still the first: there may be another plan by now."""
+        """Remove a job if it is still the first; another plan may have replaced it."""
         with self._lock:
             if self._likely and self._likely[0] is likely:
                 self._likely.popleft()

@@ -1,4 +1,4 @@
-"""What a computing process does: take jobs from the server's pool and report, until the server is gone."""
+"""The main function of a computing process: run the pool's jobs and report, until the server has ended."""
 
 from __future__ import annotations
 
@@ -21,7 +21,14 @@ NICENESS = 5
 
 
 def attend(connection: Connection, warm_up: Callable[[], Iterator[None]], threads: int) -> None:
-    """Run as the main function of a computing process."""
+    """Run as the main function of a computing process.
+
+    Args:
+        connection: pipe to the pool: receives ("job", (function, arguments)) and ("stop", None); sends
+            "ready", "warm", "progress" and the job's outcome, each with a value.
+        warm_up: yields between the parts of the warm-up; the first is run before "ready".
+        threads: number of threads for numerical libraries.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_server, daemon=True).start()
     if hasattr(os, "nice"):
@@ -68,7 +75,7 @@ def _end_with_server() -> None:
 def _answer(
     connection: Connection, function: Callable[..., Any], arguments: tuple[Any, ...]
 ) -> tuple[str, Any]:
-    """Run one job. Returns its outcome as a message for the attending thread."""
+    """Run one job. Returns its outcome as a message for the pool's thread that attends this process."""
     try:
         value = function(*arguments)
         while inspect.isgenerator(value):

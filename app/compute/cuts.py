@@ -35,7 +35,7 @@ class Box:
     centre_m: Place
     size_m: Place
     turn_deg: float = 0.0
-    """Turn about the vertical through its centre."""
+    """Turn about the vertical through its centre, counter-clockwise as seen from above."""
     inside: bool = False
     """Whether the inside is cut off instead of the outside."""
 
@@ -44,8 +44,8 @@ Cut: TypeAlias = Top | Plane | Box | None
 
 
 def planes_of(cut: Cut) -> list[tuple[FloatArray, FloatArray]]:
-    """Return the planes of a cut, each as (3,) a point and (3,) the normal. Normals point to the kept side,
-    but those of a box always to its inside.
+    """Return the planes of a cut, each as a point (3,) and a unit normal (3,). Normals point to the kept
+    side; those of a box point to its inside, even if the inside is cut off.
     """
     if isinstance(cut, Top):
         return [(np.array([0.0, 0.0, cut.height_m]), np.array([0.0, 0.0, -1.0]))]

@@ -28,7 +28,14 @@ def run(job: str, *arguments: Any) -> Any:
 
 
 def run_kept(job: str, key: Hashable, store: Store, spec: Spec, *arguments: Any) -> Generator[Any, None, Any]:
-    """Return what the job with this address returns; from the store if it has the answer with this key."""
+    """Return the answer of the job with this address: from the store, or computed and then stored.
+
+    Args:
+        job: address of the job.
+        key: everything that the answer depends on.
+        store: the server's store.
+        spec: passed to the job after the store, before ``arguments``.
+    """
     answer = store.get(kept(key))
     if answer is None:
         answer = run(job, store, spec, *arguments)
@@ -39,7 +46,7 @@ def run_kept(job: str, key: Hashable, store: Store, spec: Spec, *arguments: Any)
 
 
 def run_step(step: Step, store: Store, spec: Spec) -> Generator[Any, None, Any]:
-    """Run the job of a step; the answers of the chain's steps are kept."""
+    """Run the job of a step; the answers of the chain's steps are kept in the store."""
     job = f"{step}.job:{step}_job"
     if step in CHAIN:
         return (yield from run_kept(job, spec.key(step), store, spec))
@@ -52,7 +59,7 @@ def start_pool() -> ComputePool:
 
 
 def warm_up() -> Iterator[None]:
-    """Import the first step's job, then all other jobs, then the compiled code, a part before each yield."""
+    """Import the first step's job, then all other jobs, then compile numba functions; yield between them."""
     for step in CHAIN:
         importlib.import_module(f"{SCREENS}.{step}.job")
         yield

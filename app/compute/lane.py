@@ -12,7 +12,7 @@ from app.compute.pool import ComputePool, Outcome, Ticket
 from app.compute.state import Step
 
 CANCEL_S = 1.0
-"""Time that a cancelled job gets before its process is killed, seconds. A new process then has to start."""
+"""Time that a cancelled job gets before its process is killed and a new one starts, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,10 @@ class LatestWins:
         on_end: Callable[[Outcome], None],
         key: Hashable = None,
     ) -> None:
-        """Start this job, or make it the waiting job and ask the running one to stop."""
+        """Start this job, or make it the waiting job and ask the running one to stop.
+
+        ``on_end`` of a waiting job that this one replaces is not called.
+        """
         start = partial(
             self.pool.submit,
             self.owner,
@@ -70,7 +73,7 @@ class LatestWins:
         self.pool.stop(running)
 
     def stop(self) -> None:
-        """Drop the waiting job and ask the running one to stop at its next progress report."""
+        """Drop the waiting job without a call of its ``on_end``, and ask the running one to stop."""
         self._stop(None)
 
     def cancel(self) -> None:

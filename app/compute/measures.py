@@ -97,6 +97,7 @@ class Quantity:
     low: float
     high: float
     guessed: bool
+    """Whether an end was guessed, as in ``pipeline.measuring.values.Value``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,11 +162,12 @@ class MeasureAnswer:
     pending: Clicked
     """Points of the measure that is not complete after the clicks."""
     ends: tuple[End, ...]
-    """Its points as they are drawn."""
+    """The points of ``pending`` as they are drawn."""
     missed: str = ""
     """Why the last click gave no point; empty if it gave one."""
     scaled: ScaleView | None = None
     """By how much all lengths are scaled; None if they are not."""
     checked: ScaleView | None = None
+    """Comparison for ``request.check``; None without one."""
     scale_source: str = ""
     """Sentence on the uncertainty of the scale."""

@@ -27,7 +27,7 @@ logger = logging.getLogger(__name__)
 PATIENCE_S = 3.0
 """Time that a superseded job gets to stop before its process is killed, seconds."""
 RESPAWN_PAUSE_S = 1.0
-"""Pause before a process that died during start-up is started again, seconds."""
+"""Pause before a process is started that replaces one that died at its start or grew too large, seconds."""
 MEMORY_LIMIT_BYTES = 2 << 30
 """Memory limit of a process: one that holds more after a job is replaced by a new process."""
 DIED = "The computing process ended unexpectedly, perhaps out of memory: try fewer points or a smaller ball."
@@ -35,7 +35,7 @@ DIED = "The computing process ended unexpectedly, perhaps out of memory: try few
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The end of a job: its result, its error, or that it was stopped."""
+    """Outcome of a job: a result, an error, or neither because it was stopped."""
 
     kind: Literal["result", "error", "stopped"]
     value: Any = None
@@ -47,18 +47,19 @@ class Ticket:
     """A submitted job, until it ends."""
 
     owner: object
-    """Identifies who submitted the job; the pool never runs two jobs of one owner at once."""
+    """The object on whose behalf the job runs; the pool never runs two jobs of one owner at once."""
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
     on_progress: Callable[[Any], None]
     on_end: Callable[[Outcome], None]
     key: Hashable = None
-    """What the result depends on: jobs with equal keys are computed once. None: the job is never shared."""
+    """Everything that the result depends on: jobs with equal keys are computed once, those with None each."""
     urgent: bool = False
     """Whether the job starts before waiting jobs that are not urgent."""
     ahead: bool = False
-    """Whether nobody waits for the job yet: it starts only while all other jobs are ahead, too, and a second
-    process is free. It is asked to stop when a job that is not ahead and has another key is submitted."""
+    """Whether no session waits for the job yet: it starts only while all other jobs are ahead, too, and a
+    second process is free. It is asked to stop when a job that is not ahead and has another key is
+    submitted."""
     stopping: bool = False
 
 
@@ -123,7 +124,11 @@ class ComputePool:
         urgent: bool = False,
         ahead: bool = False,
     ) -> Ticket:
-        """Queue a job. The callbacks run on a thread of the pool and must return quickly."""
+        """Queue a job. The callbacks run on a thread of the pool and must return quickly.
+
+        Raises:
+            RuntimeError: the pool is closed.
+        """
         ticket = Ticket(owner, function, arguments, on_progress, on_end, key, urgent, ahead)
         with self._lock:
             if self._closed:
@@ -140,7 +145,10 @@ class ComputePool:
             return 0.0 if self._in_use() else time.monotonic() - self._last_used_s
 
     def stop(self, ticket: Ticket, patience_s: float | None = None) -> None:
-        """Ask a job to stop at its next progress report; kill its process after ``patience_s``."""
+        """Drop a waiting job, or ask a running one to stop at its next progress report.
+
+        After ``patience_s`` (None: the pool's) its process is killed. A job that has ended is ignored.
+        """
         if self._withdraw(ticket):
             return
         with self._lock:

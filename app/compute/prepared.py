@@ -1,4 +1,4 @@
-"""``python -m app.compute.prepared``: compute what a new server shows first, once, for all later servers.
+"""``python -m app.compute.prepared``: compute the results that a new server shows first, for all servers.
 
 The results are stored in the Python environment (``FOLDER``), in a folder named by the hash of everything
 that they depend on. After any change of code, assets or packages a server finds no folder of its hash and
@@ -30,7 +30,7 @@ FOLDER = Path(sys.prefix, "var", "packetmesh")
 
 
 def prepare() -> None:
-    """Compute the chain of the first scene with the default settings, in place of earlier results.
+    """Compute the chain of the first scene with the default settings, unless it is done; delete old results.
 
     Raises:
         OSError: the folder cannot be written.

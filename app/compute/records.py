@@ -56,6 +56,7 @@ class SceneNode:
     sensor: Sample
     """Sensor points in the camera frame."""
     T_world_camera: FloatArray
+    """(4, 4) pose of the camera."""
     fov_rad: float
     """Vertical field of view."""
     aspect: float
@@ -73,7 +74,7 @@ class AveragedView:
     frames: int
     """Number of frames that were averaged; of several cameras the most."""
     available: int
-    """Most that could be."""
+    """Number of frames that could be averaged; of several cameras the most."""
     unmeasured_share: float
     """Share of the pixels without depth."""
     moving_share: float
@@ -81,7 +82,7 @@ class AveragedView:
     flickering_share: float
     """Share of the pixels that few of the frames measured."""
     median_sd_m: float
-    """Standard deviation of the depth, median."""
+    """Median standard deviation of the depth."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +188,7 @@ class MeshView:
 
 
 SCREEN_POINTS = 60_000
-"""Number of points sent to a browser for one kind of cloud, over all nodes."""
+"""Most points of one kind of cloud, over all nodes, that are sent to a browser."""
 SENSOR_POINTS = 250_000
 """Most points of all sensors together that are sent to a browser."""
 
@@ -211,7 +212,7 @@ def drawn_rows(total: int, most: int, rng: np.random.Generator | None = None) ->
 
 
 def grid_step(total: int) -> int:
-    """Return the step in columns and rows at which at most ``SENSOR_POINTS`` of so many pixels remain."""
+    """Return the step in columns and rows at which about ``SENSOR_POINTS`` of the pixels remain, or fewer."""
     return max(1, math.ceil(math.sqrt(total / SENSOR_POINTS)))
 
 

@@ -1,4 +1,4 @@
-"""Answers that all sessions share: each is computed once, the newest are in memory, all are in the store."""
+"""Answers that all sessions share: each is computed once and stored; the last used ones stay in memory."""
 
 from __future__ import annotations
 
@@ -31,7 +31,10 @@ class SharedViews:
         self._lock = threading.Lock()
 
     def get(self, key: Hashable) -> Any:
-        """Return the answer with this key, or None. Of sessions that ask at once, one reads the file."""
+        """Return the answer with this key from memory or the store; None if it is in neither.
+
+        If several sessions need it at once, only one reads the file.
+        """
         with self._lock:
             if key in self._views:
                 self._views.move_to_end(key)
@@ -55,12 +58,12 @@ class SharedViews:
 
 
 def kept(key: Hashable) -> tuple[Hashable, ...]:
-    """Return the key of an answer in the store, where the stages of the chain have theirs."""
+    """Return the key under which the store keeps an answer, distinct from those of the chain's stages."""
     return ("view", key)
 
 
 def size_bytes(value: Any) -> int:
-    """Return about how much memory a view takes: that of its arrays, files and texts."""
+    """Return the approximate memory of a view in bytes: that of its arrays, files and texts."""
     if isinstance(value, np.ndarray):
         return int(value.nbytes)
     if isinstance(value, bytes | str):

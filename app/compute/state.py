@@ -1,4 +1,4 @@
-"""A session's spec and its results: a step is stale if its result belongs to another spec."""
+"""A session's spec and its results; a step is stale if its result belongs to another spec."""
 
 from __future__ import annotations
 
@@ -144,7 +144,11 @@ class Results:
         return step in self._views and self._views[step][0] == spec.key(step)
 
     def first_stale(self, spec: Spec, steps: Sequence[Step] = CHAIN) -> Step | None:
-        """Return the first stale one of ``steps``; None if there is none, it failed or it is not needed."""
+        """Return the first of ``steps`` without a fresh result.
+
+        Returns:
+            The step; None if all are fresh, the step failed, or it or a step before it is not to be computed.
+        """
         for step in steps:
             if not spec.includes(step):
                 return None

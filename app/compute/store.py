@@ -61,11 +61,11 @@ class Store:
         return self._path(key).exists()
 
     def get(self, key: tuple[Hashable, ...]) -> Any:
-        """Return the result for ``key``, or None."""
+        """Return the result for ``key``; None if it is not stored or damaged."""
         return _read(self._path(key))
 
     def put(self, key: tuple[Hashable, ...], value: Any) -> None:
-        """Keep a result that this process does not need again."""
+        """Write a result to the folder, but do not keep it in this process's memory."""
         self._write(self._path(key), value)
 
     def stage(self, spec: Spec, stage: StageName) -> Generator[Any, None, Any]:
@@ -74,7 +74,7 @@ class Store:
         return value
 
     def stages(self, spec: Spec, *stages: StageName) -> Generator[Any, None, tuple[Any, ...]]:
-        """Return the results of several stages; compute the stages before them if necessary."""
+        """Return the results of different stages, in order; compute the stages before them if necessary."""
         from pipeline.stages import run  # large libraries, which the server does not need
 
         done = yield from run(spec, self, stages)
@@ -143,5 +143,5 @@ def _read(path: Path) -> Any:
             value = pickle.load(file)
         os.utime(path)
         return value
-    except (OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError):  # of other code
+    except (OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError):  # pickled by other code
         return None

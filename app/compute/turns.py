@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 
 LONGEST_S = 5.0
-"""Limit after which the next session may draw although this one still does, seconds."""
+"""Time after which the next session may draw although this one is still drawing, seconds."""
 
 
 class Turns:
@@ -23,7 +23,7 @@ class Turns:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="turns")
 
     def give(self, begin: Callable[[], Future[None] | None]) -> None:
-        """Queue ``begin``, which starts a drawing and returns its future, or None if there is none to draw.
+        """Queue ``begin``, which starts a drawing and returns its future, or None if nothing is to be drawn.
 
         The next in the queue is called when that future is done, or after ``LONGEST_S``.
         """
@@ -32,7 +32,7 @@ class Turns:
 
     @contextlib.contextmanager
     def taken(self) -> Iterator[None]:
-        """Context in which this thread draws: it waits for a queued drawing, and the queue waits for it."""
+        """Context in which this thread draws: it waits for the present drawing; then the queue waits."""
         with self._drawing:
             yield
 

@@ -1,9 +1,9 @@
 """The dock at the lower edge of the window: one clock, its buttons, and a timeline with lanes.
 
 The page's part is ``dock.js``, ``dock_view.js`` (drawing) and ``dock_row.js`` (place in the page). The server
-sends three hidden pieces of HTML, each with the whole of its part, so that a page that connects later gets
-everything. The user's actions come back through a hidden text field as the list of all actions that the
-server has not acknowledged: of several changes within 50 ms viser sends only the last.
+sends three hidden pieces of HTML (set-up, pictures, state). Each is complete, so that a page that connects
+later gets everything. The user's actions come back through a hidden text field as the list of all actions
+that the server has not acknowledged: of several changes within 50 ms viser sends only the last.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ WIDTH_PX = (200, 2400)
 LEAST_SPAN_NS = 1000
 """Shortest time window."""
 COUNT_NS = 1_000_000_000
-"""One iteration or step on the axis of a timeline that counts them."""
+"""Length of one iteration or step on the axis of a timeline that counts them instead of time."""
 PAGES = 50
 """Number of pages whose acknowledged actions are remembered."""
 
@@ -89,12 +89,12 @@ class Dock:
 
     @property
     def rest_ns(self) -> int:
-        """Time of the clock, or where it was when it started to move."""
+        """Time of the clock; while it moves, its time at the last start, jump or change of speed."""
         return self._anchor[1] if self._playing else self.now_ns
 
     @property
     def shown_ns(self) -> int:
-        """Simulated time between two pictures during playback."""
+        """Simulated time between two pictures during playback at the present speed."""
         return round(self._speed * PICTURE_S * 1e9)
 
     @property
@@ -119,7 +119,7 @@ class Dock:
             stops_ns: (S,) ascending times at which the step buttons stop.
             lanes: lanes from top to bottom.
             counts: what the axis counts instead of time, such as "iteration"; each takes ``COUNT_NS``.
-            run_s: approximate duration of the whole timeline at the initial speed.
+            run_s: approximate duration of the whole timeline at the initial speed, seconds.
         """
         self.pause()
         self._counts = counts
@@ -150,7 +150,7 @@ class Dock:
         self._send_state()
 
     def mark(self, lane: int, item: int) -> None:
-        """Mark an item; -1 marks none."""
+        """Mark an item of a lane; the item -1 removes the mark."""
         self._choose(lane, item)
         self._send_state()
 
@@ -158,7 +158,7 @@ class Dock:
         self._chosen = {"lane": lane, "place": self._lanes[lane].place(item)} if item >= 0 else {}
 
     def play(self) -> None:
-        """Start the clock; from the start if it is at the end."""
+        """Start the clock, at the start of the timeline if it is at the end."""
         if self.now_ns >= self._end_ns:
             self._go(self._start_ns)
         self._playing = True
@@ -173,12 +173,12 @@ class Dock:
         self._send_state()
 
     def seek(self, t_ns: int) -> None:
-        """Move the clock to a time within the ends, and play on from there if playing."""
+        """Move the clock to a time, limited to the timeline, and play on from there if playing."""
         self._go(t_ns)
         self._anchor = (self._clock(), self.now_ns)
 
     def step(self, count: int) -> None:
-        """Pause at the next stop, or at the one before."""
+        """Pause and move to the next stop, or the one before if ``count`` is negative; stay without one."""
         self.pause()
         if count > 0:
             at = int(np.searchsorted(self._stops_ns, self.now_ns, side="right"))
@@ -249,13 +249,13 @@ class Dock:
         self._pace(SPEEDS[min(max(at, 0), len(SPEEDS) - 1)])
 
     def _look(self, start_ns: float, end_ns: float, width_px: float) -> None:
-        """Show another time window, in a page of this width."""
+        """Draw the time window and the width that a page reports."""
         self._width_px = min(max(round(width_px), WIDTH_PX[0]), WIDTH_PX[1])
         self._window(start_ns, end_ns)
         self._draw()
 
     def look(self, start_ns: float, end_ns: float) -> None:
-        """Show another time window, in place of the one that the page shows."""
+        """Show another time window in all pages."""
         self._window(start_ns, end_ns)
         self._send_setup()
         self._draw()
@@ -333,7 +333,7 @@ class Dock:
 
 
 def _looks(lane: Lane) -> dict[str, Any]:
-    """Return what the page gets of a lane at the start."""
+    """Return the parts of a lane that the page gets with the set-up."""
     legend = list(lane.legend)
     ticks = [(tick.y_px, tick.text) for tick in lane.ticks]
     return {

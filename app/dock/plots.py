@@ -1,6 +1,6 @@
 """Plots in the dock at the lower edge of the window, large enough for a class to read.
 
-The page's part is ``dock_plots.js``. The server sends one hidden piece of HTML with everything.
+The page's part is ``dock_plots.js``. The server sends everything in one hidden piece of HTML.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Sheet:
 
 
 class PlotDock:
-    """Shows plots side by side; closing it lasts until another run is shown."""
+    """Shows plots side by side. After a user has closed it, it stays closed until the next run."""
 
     def __init__(self, ui: Ui) -> None:
         """Add the dock, empty and hidden."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 
 class Ticker:
-    """One thread that calls ``tick`` every ``period_s`` while running and sleeps otherwise."""
+    """A thread that calls ``tick`` every ``period_s`` seconds while it runs, and sleeps otherwise."""
 
     def __init__(self, tick: Callable[[], None], period_s: float) -> None:
         self._tick = tick

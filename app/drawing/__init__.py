@@ -1,3 +1,3 @@
-"""Drawings of clouds, meshes, cameras, plots and timelines. Imports of ``app`` only ``compute`` and
+"""Drawings of clouds, meshes, cameras, plots and timelines. From ``app`` they import only ``compute`` and
 ``web``.
 """

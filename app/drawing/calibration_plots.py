@@ -142,7 +142,7 @@ def radial_residuals_figure(residuals: RadialResiduals) -> go.Figure:
 
 def uncertainty_figure(sd: ErrorMap, size_px: tuple[int, int], most_mm: float | None = None) -> go.Figure:
     """Draw a map of a point's standard deviation at the distance ``sd.range_m``, perpendicular to the ray, in
-    millimetres; the colours end at ``most_mm``.
+    millimetres; the colours end at ``most_mm``, by default at the 98 % quantile.
     """
     title = f"Uncertainty at {sd.range_m:g} m, one standard deviation"
     return _map_figure(sd, 1000.0 * sd.error_m, title, size_px, most_mm)
@@ -152,7 +152,7 @@ def difference_figure(
     halves: HalfDifference, size_px: tuple[int, int], most_mm: float | None = None
 ) -> go.Figure:
     """Draw a map of the difference, in millimetres at ``halves.map.range_m``, between the cameras calibrated
-    from the even and from the odd views; the colours end at ``most_mm``.
+    from the even and from the odd views; the colours end at ``most_mm``, by default at the 98 % quantile.
     """
     judged = "more than" if halves.beyond_noise else "no more than"
     title = f"Difference of two halves at {halves.map.range_m:g} m: {judged} noise"
@@ -165,7 +165,7 @@ def verdict_figure(judged: Verdict, sd: ErrorMap, size_px: tuple[int, int]) -> g
     """
     title = f"Error at {judged.range_m:g} m (95 %), required: {1000.0 * judged.accuracy_m:g} mm"
     figure = _map_figure(sd, 1000.0 * judged.error_m, title, size_px, 2000.0 * judged.accuracy_m)
-    # Without the px of ``sd``, which are one standard deviation.
+    # The text leaves out the pixels of ``sd``: they are one standard deviation, not 95 %.
     figure.update_traces(hovertemplate="(%{x:.0f}, %{y:.0f}): %{z:.2f} mm<extra></extra>")
     figure.add_contour(
         x=sd.columns_px,

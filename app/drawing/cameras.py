@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     import viser
 
 LOOKING_AROUND = 0.5
-"""Cameras whose mean viewing direction is shorter than this look around; it is 1 if all look one way."""
+"""Cameras look in all directions if the mean of their unit viewing directions is shorter than this."""
 VIEW_FOV_RAD = float(np.radians(75.0))
 """Vertical field of view of a browser's camera, viser's own."""
 SLOPE_RAD, HALF_VIEW = np.radians(50.0), 0.9 * np.tan(0.5 * VIEW_FOV_RAD)
-"""Angle at which one looks down on their scene; tangent of half the vertical field of view, less a margin."""
+"""Downward angle of the view of such a scene; tangent of half the vertical field of view, less a margin."""
 
 
 def add_camera(
@@ -48,6 +48,7 @@ class Stage:
     """The viewpoint for a scene, and the place for a second scene next to it."""
 
     viewpoint_m: FloatArray
+    """(3,), as all vectors here; world frame."""
     middle_m: FloatArray
     """The look-at point."""
     right: FloatArray
@@ -84,7 +85,7 @@ def stage_around(clouds_m: Sequence[FloatArray], T_world_camera: Sequence[FloatA
 
 
 def _above(points_m: FloatArray, gaze: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return (3,) the middle of (N, 3) points and (3,) a place above from which they fit a square."""
+    """Return (3,) the middle of (N, 3) points and (3,) a place above from which 98 % fit a square picture."""
     axes = axes_downwards(gaze)
     low_m, high_m = np.percentile(points_m @ axes.T, [1, 99], axis=0)
     middle_m = 0.5 * (low_m + high_m) @ axes
@@ -102,7 +103,7 @@ def axes_downwards(gaze: FloatArray) -> FloatArray:
 
 
 def distances_m(points_m: FloatArray, half_width: float, half_height: float) -> FloatArray:
-    """Return how far back from the origin a camera must be for each point to be in its picture.
+    """Return (N,) distances, metres, by which a camera must be behind the origin to have each point in view.
 
     Args:
         points_m: (N, 3) points along the axes of the view: right, up and forward.
@@ -115,7 +116,7 @@ def distances_m(points_m: FloatArray, half_width: float, half_height: float) -> 
 
 
 def look(clients: Iterable[viser.ClientHandle], stage: Stage, wide: bool = False) -> None:
-    """Turn each browser's view to the scene, from far enough that it (wide: two side by side) fits in."""
+    """Turn each browser's view to the scene, from where the scene, or two side by side (``wide``), fits."""
     back_m = stage.viewpoint_m - stage.middle_m
     width_m = (2.6 if wide else 1.3) * stage.width_m
     for client in clients:

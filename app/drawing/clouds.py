@@ -1,4 +1,4 @@
-"""Point clouds in the scene, sent once, then moved by their pose; and how drawings are removed."""
+"""Point clouds in the scene, sent once, then moved by their pose; and the removal of drawings."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pipeline.types import ByteArray, FloatArray
 
 POINT_SIZE_M = 0.012
 COVER = 1.3
-"""Size of a point of a grid over its distance from its neighbours: slanted surfaces are without cracks."""
+"""Size of a grid's point over the distance of its neighbours: slanted surfaces are drawn without cracks."""
 BAND = 1.3
 """Largest ratio of the depths of points that are drawn with one size."""
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 STEPS = 80
 MAP_EVERY = 8
-"""Step between drawn pixels of the map."""
+"""Every so many columns and rows of the map are drawn."""
 DIVERGING = [(0.0, "#0072b2"), (0.5, "#f7f7f7"), (1.0, "#d55e00")]
 """Measured too near is blue, too far is orange, correct is white."""
 

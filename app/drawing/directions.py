@@ -65,7 +65,7 @@ def fitting(
 
 
 def ball_m(center_m: FloatArray, stand_m: FloatArray, fov_rad: float, aspect: float) -> FloatArray:
-    """Return (26, 3) points of a ball around what a view looks at that just fits into its picture."""
+    """Return (26, 3) points of a sphere around a view's look-at point that just fits into its picture."""
     steps = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3)).reshape(3, -1).T
     steps = steps[np.any(steps != 0.0, axis=1)]
     steps /= np.linalg.norm(steps, axis=1, keepdims=True)

@@ -21,7 +21,7 @@ class Sums:
     """(F + 1, 4) running sums: number of frames and sum of their times, then both for the lost frames."""
 
     def until(self, first: int, last: int, t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return (T, 4) sums over those of the frames [first, last) before each of (T,) ascending times."""
+        """Return (T, 4) sums over the frames of [first, last) before each of (T,) ascending times."""
         # Most of the row is outside a narrow window: find the window first, then the times within it.
         low, high = first + np.searchsorted(self.t_ns[first:last], (t_ns[0], t_ns[-1]))
         at = low + np.searchsorted(self.t_ns[low:high], t_ns)
@@ -53,7 +53,7 @@ class Levels:
         return int(self.row_at[index]), int(self.row_at[index + 1])
 
     def near(self, row: int, start_ns: int, end_ns: int) -> tuple[int, int]:
-        """Return the indices of a row's first frame that starts in a time span, and of the first after it."""
+        """Return the range [first, last) of a row's frames that start in the time span [start_ns, end_ns)."""
         first, last = self.row(row)
         begin, end = np.searchsorted(self.start_ns[first:last], (start_ns, end_ns))
         return first + int(begin), first + int(end)

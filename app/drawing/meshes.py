@@ -21,7 +21,10 @@ VIOLET = (0.72, 0.5, 1.0)
 def mesh_view(
     surface: SurfaceResult, truth: dict[str, float] | None, texture: Texture | None = None
 ) -> MeshView:
-    """Return a surface with the rims of its holes for the browser, with photographs if it has a texture."""
+    """Return a surface with the rims of its holes for the browser, with photographs if it has a texture.
+
+    ``truth`` is its comparison with the true surface; None without one.
+    """
     glb = surface_glb(surface, surface.colors, photographed=True)
     return MeshView(
         glb=glb if texture is None else photographed_glb(surface, texture),
@@ -82,7 +85,7 @@ def _lit(surface: Surface, colors: ByteArray | None, photographed: bool) -> Byte
 
 
 def vertex_normals(surface: Surface) -> FloatArray:
-    """Return (V, 3) the points' normals or, where a surface has none, means of the triangles' normals."""
+    """Return (V, 3) the points' normals or, if there are none, means of the triangles' normals by area."""
     if surface.normals is not None:
         return surface.normals
     a, b, c = surface.vertices_m[surface.triangles].swapaxes(0, 1)

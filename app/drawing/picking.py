@@ -1,4 +1,4 @@
-"""The search for the hole that a click in the scene means."""
+"""The search for the hole that a click in the scene selects."""
 
 from __future__ import annotations
 

@@ -56,5 +56,5 @@ def image_figure(title: str, size_px: tuple[int, int]) -> go.Figure:
 
 
 def faint(color: tuple[int, int, int]) -> str:
-    """Return a colour that is transparent enough to fill a band."""
+    """Return the CSS colour at 25 % opacity, to fill a band."""
     return "rgba({}, {}, {}, 0.25)".format(*color)

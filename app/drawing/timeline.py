@@ -1,4 +1,4 @@
-"""Lanes of a timeline: pictures of a simulated-time window at a cost nearly independent of its events."""
+"""Lanes of a timeline: each draws any time window at a cost that hardly depends on its number of events."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Lane(Protocol):
         """Return the texts in a picture of this width."""
 
     def pick(self, t_ns: int, y_px: int, tolerance_ns: int) -> int:
-        """Return the index of the nearest item, or -1."""
+        """Return the index of the item nearest to a place; -1 if none is within the tolerance."""
 
     def tip(self, t_ns: int, y_px: int, tolerance_ns: int) -> str:
         """Return one line about the items at a place; empty if there are none."""
@@ -92,7 +92,7 @@ class Lane(Protocol):
 
 
 class FramesLane:
-    """One row per node with its radio frames; losses are red: single frames when near, a rate when far."""
+    """One row per node with its radio frames; losses are red: single frames when zoomed in, else a rate."""
 
     title = "Frames"
     veil = 0.0
@@ -161,7 +161,7 @@ class FramesLane:
         return words[:WORDS]
 
     def pick(self, t_ns: int, y_px: int, tolerance_ns: int) -> int:
-        """Return the frame at a place, or the nearest one in its row."""
+        """Return the input index of the frame at a place or nearest to it in its row; -1 if none is near."""
         row, levels = y_px // self._row_px, self._levels
         if not 0 <= row < levels.rows:
             return -1
@@ -321,7 +321,7 @@ class CurvesLane:
 
 
 def round_up(value: float) -> float:
-    """Return the next of 1, 2, 4, 6, 8 or 10 times a power of ten: half of it is a round number too."""
+    """Round a positive value up to 1, 2, 4, 6, 8 or 10 times a power of ten, whose half is round, too."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(next(times * power for times in (1.0, 2.0, 4.0, 6.0, 8.0, 10.0) if times * power >= value))
 

@@ -14,7 +14,7 @@ COLUMNS = ("lesson", "round", "stop", "title", "question", "choice", "text", "ri
 TEACHER = "teacher"
 """Last column: whether the choice was the teacher's."""
 _FORMULA = re.compile(r"^[=+\-@\t\r]")
-"""Beginnings that spreadsheets take for a formula."""
+"""Beginning of a text that a spreadsheet would take for a formula."""
 
 
 @dataclass(slots=True)
@@ -35,9 +35,9 @@ class Ballot:
 
 
 def votes_csv(lesson: str, ballots: Collection[Ballot]) -> bytes:
-    """Return the table of a lesson's votes as CSV in UTF-8, with the mark by which spreadsheets know it.
+    """Return the table of a lesson's votes as CSV in UTF-8, with the byte order mark that spreadsheets need.
 
-    ``right`` is empty where the right choice depends on the scene and was not known.
+    The column ``right`` is empty where the right choice depends on the scene and was not known.
     """
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\r\n")
@@ -55,6 +55,6 @@ def votes_csv(lesson: str, ballots: Collection[Ballot]) -> bytes:
 
 
 def _plain(cell: object) -> str:
-    """Return a cell's text on one line, which no spreadsheet computes."""
+    """Return a cell's text on one line, quoted if a spreadsheet would take it for a formula."""
     line = " ".join(str(cell).split())
     return f"'{line}" if _FORMULA.match(line) else line

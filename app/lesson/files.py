@@ -5,9 +5,9 @@ which a teacher's own lesson needs the first. Then come sections. A section is a
 name = value``, lines ``open: folder or tab``, lines ``see: control or number``, and its text. What a section
 does not set has its default, so that each stop can be shown alone. The folders and tabs that it names are
 opened; they, the controls and the numbers are framed, and the page scrolls to the first. A text may have
-emphasis, lists and web links; tags and images in it are shown as plain text. Numbers are computed from the
-screen, not typed: ``{name}``. ``{{, and was {3:name}}}`` gives the number at the third stop, and is left out
-for users who have not been there.
+emphasis, lists and web links; tags and images in it are shown as plain text. ``{name}`` is replaced by a
+number that the screen has computed. ``{{, and was {3:name}}}`` gives the number at the third stop, and is
+left out for users who have not been there.
 After its text a section may ask a question::
 
     ask: What does it cost?
@@ -140,12 +140,12 @@ class Lesson(Generic[Look]):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Kind(Generic[Look]):
-    """What the lessons of a screen can set and compute."""
+    """The settings and numbers that the lessons of a screen can use."""
 
     name: str
     """Name of the screen in a lesson's file."""
     settings: Mapping[str, Setting[Look]]
-    """What a section can set, by the names that it uses."""
+    """Settings that a section can make, by their names in the file."""
     default: Look
     """The default of everything that a section does not set."""
     numbers: tuple[str, ...] = ()
@@ -162,12 +162,12 @@ def screen_of(kind: str) -> str:
 
 
 def sets(key: str, read: Callable[[str], Any]) -> Callable[[Look, str], Look]:
-    """Return a setting that stores what ``read`` makes of the text in one field of the look."""
+    """Return a setting that reads the text with ``read`` and stores the value in the look's field ``key``."""
     return lambda look, text: replace(look, **{key: read(text)})
 
 
 def choice(options: Mapping[str, Value]) -> Callable[[str], Value]:
-    """Return a reader that takes the name of one of the options."""
+    """Return a function from the name of an option to its value; it raises ValueError for other names."""
 
     def read(text: str) -> Value:
         if text not in options:
@@ -180,7 +180,16 @@ def choice(options: Mapping[str, Value]) -> Callable[[str], Value]:
 def quantity(
     unit: str, most: float, per_unit: float = 1.0, above_zero: bool = False
 ) -> Callable[[str], float]:
-    """Return a reader of texts such as '2 cm' (unit cm) up to ``most``; it divides by ``per_unit``."""
+    """Return a function from a text such as '2 cm' to its number divided by ``per_unit``.
+
+    It raises ValueError for a text of another form or a number out of range.
+
+    Args:
+        unit: unit in the text, such as cm.
+        most: largest number in the text.
+        per_unit: units of the text in one unit of the result: 100 for cm to metres.
+        above_zero: whether 0 is refused.
+    """
 
     def read(text: str) -> float:
         found = re.fullmatch(rf"{NUMBER} ?{unit}", text)
@@ -192,5 +201,5 @@ def quantity(
 
 
 def short(label: str) -> str:
-    """Return a label's text without its explanation."""
+    """Return a label up to the bracket, comma or colon at which its explanation begins."""
     return re.split(r" \(|[,:]", label)[0]

@@ -45,7 +45,7 @@ _PREFERRED = re.compile(
 
 
 def preferred(header: str, offered: Collection[str]) -> str:
-    """Return the offered language that a browser prefers; English if it wants none of them.
+    """Return the offered language that a browser prefers; English if it names none of them.
 
     Args:
         header: the browser's ``Accept-Language``, such as ``de-CH,de;q=0.9,en;q=0.8`` (RFC 9110, 12.5.4).
@@ -64,7 +64,7 @@ def preferred(header: str, offered: Collection[str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Phrases:
-    """What the app adds to a lesson's text, as markdown."""
+    """Texts in one language that the app adds to a lesson, as markdown."""
 
     begin: str
     guess: str
@@ -75,7 +75,7 @@ class Phrases:
     right: str
     wrong: str
     place: str
-    """Number of the stop and of all stops, for ``str.format``."""
+    """For ``str.format`` with the number of the stop and the number of all stops."""
     space: str
     """Name of the space bar."""
     keys: str
@@ -146,9 +146,9 @@ PHRASES = {
         dock_keys="ตอนนี้ปุ่มควบคุมแถบด้านล่าง กด {} เพื่อกลับมาควบคุมบทเรียน",
     ),
 }
-"""By language; a lesson in another language has the English ones."""
+"""Phrases by language code; a lesson in any other language has the English ones."""
 
 
 def phrases_of(language: str) -> Phrases:
-    """Return the phrases in a language, or in English."""
+    """Return the phrases in a language, in English if there are none."""
     return PHRASES.get(language, PHRASES[ENGLISH])

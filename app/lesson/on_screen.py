@@ -66,7 +66,7 @@ class ScreenLessons(Generic[Look]):
                 folder.take("")
 
     def refresh(self) -> None:
-        """Update the numbers of the stop and the statement, because the screen shows something else."""
+        """Update the numbers of the stop and the statement after the screen has changed."""
         for folder in self._folders.values():
             folder.refresh()
         numbers = self._numbers()

@@ -23,11 +23,11 @@ SKIP, SKIPPED = "Skip", -1
 FIRST_OF_ALL = -1.0
 """Order of the lesson's folder in its screen's panel: it comes first."""
 BAR = 12
-"""Length of the bar for all votes, blocks."""
+"""Length of a bar that stands for all votes, in block characters."""
 TO_COME = "…"
 REPLACED = re.compile(rf"{FIELD.pattern}|!\[|\](?!\(https?://)")
-"""Parts of a file's markdown to replace: fields, and the start of an image or of a link to no web address,
-which is then shown as text."""
+"""Parts of a file's markdown to replace: fields, and the start of an image or of a link that leads to no web
+address, so that both are shown as text."""
 
 
 class LessonFolder(Generic[Look]):
@@ -180,6 +180,7 @@ class LessonFolder(Generic[Look]):
         self._picked()
 
     def _index(self) -> int:
+        """Return the index of the stop that is shown; -1 without one."""
         return -1 if self._stop.value == OFF else self._names.index(self._stop.value)
 
     def _waits(self) -> bool:
@@ -204,7 +205,7 @@ class LessonFolder(Generic[Look]):
         self._point_out()
 
     def refresh(self) -> None:
-        """Update the numbers of the stop, because the screen shows something else."""
+        """Update the numbers of the stop after the screen has changed."""
         if self._index() >= 0:
             self._write()
 
@@ -265,7 +266,7 @@ class LessonFolder(Generic[Look]):
     # The text.
 
     def _waiting(self) -> str:
-        """Return the text in the place of the answer until there is one."""
+        """Return the text that stands in place of the answer until there is one."""
         if self._refused:
             return self._phrases.first
         return self._phrases.guess if self._lecture is None else self._phrases.voting
@@ -324,7 +325,7 @@ def _with_texts(question: Question, read: Callable[[str], str]) -> Question:
 
 
 def keys_html(phrases: Phrases) -> Markup:
-    """Return HTML of the line about the keys: one text while they control the lesson, one while the dock."""
+    """Return HTML of the line about the keys: a text while they control the lesson, another for the dock."""
     names = ("→", phrases.space, "←", "1 2 3", "S")
     keys = escape(phrases.keys).format(*map(Markup("<b>{}</b>").format, names))
     dock_keys = escape(phrases.dock_keys).format(Markup("<b>Esc</b>"))

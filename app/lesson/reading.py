@@ -1,4 +1,4 @@
-"""Reading lesson files, in all their languages, with every fault by file and line (format: ``files.py``)."""
+"""Reads lesson files and their translations; every fault has its file and line (format: ``files.py``)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ Lines = Sequence[tuple[int, str]]
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """What is wrong in a lesson's file, and what to write instead."""
+    """A fault in a lesson's file, with advice on what to write instead."""
 
     path: Path
     line: int
@@ -67,7 +67,7 @@ def read_lesson(path: Path, kind: Kind[Look]) -> Lesson[Look]:
 
 
 def first_of(faults: Sequence[Fault]) -> InputError:
-    """Return the first fault as an error, and how to read the others."""
+    """Return the first fault as an error; if there are others, it names the command that shows them."""
     more = "; packetmesh lesson check shows the other faults" if faults[1:] else ""
     return InputError(f"{str(faults[0]).removesuffix('.')}{more}.")
 
@@ -77,7 +77,10 @@ shipped_lesson = cache(read_lesson)
 
 
 def check_lesson(path: Path, kind: Kind[Look]) -> tuple[Lesson[Look] | None, list[Fault]]:
-    """Read a lesson as ``read_lesson``. Returns None if it cannot be shown, and all faults."""
+    """Read a lesson like ``read_lesson``. Returns it without faulty translations, and all faults.
+
+    The lesson is None if its own file has a fault.
+    """
     lesson, faults = _parse(path, kind, None)
     if lesson is None:
         return None, faults
@@ -148,7 +151,9 @@ def read_text(path: Path) -> str:
 
 
 def head_of(text: str) -> tuple[dict[str, tuple[int, str]], Lines]:
-    """Return the head's values with their lines, by key (``title``, those of ``HEAD``), and other lines."""
+    """Return the head's values with their line numbers, by key (``title``, those of ``HEAD``), and the other
+    lines before the first section.
+    """
     values, others = dict[str, tuple[int, str]](), []
     for number, line in enumerate(text.splitlines(), 1):
         if line.startswith("## "):
@@ -166,7 +171,7 @@ def head_of(text: str) -> tuple[dict[str, tuple[int, str]], Lines]:
 def _parse(
     path: Path, kind: Kind[Look], original: Lesson[Look] | None
 ) -> tuple[Lesson[Look] | None, list[Fault]]:
-    """Read one file; with the original it is a translation."""
+    """Read one file, a translation if ``original`` is given. Returns None if it has faults, and these."""
     faults = _Faults(path)
     try:
         text = read_text(path)
@@ -222,7 +227,9 @@ def _sections(text: str) -> list[Lines]:
 
 
 def _check_fields(sections: Sequence[Lines], kind: Kind[Look], faults: _Faults) -> None:
-    """Add a fault for each field that its screen does not compute, or that may be missing."""
+    """Add a fault for each field that its screen does not compute, or whose stop may have been skipped, and
+    for each brace outside of fields.
+    """
     known = ", ".join(kind.numbers) or "none"
     for number, line in (one for section in sections for one in section):
         for stop, name in FIELD.findall(line):
@@ -257,7 +264,10 @@ def _check_fields(sections: Sequence[Lines], kind: Kind[Look], faults: _Faults) 
 
 
 def _stop(section: Lines, kind: Kind[Look], same: Stop[Look] | None, faults: _Faults) -> Stop[Look] | None:
-    """Return a stop; with the same stop of the original, what it sets is taken from there."""
+    """Return the stop of a section; None if it has a fault.
+
+    A translation has the settings of ``same``, the original's stop.
+    """
     (first, heading), *lines = section
     title, before = heading[3:].strip(), len(faults)
     where = f"section '{title}'"

@@ -17,10 +17,11 @@ from websockets.sync.client import connect
 from app.window.stepper import MARKS
 
 PATIENCE_S = 30.0
+"""Default time limit of ``wait_for``, seconds."""
 DRAWN_QUERY = 'data-packetmesh-call="ask"'
 """Part of the HTML by which the server asks whether everything is drawn."""
 DRAWN = "Say that all is drawn"
-"""Label of the command that answers it."""
+"""Label of the command with which a page confirms that everything is drawn."""
 OLD = "packetmesh-old"
 """Part of the HTML that dims the numbers or the picture."""
 _CURRENT = re.compile(r"nth-of-type\((\d+)\) {[^}]*color: white;")
@@ -31,7 +32,7 @@ def wait_for(happened: Callable[[], bool], patience_s: float = PATIENCE_S) -> No
     """Wait until ``happened()`` is true.
 
     Raises:
-        TimeoutError: it is not true in time.
+        TimeoutError: it is not true within ``patience_s``.
     """
     end_s = time.monotonic() + patience_s
     while not happened():
@@ -65,7 +66,7 @@ class Connection:
         self.current = ""
         """The step that is shown."""
         self.shown_s: dict[str, float] = {}
-        """Time when each step was last shown, and when ``surface`` was last up to date."""
+        """``time.monotonic()`` when each step was last shown, and when ``surface`` was last up to date."""
         self._dimmed: set[str] = set()
         """Uuids of HTML that dims outdated numbers or pictures."""
         self.lost = False
@@ -94,7 +95,11 @@ class Connection:
         )
 
     def set(self, label: str, value: object, which: int = 0) -> None:
-        """Set the control with this label; ``which`` is its index among equal labels."""
+        """Set the control with this label, once it exists; ``which`` is its index among equal labels.
+
+        Raises:
+            TimeoutError: there is no such control within ``PATIENCE_S``.
+        """
         wait_for(lambda: len(self.uuids.get(label, ())) > which)
         self.send(messages.GuiUpdateMessage(self.uuids[label][which], {"value": value}))
 
@@ -154,7 +159,7 @@ class Connection:
             self.values[uuid] = value
 
     def _take_html(self, uuid: str, content: str) -> None:
-        """Note the step and whether HTML is dimmed; confirm that all is drawn if the server asks."""
+        """Record the step and whether HTML is dimmed; confirm that all is drawn if the server asks."""
         if DRAWN_QUERY in content:
             for command in self._drawn:
                 self.send(messages.CommandTriggerMessage(command))

@@ -23,7 +23,7 @@ LOOK_S = 0.5
 LATE_S = 2.0
 """Limit for an answer that needs no computation, seconds."""
 PREPARED_S = 900.0
-"""Limit of the wait until the server has computed ahead what it does before a class comes, seconds."""
+"""Longest wait for the results that the server computes before a class comes, seconds."""
 SETTLE_S = 2.0 * PATIENCE_S
 """Wait after the last browser has left, seconds."""
 
@@ -34,7 +34,7 @@ class Load:
 
     diaries: tuple[Diary, ...]
     looks: tuple[tuple[float, Look], ...]
-    """Server states with seconds since the first browser came."""
+    """States of the server, each after its time in seconds since the first browser came."""
     before: Look
     """State before the first browser."""
     after: Look
@@ -98,11 +98,11 @@ class Load:
         )
 
     def longest_stray_s(self) -> float:
-        """Longest time for which a job of a browser that had left was seen."""
+        """Return the longest time for which a job of a browser that had left was seen running."""
         return max(self._strays_s().values(), default=0.0)
 
     def strays(self, longer_than_s: float) -> int:
-        """Return the number of such jobs seen for longer."""
+        """Return the number of jobs of browsers that had left that were seen for longer than this."""
         return sum(seconds > longer_than_s for seconds in self._strays_s().values())
 
     def _strays_s(self) -> dict[int, float]:
@@ -142,7 +142,11 @@ def put_load(seconds: float) -> Load:
 
 
 def _prepare(server: Serving) -> float:
-    """Wait until the server has computed ahead, as before a lesson. Returns the time that it took."""
+    """Wait until the server has computed ahead, as before a lesson; give up after ``PREPARED_S``.
+
+    Returns:
+        The time waited, seconds.
+    """
     started_s = time.monotonic()
     while not server.look().prepared and time.monotonic() - started_s < PREPARED_S:
         time.sleep(LOOK_S)
@@ -150,7 +154,7 @@ def _prepare(server: Serving) -> float:
 
 
 def soak(seconds: float) -> Load:
-    """Keep thirty browsers, of which one leaves every few seconds and a new one comes."""
+    """Keep thirty browsers on a server for this long; every few seconds one leaves and a new one comes."""
     with serving(SCENE) as server:
         before = server.look()
         started_s = time.monotonic()
@@ -168,7 +172,7 @@ def soak(seconds: float) -> Load:
 
 
 def _looks(server: Serving, started_s: float, until_s: float) -> Iterator[tuple[float, Look]]:
-    """Yield the server's state now and then, until this many seconds after the start."""
+    """Yield the server's state about every ``LOOK_S``, until this many seconds after the start."""
     while time.monotonic() - started_s < until_s:
         yield time.monotonic() - started_s, server.look()
         time.sleep(LOOK_S)
@@ -186,7 +190,10 @@ def _counts(look: Look) -> dict[str, float]:
 
 
 def _spread(seconds: list[float]) -> dict[str, float]:
-    """Return count, median, 95th percentile and maximum of the finite times."""
+    """Return count, median, 95th percentile and maximum of the times that are not NaN.
+
+    If there are none, only the count of 0 is returned.
+    """
     came = [one for one in seconds if one == one]
     if not came:
         return {"count": 0}

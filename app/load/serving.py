@@ -28,9 +28,9 @@ class Look:
     """Number of files in the store, including uploads."""
     bytes: int
     strays: tuple[int, ...]
-    """Running jobs of browsers that have left, each with its own number."""
+    """Numbers of the running jobs of browsers that have left; a job keeps its number."""
     prepared: bool
-    """Whether all that is computed ahead is there."""
+    """Whether the server has computed everything that it computes ahead."""
     server_bytes: int = 0
     """Memory of the server process."""
     workers_bytes: int = 0
@@ -66,7 +66,8 @@ def serving(scene: str) -> Iterator[Serving]:
     """Context with a server on loopback that starts with a scene.
 
     Raises:
-        TimeoutError: it did not start.
+        TimeoutError: it did not start within ``READY_S``.
+        EOFError: its process ended at the start.
     """
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()

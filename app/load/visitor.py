@@ -19,11 +19,11 @@ STEPS = ("Scene", "Depth", "Fuse", "Surface", "Export")
 """Steps to click; showing them starts no computation."""
 RADIUS_MM = (12.0, 40.0)
 MOVES, MOVE_S = 8, 0.08
-"""Number of moves of a dragged slider, and the time between them."""
+"""Number of moves of a dragged slider, and the time between them, seconds."""
 THINKING_S = 1.5
-"""Mean time between two actions of a user."""
+"""Mean time between two actions of a user, seconds."""
 MESH_SHARE = 0.3
-"""Share of mesh requests among the actions while no mesh is awaited."""
+"""Share of radius changes among the actions while no mesh is awaited."""
 FIRST_S = 240.0
 """Time limit for the panel, seconds; it is long because all browsers come at once."""
 LONGEST_S = 30.0
@@ -32,12 +32,12 @@ LONGEST_S = 30.0
 
 @dataclass(slots=True)
 class Diary:
-    """Times measured by one browser."""
+    """Times measured by one browser, seconds; NaN for those that it did not reach."""
 
     opened_s: float = float("nan")
-    """Time until the panel had its steps and the slider of the radius."""
+    """Time from the browser's start until the panel had its steps and the slider of the radius."""
     first_mesh_s: float = float("nan")
-    """Time until the first surface was complete."""
+    """Time from the browser's start until the first surface was complete."""
     answers_s: list[float] = field(default_factory=list)
     """Answer times of clicks that need no computation."""
     meshes_s: list[float] = field(default_factory=list)

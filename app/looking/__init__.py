@@ -1,3 +1,3 @@
-"""How a person looks at a reconstruction: cuts, wireframe, size of points, light, scale bar and axes. Nothing
-of it changes what is measured or exported.
+"""Display settings of a reconstruction: cuts, wireframe, size of points, light, scale bar and axes. They
+change only the view and pictures of it.
 """

@@ -1,6 +1,6 @@
 """The folder *Look* of a screen: cuts, wireframe, light, size of points, scale bar and axes.
 
-The page's script draws what it says (``look.js``), so nothing is sent again when a cut moves.
+The page's script ``look.js`` applies the settings, so that no mesh is sent again when a cut moves.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from app.window.panel import PanelSession
 from pipeline.types import FloatArray
 
 LIGHT_DEG = (120, 35)
-"""The light by hand at first: from the side, so that it shows how uneven a surface is."""
+"""First azimuth and elevation of the light set by hand: light from the side shows an uneven surface."""
 STEP_M = 0.01
 SPARE_M = 0.05
-"""Distance of the highest cut above what was seen."""
+"""Distance of the highest cut above the points that were seen."""
 
 
 class LookFolder:
-    """How a person looks at what a screen draws. A part of the address (``InAddress``)."""
+    """Display settings of a screen's drawing. A part of the address (``InAddress``)."""
 
     def __init__(
         self, session: PanelSession, below: str, parts: Sequence[str] = (), surface: bool = True
@@ -39,7 +39,7 @@ class LookFolder:
         Args:
             session: the session of the screen.
             below: the screen's scene node.
-            parts: nodes below it that may stand elsewhere, each of which is cut where it stands.
+            parts: nodes below it that may be moved, such as a second mesh; the cut moves with each.
             surface: whether the screen draws surfaces; else it draws points.
         """
         self._session, self._below, self._parts = session, below, parts
@@ -85,7 +85,7 @@ class LookFolder:
 
     @property
     def cut(self) -> Cut:
-        """What is left out now; each of the ``parts`` is cut as if it stood in its place in the scene."""
+        """The present cut, world frame; ``parts`` are cut as if they had not been moved."""
         return self._look.cut
 
     # The room.
@@ -101,7 +101,7 @@ class LookFolder:
         return self._known[1]
 
     def on_spec(self) -> None:
-        """Drop the cut, which belongs to another scene, if there is another one."""
+        """Drop the cut if the scene has changed, because the cut belongs to the earlier one."""
         if self._session.spec.source != self._source:
             self._source = self._session.spec.source
             self._take(replace(self._look, cut=None))
@@ -114,7 +114,7 @@ class LookFolder:
     # Changes by the controls.
 
     def _picked(self) -> None:
-        """Begin with the chosen kind of cut."""
+        """Start a cut of the chosen kind."""
         cut: Cut = None
         room = self._room
         if room is not None and self._cut.value == labels.TOP:
@@ -127,7 +127,7 @@ class LookFolder:
         self._take(replace(self._look, cut=cut))
 
     def _set(self) -> None:
-        """Take what the controls say besides the kind of cut."""
+        """Take the values of all controls but the kind of cut."""
         cut = self._look.cut
         if isinstance(cut, Top):
             cut = Top(float(self._height.value))
@@ -139,7 +139,7 @@ class LookFolder:
         self._take(Look(cut, drawn == labels.WIRE, size_mm, light_deg, bool(self._ruler.value)))
 
     def _facing(self, way: str) -> Callable[[], None]:
-        """Return what a button of the plane does."""
+        """Return the action of a button of the plane."""
         normals: dict[str, Place] = {
             labels.X: (1.0, 0.0, 0.0),
             labels.Y: (0.0, 1.0, 0.0),
@@ -159,7 +159,9 @@ class LookFolder:
         return press
 
     def _view_direction(self, level: bool) -> Place:
-        """Return where the viewer looks, or its horizontal part: what is nearer is left out."""
+        """Return the unit direction of view, or of its horizontal part. A plane with this normal cuts off the
+        front.
+        """
         client = next(iter(self._session.clients()), None)
         if client is not None and client.camera.position is not None:
             direction = np.asarray(client.camera.look_at, float) - np.asarray(client.camera.position, float)
@@ -218,7 +220,7 @@ class LookFolder:
             self._turn.value, self._inside.value = round(cut.turn_deg), cut.inside
 
     def _send(self) -> None:
-        """Tell the page's script how to draw."""
+        """Send the settings to the page's script."""
         look, handles = self._look, self._handles.planes
         planes = [
             {"point": point_m.tolist(), "normal": normal.tolist()}
@@ -239,11 +241,11 @@ class LookFolder:
     # The address.
 
     def place(self) -> str:
-        """Return the look as text; empty for the usual one."""
+        """Return the look as text; empty for the default."""
         return text_of(self._look)
 
     def take(self, place: str) -> None:
-        """Look as an address says.
+        """Take the look of an address.
 
         Raises:
             InputError: the text is no look.

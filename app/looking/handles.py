@@ -47,7 +47,7 @@ class CutHandles:
         return [(grip.name, normal) for grip, normal in zip(self._grips, normals, strict=False)]
 
     def draw(self, cut: Cut, room: Room | None) -> None:
-        """Draw or move the handles so that they fit the cut; remove them if it or the room is None."""
+        """Draw or move the handles so that they fit the cut; remove them if the cut or the room is None."""
         cut = None if room is None else cut
         if type(cut) is not type(self._cut) or not self._alive:
             self._remove()
@@ -97,8 +97,8 @@ class CutHandles:
         )
 
     def _arrange(self, box: Box, turned: bool = True) -> None:
-        """Put handles and outline where the box is; ``turned`` is False while one is dragged, and then their
-        common frame stays.
+        """Move handles and outline to the box. Their common frame moves only if ``turned``, which is False
+        while a handle is dragged.
         """
         assert self._frame is not None
         assert self._outline is not None
@@ -119,7 +119,7 @@ class CutHandles:
         return lambda event: self._on_drag(self._dragged(row), event.phase == "end")
 
     def _dragged(self, row: int) -> Cut:
-        """Return the cut moved to the handle ``row``, which was dragged; None if there is no cut."""
+        """Return the cut moved to the dragged handle ``row``; None if there is no cut."""
         cut, grip = self._cut, self._grips[row]
         at_m = np.asarray(grip.position, float)
         if isinstance(cut, Top):

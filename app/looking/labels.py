@@ -31,7 +31,7 @@ HINTS = {
 
 
 def top_text(room: Room | None) -> Markdown:
-    """Return what is known of the ceiling."""
+    """Return a note on the ceiling, or the reason why none is known."""
     if room is None:
         return Markdown("There is nothing to look at yet.")
     if not room.upright:

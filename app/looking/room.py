@@ -1,4 +1,4 @@
-"""What a look must know of a scene: its extent, its ceiling, and whether up is known."""
+"""Extent of a scene, height of its ceiling, and whether its up direction is known; needed to place cuts."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pipeline.kernels.geometry import LEVEL_POSE, apply
 from pipeline.types import FloatArray
 
 INNER = (1.0, 99.0)
-"""Percentiles between which the extent lies."""
+"""Percentiles of the points' coordinates that bound the extent."""
 BELOW_M = 0.1
 """Distance of a cut below the ceiling."""
 ABOVE_M = 0.1
@@ -19,9 +19,9 @@ ABOVE_M = 0.1
 LAYER_M = 0.1
 """Height of a layer of points, and the size of the cells in which its area is counted."""
 CLEAR_LAYERS = 3
-"""A ceiling's cell has no points in so many layers below it; a wall's has."""
+"""Number of layers below a cell of a ceiling that have no points; below a cell of a wall they have some."""
 LEAST_M2 = 1.0
-"""Least area of a ceiling that was seen."""
+"""Least area of a ceiling's seen part, square metres."""
 MOST_OVER = 0.02
 """Largest share of the points that may be above a ceiling: seen through a window, or flying."""
 

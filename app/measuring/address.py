@@ -1,8 +1,8 @@
 """The list of measures as text for the page's address.
 
 ``distance~edge~1234_-567_890~1300_-500_880~.Table~t2000``: kind, snap, clicked points in millimetres, then
-what there is of ``nPART``, ``.NAME`` and ``tTRUE``, the true length in tenths of a millimetre by which all
-lengths are scaled; two measures have ``~~`` between them.
+if needed ``nPART`` (index of the clicked surface), ``.NAME`` and ``tTRUE`` (true length by which all lengths
+are scaled, tenths of a millimetre). ``~~`` separates measures.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def fits(tape: Tape) -> bool:
 
 
 def name_of(text: str) -> str:
-    """Return a typed name as it can be in an address."""
+    """Return a typed name without ``~`` and extra spaces, cut to ``LONGEST_NAME`` letters."""
     return re.sub(r"\s+", " ", text.replace("~", "-")).strip()[:LONGEST_NAME]
 
 

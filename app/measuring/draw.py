@@ -14,7 +14,7 @@ from app.drawing.quantities import short_text
 from pipeline.types import ByteArray, FloatArray
 
 INK, PAPER = (24, 28, 32), (255, 255, 255)
-"""Alternating colours of a ruler; where an end was guessed, violet takes the place of the first."""
+"""Alternating colours of a ruler; violet replaces the first if an end was guessed."""
 LINE_PX, DOT_PX = 5.0, 13.0
 LIFT_M = 0.004
 """Distance of ends, rulers and planes from the surface, which would else hide parts of them."""
@@ -25,9 +25,9 @@ MARKS = (1.0, 2.0, 5.0)
 FEWEST_MARKS = 6
 """A ruler's parts are 1, 2 or 5 times a power of ten long, and at least so many."""
 LEVEL = 0.2
-"""Sine of the steepest line that has its label in the middle, which would cover a steeper one."""
+"""Sine of the slope up to which a line has its label in the middle; there it would cover a steeper line."""
 SQUARE = 1e-3
-"""Largest cosine between two edges of a box that meet at a right angle."""
+"""Two edges of a box whose cosine is smaller count as perpendicular."""
 
 
 class MeasureDrawing:
@@ -77,7 +77,7 @@ class MeasureDrawing:
             handle.position = place_m
 
     def _remove(self, handles: Iterable[viser.SceneNodeHandle]) -> None:
-        """Remove nodes, but not those that went with what the screen drew."""
+        """Remove nodes, except those that were removed with the screen's own drawing."""
         for handle in handles:
             if self._scene.get_handle_by_name(handle.name) is handle:
                 handle.remove()
@@ -100,7 +100,7 @@ class MeasureDrawing:
         )
 
     def _dot(self, end: End) -> viser.SceneNodeHandle:
-        """Draw an end as a dot that is equally large at all distances."""
+        """Draw an end as a dot of ``DOT_PX`` at all distances."""
         point_m = end.point_m + LIFT_M * end.normal
         across_m = 1e-4 * np.roll(end.normal, 1)
         segment = np.stack([point_m - across_m, point_m + across_m])[None].astype(np.float32)
@@ -147,7 +147,7 @@ def box_edges(corners_m: FloatArray) -> list[tuple[int, int]]:
     from_first = corners_m - corners_m[0]
     length_m = np.linalg.norm(from_first, axis=1)
     sides_m = list[FloatArray]()
-    for row in np.argsort(length_m)[1:]:  # a diagonal comes after its edges, and is not square to the longest
+    for row in np.argsort(length_m)[1:]:  # a diagonal is longer than its edges, not perpendicular to all
         cosines = [float(from_first[row] @ side) / length_m[row] / np.linalg.norm(side) for side in sides_m]
         if all(abs(cosine) < SQUARE for cosine in cosines):
             sides_m.append(from_first[row])
@@ -161,8 +161,8 @@ def box_edges(corners_m: FloatArray) -> list[tuple[int, int]]:
 
 
 def label_place_m(taken: Taken, lines: Iterable[FloatArray]) -> FloatArray:
-    """Return the (3,) place of a label: an angle's corner, above a box, at the upper end of a line, else in
-    the middle.
+    """Return the (3,) place of a label: an angle's corner, above a box, at the upper end of a steep line,
+    else in the middle.
     """
     points_m = np.concatenate(list(lines))
     if taken.kind == "box":
@@ -221,7 +221,7 @@ def ruler(line_m: FloatArray, color: tuple[int, int, int]) -> tuple[FloatArray, 
 
 
 def mark_m(length_m: float) -> float:
-    """Return the length of a ruler's parts."""
+    """Return the length of the parts of a ruler of this length, metres."""
     most_m = max(length_m, 1e-6) / FEWEST_MARKS * (1.0 + 1e-9)
     power = 10.0 ** np.floor(np.log10(most_m))
     return float(max(factor * power for factor in MARKS if factor * power <= most_m))

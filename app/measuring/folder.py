@@ -58,10 +58,10 @@ class MeasureFolder:
         """
         self._session, self._job, self._on_change = session, job, on_change
         self._arguments: tuple[object, ...] | None = None
-        """What the job needs besides the request; None while there is no surface."""
+        """Arguments of the job after the request; None while there is no surface."""
         self._tape = Tape()
         self._made: dict[Taken, Made] = {}
-        """Numbers by unnamed measure, on the current surface and scale."""
+        """Results on the current surface and scale, by measure without its name."""
         self._pending, self._ends, self._missed = Clicked("distance", "surface"), tuple[End, ...](), ""
         self._clicks: tuple[Click, ...] = ()
         """Clicks whose points are not known yet."""
@@ -107,7 +107,7 @@ class MeasureFolder:
     # The surface.
 
     def load(self, *arguments: object) -> None:
-        """Measure on another surface from now on, everything anew; ``arguments`` are passed to the job."""
+        """Measure on another surface, and compute all measures anew; ``arguments`` are passed to the job."""
         self._arguments = arguments
         self._forget()
         if self._tape.taken or self._on.value:
@@ -126,7 +126,7 @@ class MeasureFolder:
     # Clicks.
 
     def clicked(self, origin_m: FloatArray, direction: FloatArray, cut: Cut = None) -> bool:
-        """Take a click on what a cut leaves in the picture; False if clicks do not measure now.
+        """Take a click into the picture. Returns False if clicks do not measure now.
 
         Args:
             origin_m: (3,) origin of the click's ray, world frame.
@@ -158,7 +158,7 @@ class MeasureFolder:
     # Questions and answers.
 
     def _ask(self) -> None:
-        """Request what is not known of the list, the clicks and the scale."""
+        """Request the results of the list, the clicks and the scale that are not known."""
         self._checked = None
         if self._arguments is not None:
             wanted = (taken.unnamed for taken in self._tape.taken)
@@ -280,7 +280,7 @@ class MeasureFolder:
     # The folder and the picture.
 
     def _show(self) -> None:
-        """Show prompt, list, scale and drawing as they are now."""
+        """Update prompt, list, scale and drawing."""
         rows = [
             (labels.name_of(number, taken), taken, self._made.get(taken.unnamed))
             for number, taken in enumerate(self._tape.taken, 1)

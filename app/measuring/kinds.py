@@ -29,7 +29,7 @@ class Step:
     """One click of a measure."""
 
     marks: Literal["point", "plane", "rim", "part"]
-    """What the click marks: a point that snaps, a plane, the rim of a hole, or a thing on a plane."""
+    """What the click marks: a point that snaps, a plane, the rim of a hole, or an object on a plane."""
     prompt: str
 
 
@@ -52,7 +52,7 @@ SNAPPED: Mapping[Kind, str] = {
     "angle": "With Snap to: Plane, two planes give their angle.",
     "box": "With Snap to: Plane, three of its faces give its size.",
 }
-"""What other snapping does to a kind."""
+"""Sentences on what *Snap to: Plane* changes, by kind."""
 
 
 def steps_of(kind: Kind, snap: Snap) -> tuple[Step, ...]:

@@ -41,7 +41,7 @@ INTERVAL = (
 
 
 def prompt(step: Step, hint: str, missed: str) -> Markdown:
-    """Return what to click next, and why the last click gave no point."""
+    """Return the prompt for the next click, after the reason why the last one gave no point."""
     trouble = Markdown("{}. ").format(missed.rstrip(".")) if missed else ""
     return Markdown("{}**{}** {}").format(trouble, step.prompt, hint)
 

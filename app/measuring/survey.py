@@ -1,4 +1,4 @@
-"""Marks and planes of a surface, each found once: the same clicks are asked for again and again."""
+"""Marks and planes of a surface, each computed once, because requests repeat the same clicks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Found = TypeVar("Found")
 
 
 class Survey:
-    """What has been found on one surface, at its own scale or at another one."""
+    """Marks and planes found on one surface, at its own scale or at another one."""
 
     def __init__(self, surface: MeasuredSurface, factor: float = 1.0) -> None:
         """Begin with nothing; ``factor`` is the surface's size over that of the drawn one."""
@@ -62,7 +62,7 @@ _surveys: WeakKeyDictionary[MeasuredSurface, Survey] = WeakKeyDictionary()
 
 
 def survey_of(surface: MeasuredSurface) -> Survey:
-    """Return what has been found on a surface by this process."""
+    """Return this process's survey of a surface."""
     if surface not in _surveys:
         _surveys[surface] = Survey(surface)
     return _surveys[surface]

@@ -52,7 +52,7 @@ NO_PART = "The node that was clicked is not in this scene"
 
 @dataclass(frozen=True, slots=True)
 class _Loop:
-    """A hole's loop for ``picked_hole``."""
+    """A hole's loop as ``picked_hole`` takes it."""
 
     loop_m: FloatArray
     rim: bool = False
@@ -110,7 +110,13 @@ def _with_click(surveys: Sequence[Survey], pending: Clicked, click: Click) -> Cl
 
 
 def _hit(surveys: Sequence[Survey], pending: Clicked, step: Step, click: Click) -> tuple[int, Place]:
-    """Return the nearest surface that a click meets and the point there; later clicks stay on the surface."""
+    """Return the index of the nearest surface that a click meets, and the point there, metres.
+
+    Later clicks of a measure stay on the surface of the first.
+
+    Raises:
+        InputError: the click meets no surface.
+    """
     origin_m, direction = np.array(click.origin_m), np.array(click.direction)
     found: Callable[..., FloatArray] = _rim_on_ray if step.marks == "rim" else _point_on_ray
     parts = [pending.part] if pending.points_m else range(len(surveys))
@@ -131,7 +137,11 @@ def _hit(surveys: Sequence[Survey], pending: Clicked, step: Step, click: Click) 
 def _point_on_ray(
     surface: MeasuredSurface, origin_m: FloatArray, direction: FloatArray, cut: Cut
 ) -> FloatArray:
-    """Return the first point that a ray meets in what is kept."""
+    """Return (3,) the first point of the surface on a ray that the cut keeps.
+
+    Raises:
+        InputError: there is none.
+    """
     mark_on_ray(surface, origin_m, direction)  # raises if nothing is there at all
     for begin, end in kept_on_ray(cut, origin_m, direction):
         spot = lookup_of(surface).first_on(origin_m + begin * direction, direction)
@@ -143,7 +153,11 @@ def _point_on_ray(
 def _rim_on_ray(
     surface: MeasuredSurface, origin_m: FloatArray, direction: FloatArray, cut: Cut
 ) -> FloatArray:
-    """Return the kept vertex of the rim that a ray means, the one that it passes at the smallest angle."""
+    """Return (3,) the kept vertex of the selected hole's rim that a ray passes at the smallest angle.
+
+    Raises:
+        InputError: the ray selects no hole.
+    """
     loops = [_Loop(surface.vertices_m[hole.loop]) for hole in lookup_of(surface).open_holes]
     picked = picked_hole(loops, origin_m, direction, cut)
     if picked is None:
@@ -172,7 +186,7 @@ def _scaled(surveys: Sequence[Survey], scale: Scale) -> tuple[Sequence[Survey], 
 
 
 def _made(surveys: Sequence[Survey], taken: Taken) -> Made:
-    """Return a measure with its drawing, at the size of the drawn surface."""
+    """Return a measure's numbers, and its drawing at the size of the drawn surface."""
     try:
         survey = surveys[taken.part]
         measure, marks, planes = _measured(survey, taken)
@@ -224,7 +238,7 @@ def _combined(
 
 
 def _pending_ends(surveys: Sequence[Survey], pending: Clicked) -> tuple[End, ...]:
-    """Return the points clicked so far as they are drawn."""
+    """Return the ends to draw for the points clicked so far."""
     ends = list[End]()
     for step, place in zip(steps_of(pending.kind, pending.snap), pending.points_m, strict=False):
         snap = pending.snap if step.marks == "point" else "surface"

@@ -30,14 +30,14 @@ SMALLEST_M = 1e-4
 APP_FOV_RAD = float(np.radians(75.0))
 """Vertical field of view for which ``stage_around`` chooses the viewpoint."""
 HELD_S, STEP_S, LONGEST_S = 1.5, 0.2, 6.0
-"""Pause before and after the steps of a registration, time of a step, and longest time of all steps."""
+"""Pause before and after the steps of a registration, time of a step, longest time of all steps; seconds."""
 
 
 class Recording(Protocol):
     """The recording of a viser scene."""
 
     def insert_sleep(self, duration: float) -> None:
-        """Let some seconds pass."""
+        """Add a pause of ``duration`` seconds."""
 
 
 Play = Callable[[Recording], None]

@@ -86,7 +86,7 @@ def _title(result: object) -> str:
 
 
 def _page(title: str, draw: Callable[[viser.SceneApi], tuple[View, Play | None]]) -> Shown:
-    """Return the page of what ``draw`` adds to a scene."""
+    """Return the page of a scene that ``draw`` fills."""
     with _server() as server:
         view, play = draw(server.scene)
         server.scene.set_up_direction(view.up)
@@ -102,7 +102,7 @@ def _page(title: str, draw: Callable[[viser.SceneApi], tuple[View, Play | None]]
 
 @contextlib.contextmanager
 def _server() -> Iterator[viser.ViserServer]:
-    """Start a server for the body, without which viser draws nothing, and without its lines of text."""
+    """Run a viser server, without which nothing can be drawn, for the body; it prints nothing."""
     console = rich.get_console()
     was_quiet, console.quiet = console.quiet, True
     try:

@@ -1,3 +1,3 @@
-"""HTML pages and pictures that commands write without a display. Imports of ``app`` only ``drawing``,
+"""HTML pages and pictures that commands write without a display. From ``app`` they import only ``drawing``,
 ``compute`` and ``web``.
 """

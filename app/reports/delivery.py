@@ -39,7 +39,8 @@ _PARTS = (
 def delivery_page(hand_out: HandOut) -> Markup:
     """Return a self-contained HTML document of at most ``MOST_BYTES``.
 
-    Meshes that would make it larger are thinned, the last one least; pictures and frames stay as given.
+    Meshes that would make it larger are thinned, the last one least. Pictures and frames stay as given:
+    if they take nearly all bytes, the document is larger.
     """
     meshes = [moment.surface or _NOTHING for moment in hand_out.moments]
     box = Box.around(_corners_m(hand_out, meshes))
@@ -58,7 +59,7 @@ _NOTHING = Surface(np.zeros((0, 3)), np.zeros((0, 3), np.int32), np.zeros((0, 3)
 
 
 def _corners_m(hand_out: HandOut, meshes: list[Surface]) -> np.ndarray:
-    """Return (C, 3) points whose bounding box is that of all meshes."""
+    """Return (C, 3) points whose bounding box is that of all meshes; without any, the cameras' places."""
     corners = [
         edge(mesh.vertices_m, axis=0) for mesh in meshes if len(mesh.vertices_m) for edge in (np.min, np.max)
     ]
@@ -107,8 +108,8 @@ def _frames(hand_out: HandOut) -> tuple[bytes, float, float]:
     seconds.
 
     The columns, by node and start: the ``uint32`` number of frames of every node; then as byte planes
-    (``packed_mesh``) starts, as differences to the same node's frame before, and durations, both in ticks, 32
-    bits; the cause, 8 bits.
+    (``packed_mesh``) starts, as differences to the previous frame of the same node, and durations, both in
+    ticks, 32 bits; the cause, 8 bits.
     """
     frames, until_s = hand_out.frames, hand_out.end_s
     tick_s = max(_TICK_S, float(frames.end_s.max(initial=0.0)) / 2**32)

@@ -20,7 +20,8 @@ from pipeline.types import ByteArray
 
 SIZE_PX = (960, 540)
 PLAYS_S = 10.0
-"""Duration of all moments together; their intervals are proportional to the network's."""
+"""Duration of all moments together. Each is shown in proportion to its time in the network, but at least
+``_SHORTEST_S``."""
 LAST_S = 3.0
 """Duration of the last moment."""
 _SHORTEST_S = 0.06

@@ -1,8 +1,7 @@
 """A whole HTML document in one file. Its content policy lets the browser run only the document's own scripts
 and load nothing.
 
-Scripts and styles are no text that could be escaped: they come from files of the program, or are JSON or
-base64.
+Scripts, styles and data are not escaped: they come from files of the program, or are JSON or base64.
 """
 
 from __future__ import annotations
@@ -51,13 +50,13 @@ def shipped(path: Path) -> Markup:
 
 
 def json_block(name: str, value: Any) -> Markup:
-    """Return an element with this name and a value that scripts read as JSON."""
+    """Return an element with this id and a value, without NaN or infinity, that scripts read as JSON."""
     text = json.dumps(value, allow_nan=False).replace("<", "\\u003c")  # nothing in it closes the element
     return Markup('<script type="application/json" id="{}">{}</script>').format(name, Markup(text))  # noqa: S704
 
 
 def bytes_block(name: str, data: bytes) -> Markup:
-    """Return an element with this name and bytes that scripts read as base64."""
+    """Return an element with this id and bytes that scripts read as base64."""
     return Markup('<script type="text/plain" id="{}">{}</script>').format(name, b64encode(data).decode())
 
 

@@ -129,7 +129,7 @@ def chart_svg(chart: Chart) -> Markup:
 
 
 def heat_map_svg(heat_map: HeatMap) -> Markup:
-    """Draw cells from pale (none) to blue (all), each with its share."""
+    """Draw cells from pale (0 %) to blue (100 %), each with its share as text."""
     columns, rows = len(heat_map.x), len(heat_map.y)
     width, height = LEFT + CELL_PX * columns + 10, TOP + CELL_PX * rows + BOTTOM
     parts = []

@@ -60,7 +60,7 @@ class FramesOnAir:
     start_s: FloatArray
     end_s: FloatArray
     cause: IntArray
-    """Index in ``causes`` of the cause of the loss."""
+    """Index in ``causes`` of the cause of the loss; 0 if the frame arrived."""
     causes: tuple[str, ...]
     """Causes in words; the first stands for frames that arrived and is not shown. At most 256."""
 

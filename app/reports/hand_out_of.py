@@ -70,7 +70,7 @@ def _moment(sending: Sending, index: int, moment: Moment) -> HandOutMoment:
 
 
 def _frames(trace: NetworkTrace, nodes: int) -> FramesOnAir:
-    """Return the frames of the cameras; those of the sink only request missing packets."""
+    """Return the frames of the cameras; those of the sink, which request missing packets, are left out."""
     frames = trace.events.of(EventKind.AIR)
     frames = frames.where(frames.node < nodes)
     words = (RECEIVED, *(cause.name.lower().replace("_", " ") for cause in Cause if cause))

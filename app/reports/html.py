@@ -1,4 +1,4 @@
-"""Parts of all written reports: one self-contained HTML file."""
+"""Parts of all written reports, each of which is one self-contained HTML file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The part of a report with what was measured on the surface."""
+"""The part of a report that lists the measures on the surface."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def measured_sections(measures: dict[str, Any]) -> Iterator[Markup]:
 
 
 def measured_sentence(measures: dict[str, Any]) -> str:
-    """Return the list in one line, without measures that have no number."""
+    """Return the measures in one sentence, without those that have no number; empty if none has one."""
     texts = []
     for one in measures["measures"]:
         values = [_quantity(value) for value in one["values"]]

@@ -99,7 +99,7 @@ def _share(needs: FloatArray, weights: FloatArray, most: float) -> float:
 
 
 def _thinned(mesh: Surface, box: Box, packed: bytes, most_bytes: float) -> bytes:
-    """Return the mesh with as many triangles as fit."""
+    """Return the packed mesh, with so few triangles that it fits, but at least ``FEWEST_TRIANGLES``."""
     count = len(mesh.triangles)
     for _ in range(_TRIES):
         if len(packed) <= most_bytes or count <= FEWEST_TRIANGLES:
@@ -110,7 +110,7 @@ def _thinned(mesh: Surface, box: Box, packed: bytes, most_bytes: float) -> bytes
 
 
 def thinned(mesh: Surface, triangles: int) -> Surface:
-    """Return the mesh with about this many triangles, its rims kept."""
+    """Return the mesh with about this many triangles; its rims hardly move."""
     legacy = o3d.geometry.TriangleMesh(
         o3d.utility.Vector3dVector(mesh.vertices_m), o3d.utility.Vector3iVector(mesh.triangles)
     )

@@ -32,7 +32,7 @@ def project(points_m: FloatArray, camera: Camera) -> tuple[FloatArray, FloatArra
 
 
 def splat(picture: ByteArray, points_m: FloatArray, colors: ByteArray, camera: Camera, size_px: int) -> None:
-    """Draw (N, 3) points in (N, 3) colours as squares into (H, W, 3), the nearest last."""
+    """Draw (N, 3) world points in (N, 3) colours as squares of this size into (H, W, 3), the nearest last."""
     at, depth_m = project(points_m, camera)
     order = np.argsort(-depth_m, kind="stable")
     column, row = np.rint(at[order] - 0.5 * (size_px - 1)).astype(int).T

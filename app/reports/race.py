@@ -31,7 +31,7 @@ class RaceRun:
     notes: tuple[str, ...]
     """(K,) status texts."""
     arrived: bool | None
-    """Whether it arrived at the end; None without ground truth."""
+    """Whether it arrived at the end; None if no reference position is known."""
     shades: ByteArray
     """(K, N) distance of each point, 0 to 255 along the scale."""
     lens: tuple[ByteArray, ...]
@@ -40,7 +40,7 @@ class RaceRun:
 
 @dataclass(frozen=True, slots=True)
 class RaceShow:
-    """A race with its settings."""
+    """A race as its page and its GIF show it."""
 
     title: str
     sentence: str

@@ -38,6 +38,7 @@ QUALITY_ROWS = (
     ("triangles", "triangles", None),
     ("unused_points", "points without a triangle", None),
 )
+"""Key of a quality measure, label, and factor to the label's unit; None for a count."""
 
 
 def write_reconstruction_report(
@@ -176,7 +177,7 @@ def _surfaces(
 
 
 def _whose(nodes: int) -> str:
-    """Return whose cameras the report's pictures are from."""
+    """Return the words for the cameras from which the report's pictures are seen."""
     return "each node's camera" if nodes <= MOST_SHOWN else f"the cameras of the first {MOST_SHOWN} nodes"
 
 

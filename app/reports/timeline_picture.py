@@ -14,7 +14,7 @@ WIDTH_PX = 1600
 _TITLE_PX, _AXIS_PX, _FOOT_PX, _GAP_PX, _RIGHT_PX = 54, 34, 40, 12, 40
 _TICKS = 10
 _SCALE = 2
-"""Scale of the lanes over their height in the app."""
+"""Factor by which the lanes are higher than in the app."""
 
 
 def timeline_picture(title: str, lanes: Sequence[Lane], start_ns: int, end_ns: int) -> Image.Image:

@@ -73,7 +73,7 @@ def place_of(
     sources: Mapping[str, Source],
     keys: Sequence[str] = (),
 ) -> tuple[Place, list[str]]:
-    """Parse an address. Returns the place and one error sentence for each part that cannot be followed.
+    """Parse an address. Returns the place and one error sentence for each part that cannot be used.
 
     Args:
         text: the query.
@@ -110,7 +110,7 @@ def place_of(
 
 
 class Address:
-    """Receive what the page's address asks for, and keep the address equal to the session's state."""
+    """Receives the page's new addresses, and keeps the page's address equal to the session's state."""
 
     def __init__(
         self,
@@ -163,7 +163,7 @@ class Address:
         try:
             if (text or not begins) and text != self._place.text():
                 self._on_place(*self._read(text))
-        finally:  # replaces the parts that could not be followed
+        finally:  # replaces the parts that could not be used
             self._timer.restart()
 
     def _read(self, text: str) -> tuple[Place, list[str]]:
@@ -173,7 +173,7 @@ class Address:
         return place_of(text, self._start, self._screens, sources, self._keys)
 
     def _send(self) -> None:
-        """Send the page its address, even one that the page requested: it may have changed since."""
+        """Send the page its address, even one that the page requested: the state may have changed since."""
         place, text = self._place, self._place.text()
         before, wrong = self._read(self._text)
         new = not wrong and place.is_beside(before)

@@ -15,9 +15,9 @@ from pipeline.kernels.geometry import apply
 from pipeline.types import FloatArray
 
 MOST_POINTS = 4000
-"""Points of a node's cloud that are looked at, approximately."""
+"""Approximate number of points of each node's cloud to which a view is fitted."""
 BARE = "/scene"
-"""Node below which only what the sensors measured is drawn."""
+"""Scene node below which only measured points are drawn, no inferred ones."""
 
 
 class Framing:
@@ -49,7 +49,7 @@ class Framing:
 
     @property
     def clouds_m(self) -> list[FloatArray]:
-        """Return (N, 3) thinned points of each of ``nodes``, world frame, with inferred ones if drawn."""
+        """Return (N, 3) thinned points per node, world frame, metres; with inferred ones if drawn."""
         nodes, depth = self.nodes, self._session.results.view("depth")
         clouds = [node.sensor for node in nodes]
         bare = self._session.current.drawn_below == BARE

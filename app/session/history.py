@@ -1,8 +1,8 @@
 """Undo and redo of a session's settings: source, preset, settings of the chain, and what the screens set.
 
-A state is what the address holds, less the parts that are no settings, such as the camera's pose or the time
-of a clock. Going back asks for the earlier state as an address does, so that only what differs is computed,
-and what was computed before is still in the store.
+A state is the content of the address without the parts that are no settings, such as the camera's pose or
+the time of a clock. Undo requests the earlier state as an address does: only what differs is computed, and
+earlier results are still in the store.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pipeline.config import PipelineConfig
 from pipeline.sources import Source
 
 NO_SETTINGS = {"t", "node", "photo", "pictures", "ball", "measure"}
-"""Keys of the address that say where in a result one looks, and the measures, which have their own list."""
+"""Keys of the address that are not undone: places in a result, and measures, which have their own list."""
 SAME_S = 1.5
 """Changes of one setting within this time, seconds, are one step, as when a slider is dragged."""
 MOST_STEPS = 100
@@ -55,7 +55,10 @@ class Settings:
     """Screen, key and text of the parts of the screens that are settings and not in their start state."""
 
     def names_of_changes(self, before: Settings) -> tuple[str, ...]:
-        """Return the names of what differs from ``before``, the most telling first."""
+        """Return the names of the settings that differ from ``before``.
+
+        The chain's settings are named only if scene and preset are the same.
+        """
         named = ["source"] if self.source != before.source else []
         named += ["preset"] if self.preset != before.preset else []
         if not named:
@@ -87,15 +90,15 @@ class History:
         self._first: Settings | None = None
 
     def begin(self) -> None:
-        """Take the present state as the one of *Reset*, once the screens are built."""
+        """Remember the present state as the one that *Reset* restores. Called once the screens are built."""
         self._first = self._now = self._read()
 
     def accept(self) -> None:
-        """Take the present state as it is, without a step: it is what a link opens."""
+        """Take the present state without recording a step, because a link has opened it."""
         self._now = self._read()
 
     def follow(self, by_hand: bool) -> None:
-        """Record a step if the settings have changed; a change by a result is no step of its own."""
+        """Record a step if a user has changed the settings (``by_hand``); a result's change is no step."""
         if self._now is None:
             return
         before, now = self._now, self._read()
@@ -157,7 +160,7 @@ class History:
         }
 
     def _restore(self, settings: Settings) -> None:
-        """Ask for an earlier state: stops of lessons first, because they set other parts."""
+        """Request the state of another step: stops of lessons first, because they set other parts."""
         session, texts = self._session, {part[:2]: part[2] for part in settings.parts}
         session.want(_with(session.spec, settings))
         parts = self._parts()
@@ -177,5 +180,5 @@ def _with(spec: Spec, settings: Settings) -> Spec:
 
 
 def _words(key: str) -> str:
-    """Return the field's name of a dotted key as words, without its unit."""
+    """Return the last name of a dotted key as words, without the unit ``_m``."""
     return key.rpartition(".")[2].removesuffix("_m").replace("_", " ")

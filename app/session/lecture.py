@@ -102,7 +102,7 @@ class Lecture:
         return self._server.get_clients().values()
 
     def poll(self, count: Count | None) -> None:
-        """Open a vote and pass each vote to ``count``, or close it (None); earlier votes are dropped."""
+        """Open a vote and pass each vote to ``count``, or close it (None). Pages forget earlier votes."""
         self._count_vote = count
         for seat in self._present():
             seat.vote = 0

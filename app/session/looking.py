@@ -15,7 +15,8 @@ from packetmesh.errors import InputError
 from pipeline.types import FloatArray
 
 AHEAD_M = 0.2
-"""Distance by which the view stands before a camera node, whose drawn picture would else fill the view."""
+"""Distance of the viewpoint in front of a camera node, metres. It is beyond the node's drawn picture, which
+would otherwise fill the view."""
 
 
 class Looking:
@@ -30,15 +31,15 @@ class Looking:
 
     @property
     def nodes(self) -> tuple[SceneNode, ...]:
-        """Return the camera nodes that are drawn where they stand; none while something else is shown."""
+        """Return the camera nodes of the scene that is drawn; empty while something else is shown."""
         return self._framing.nodes
 
     def look(self, side: Side) -> None:
-        """Look from a side, from where everything fits into the picture."""
+        """Look from a side, at the distance from which everything fits into the picture."""
         self._fit(forward_of(side, self._gaze()))
 
     def fit(self) -> None:
-        """Keep the direction; move so that everything fits into the picture."""
+        """Keep the direction and fit everything into the picture. A vertical view becomes one from above."""
         camera = self._client.camera
         forward = np.asarray(camera.look_at, float) - np.asarray(camera.position, float)
         length = float(np.linalg.norm(forward))
@@ -65,7 +66,7 @@ class Looking:
         self._turn(center_m, stand_m)
 
     def look_from_next(self, step: int = 1) -> str:
-        """Look from the camera node after the last one. Returns its name.
+        """Look from the camera node ``step`` places after the last one. Returns its name.
 
         Raises:
             InputError: no camera node is drawn now.
@@ -77,14 +78,14 @@ class Looking:
         return name
 
     def look_as_opened(self) -> None:
-        """Look as the app did when this was first shown."""
+        """Return to the view to which the app itself turned last."""
         if self._framing.framed is not None:
             stand_m, center_m = self._framing.framed
             self._turn(center_m, stand_m)
             self._framing.forget_turned()
 
     def _gaze(self) -> FloatArray:
-        """Return (3,) the mean direction of the camera nodes, or of the app's own view of something else."""
+        """Return (3,) the mean direction of the camera nodes; without nodes, that of the app's own view."""
         if self.nodes:
             return np.asarray(np.mean([node.T_world_camera[:3, 2] for node in self.nodes], axis=0))
         framed = self._framing.framed

@@ -1,7 +1,7 @@
-"""The command palette of a session: what can be found by typing, and the keys.
+"""The command palette of a session: its entries, which are found by typing or have keys.
 
-What changes the session is offered to all its browsers, and in a lecture only those who may steer can use it.
-What concerns one browser alone, such as its view, is offered to each browser for itself.
+Entries that change the session are offered to all its browsers; in a lecture only those that may steer can
+use them. Entries that concern one browser, such as its view, are offered to each browser separately.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from pipeline.io.demos import DEMOS
 from pipeline.sources import demo_of
 
 REST_S = 0.5
-"""Time that nothing has been computed before new entries are looked for, seconds."""
+"""Time without any computation after which new entries are collected, seconds."""
 FAILED, SHOWN_S = "That did not work", 15.0
 """Title of a notification of an error, and time for which it is shown, seconds."""
 LESSON_FOLDER = "Lesson: "
-"""Begin of the title of a lesson's folder: its controls are not offered as settings."""
+"""Beginning of the title of a lesson's folder, whose controls are not offered as settings."""
 TERM = re.compile(r'class="packetmesh-term" data-hint="([^"]+)">([^<]+)<')
 """A word with an explanation in a screen's HTML (``app.window.tables.term``)."""
 
@@ -48,7 +48,7 @@ class Palettes:
     """The palettes of all browsers of a session. Methods run on the session's thread."""
 
     def __init__(self, session: PanelSession, framing: Framing) -> None:
-        """Keep what the entries act on: the session, and its ``framing`` of views."""
+        """Keep the session and its ``framing`` of views, on which the entries act."""
         self._session, self._framing = session, framing
         self._history = History(session)
         self._shared = Palette(session.ui.gui, session.post)
@@ -58,7 +58,7 @@ class Palettes:
         self._resting = session.ui.debounce(REST_S, self._refresh)
 
     def begin(self, folders: Mapping[str, Any], tools: Tools) -> None:
-        """Offer the entries, and note changes from now on.
+        """Offer the entries, and record changes for *Undo* from now on.
 
         Args:
             folders: the screens' folders in the control panel, by title.
@@ -80,7 +80,7 @@ class Palettes:
         return partial(self._own.remove, own)
 
     def follow(self, by_hand: bool) -> None:
-        """Note a possible change, made by a user or by a result that has come."""
+        """Record a possible change of the settings, by a user (``by_hand``) or by a result."""
         self._history.follow(by_hand)
         if self._folders:
             self._tools.show(*self._history.has_steps)
@@ -90,11 +90,11 @@ class Palettes:
         self._history.accept()
 
     def rest(self) -> None:
-        """Look for new entries after a while, because everything is computed."""
+        """Collect new entries after ``REST_S``, because everything is computed."""
         self._resting.restart()
 
     def _refresh(self) -> None:
-        """Offer also what the screens show by now: their controls, and the terms in their tables."""
+        """Also offer the controls and the terms in tables that the screens have by now."""
         inside = {title: list(contents(folder)) for title, folder in self._folders.items()}
         settings = [entry for title in inside for entry in self._settings(title, inside[title])]
         self._shared.offer([*self._entries(), *settings])
@@ -156,7 +156,7 @@ class Palettes:
         part.take("1")
 
     def _point(self, screen: str, opens: tuple[str, ...], name: str, label: str) -> None:
-        """Show a control where it is."""
+        """Show a screen, open these folders and point at a control."""
         if self._session.current.title != screen:
             self._session.show(screen)
         self._call("point", list(opens), name, label)
@@ -218,7 +218,7 @@ class OwnPalette:
 
 
 def _run_for(client: viser.ClientHandle, function: Callable[..., object], *arguments: object) -> None:
-    """Run what one browser has requested for itself; only this browser gets the error's sentence."""
+    """Run a function for one browser, which alone is notified of an ``InputError``."""
     try:
         function(*arguments)
     except InputError as error:

@@ -43,7 +43,7 @@ def size_of(text: str) -> tuple[int, int]:
 
 
 class ViewPicture:
-    """Takes pictures of the view of one browser, one at a time."""
+    """Takes pictures of the view of one browser. A request during another one is ignored."""
 
     def __init__(self, ui: Ui, client: viser.ClientHandle, name: str, file: Callable[[], str]) -> None:
         """Add the hidden field for the page's answer.
@@ -67,7 +67,7 @@ class ViewPicture:
         self._html.content = page_call("measureView", self._name, mark=self._count)
 
     def _answered(self) -> None:
-        """Draw on a thread of its own: the browser may take seconds."""
+        """Have the browser draw. A thread of its own waits for the picture, which may take seconds."""
         size_px = size_of(self._field.value)
         if self._taking.acquire(blocking=False):
             threading.Thread(target=self._draw, args=(*size_px, self._file()), daemon=True).start()

@@ -57,7 +57,7 @@ class Places:
         return remove
 
     def reset(self) -> None:
-        """Restore what the screens and the settings were at the start."""
+        """Restore the screens and the settings to their state at the start."""
         session = self._session
         for reset in session.ui.resets:
             reset()
@@ -89,7 +89,7 @@ class Places:
         return parts if self._views is None else parts | {CAMERA: self._views}
 
     def _go_to(self, place: Place, wrong: list[str]) -> None:
-        """Show what an address asks for; report its wrong parts in one notification."""
+        """Show the place of an address, and report the address's wrong parts in one notification."""
         session = self._session
         session.want(_with(session.spec, place.spec))
         if place.screen != session.current.title:

@@ -172,7 +172,7 @@ class Session:
     def quick_job(
         self, job: str, *arguments: Any, on_end: Callable[[Any], None], key: Hashable = None
     ) -> None:
-        """Run a job beside the chain, of each module only the last. Answers with a key are shared."""
+        """Run a job parallel to the chain, of its module only the last. Answers with a key are shared."""
         view = None if key is None else self._shared.get(key)
         if view is None:
             self._run_beside(self._quick[job.partition(":")[0]], job, arguments, on_end, lambda _: None, key)

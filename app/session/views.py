@@ -17,7 +17,7 @@ from pipeline.types import FloatArray
 View: TypeAlias = FloatArray
 """(2, 3) camera position and look-at point in the world frame, metres."""
 ALIKE = 1e-3
-"""Tolerance over the distance to the look-at point: two views closer than this are equal."""
+"""Largest difference of a coordinate between equal views, over the distance to the look-at point."""
 ECHO_S = 0.7
 """Time after the app turned the view in which a browser's report is not taken for the user's, seconds."""
 MOST_KNOWN = 16
@@ -35,7 +35,7 @@ class Views:
         self._known = deque([self._framed], MOST_KNOWN)
         """Views before and after the app's last turns: a slow browser may report any of them later."""
         self._turned: dict[str, View] = {}
-        """By kind: the view that the user has turned to."""
+        """Views to which the user has turned, by the kind of object."""
         self._requested: View | None = None
         """The view that the address asks for, until the results of the address have been computed."""
 
@@ -109,7 +109,7 @@ class Views:
         return np.array([camera.position, camera.look_at])
 
     def _by_hand(self) -> bool:
-        """Whether the view differs from all that the app turned to or from."""
+        """Whether the user has turned the view: it differs from all that the app turned to or from."""
         if self._clock() - self._framed_s < ECHO_S or self._requested is not None:
             return False
         now = self._now()

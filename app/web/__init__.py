@@ -1,1 +1,1 @@
-"""Access to the server, checks of what browsers send, and safe text. Imports nothing else of ``app``."""
+"""Access to the server, checks of what browsers send, and safe text. From ``app`` it imports nothing else."""

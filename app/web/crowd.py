@@ -1,4 +1,4 @@
-"""Limits on the browsers, in all and per address, and a queue whose sessions start one by one."""
+"""Limits on the number of browsers, in all and per address, and a queue that starts sessions one by one."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ MOST_OF_ONE_ADDRESS = 48
 """Most sessions of one network address; a class behind one router has one address."""
 MOST_WAITING, MOST_WAITING_OF_ONE = 64, 32
 BUILD_S = 5.0
-"""Time that a session's building may take before the next session starts, seconds."""
+"""Longest wait for a session to be built before the next one starts, seconds."""
 SILENT_S = 60.0
-"""Time after which a browser that has not shown the page is disconnected, seconds; a page reports at once."""
+"""Time from the start of its session after which a browser that has not shown the page is disconnected,
+seconds. A page reports at once."""
 LOOK_S = 5.0
+"""Time between two searches for such browsers, seconds."""
 
 logger = logging.getLogger(__name__)
 
@@ -34,7 +36,7 @@ class Visitor:
     begin: Callable[[], Future[Any] | None]
     """Starts its session. Returns a future that is done when the session is built; None without one."""
     wait: Callable[[], None]
-    """Shows in the browser that it waits for a place."""
+    """Shows a note in the browser that it waits for a place."""
     turn_away: Callable[[], None]
     """Closes its connection."""
     shows_page: Callable[[], bool]
@@ -46,7 +48,7 @@ class Visitor:
 
 
 class Crowd:
-    """All connected browsers, usable on any thread. One thread starts sessions and finds silent ones."""
+    """All connected browsers, usable on any thread. One thread starts sessions, one finds silent browsers."""
 
     def __init__(self) -> None:
         self._inside: dict[int, Visitor] = {}
@@ -102,7 +104,7 @@ class Crowd:
             one.wait()
 
     def _next(self) -> Visitor | None:
-        """Remove and return the first waiting browser whose address has room."""
+        """Give a place to the first waiting browser whose address has room. Returns it; None without one."""
         with self._lock:
             counts = Counter(one.address for one in self._inside.values())
             if len(self._inside) >= MOST_SESSIONS:

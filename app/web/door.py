@@ -15,6 +15,7 @@ MOST_AT_ONCE, MOST_A_SECOND = 48.0, 4.0
 """Connections of one address: the largest burst, and the rate per second after it. A class behind one router
 connects in one burst."""
 MOST_ADDRESSES = 10_000
+"""Number of addresses above which those with a full allowance are forgotten."""
 NOT_NOW = "PacketMesh takes no more connections at this moment; the page tries again by itself.\n"
 
 
@@ -35,7 +36,7 @@ class Door:
         self.is_open = False
 
     def guarded(self) -> AbstractContextManager[None]:
-        """Context in which servers start that answer 503 to connections too early or too frequent."""
+        """Return a context. A server started in it answers connections too early or too frequent with 503."""
         return answering(self._answering)
 
     def lets_in(self, address: str) -> bool:

@@ -65,7 +65,7 @@ class Entrance:
         return self.visitor is None or any(token.is_in(cookies) for token in self._tokens)
 
     def guarded(self) -> AbstractContextManager[None]:
-        """Context for starting servers that set the cookie of a valid link and refuse other browsers."""
+        """Return a context. A server started in it sets a valid link's cookie and refuses other browsers."""
         return answering(self._answering)
 
     @property

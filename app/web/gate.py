@@ -31,6 +31,7 @@ MOST_NAME = 1024
 FARTHEST = 1e7
 """Largest coordinate in the scene, metres."""
 MOST_PIXELS = 100_000
+"""Largest width and height of a browser's view, pixels."""
 MOST_VIEW_PX = 8192
 """Largest width and height of a picture of the view, pixels: what graphics cards draw."""
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -108,7 +109,7 @@ class Gate:
                 private.close(self._server, number, FORGED_CLOSE, "not a page of this server")
 
     def _touch(self, number: int, found: tuple[Any, bool] | None) -> Verdict:
-        """Judge whether a browser may use the found control or node."""
+        """Judge whether a browser may use the control or node that was found; None is forged."""
         if found is None:
             return Verdict.FORGED
         return Verdict.PASSES if not found[1] or self.may_steer(number) else Verdict.REFUSED
@@ -297,7 +298,7 @@ def _check_number(handle: Any, value: object) -> Verdict:
 
 
 def _check_vector(handle: Any, value: object) -> Verdict:
-    """Check each number of a vector in the same way."""
+    """Check each number of a vector like ``_check_number``."""
     count = len(handle.value)
     if not isinstance(value, tuple | list) or len(value) != count:
         return Verdict.FORGED

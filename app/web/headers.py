@@ -29,7 +29,7 @@ OTHERS = {"X-Content-Type-Options": "nosniff", "X-Frame-Options": "DENY", "Refer
 
 
 def strict_headers(hashes: Sequence[str] = (), allowed: Collection[str] = ()) -> AbstractContextManager[None]:
-    """Context in which servers start that send the policy with every answer.
+    """Return a context. A server started in it sends the policy with every answer.
 
     Args:
         hashes: hashes of the scripts allowed in the page, as the policy writes them.

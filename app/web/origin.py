@@ -45,7 +45,7 @@ NOT_PASSED_ON = (
     "path such as /pm/, also for /pm\n"
 )
 RECENT_S = 10.0
-"""Time within which a page that waits tries to open its websocket."""
+"""Time within which a waiting page tries to open its websocket at least once, seconds."""
 _MOST_ORIGINS = 1000
 _NOBODY: frozenset[str] = frozenset()
 _ADDRESS = re.compile(r"[A-Za-z0-9._:\[\]-]{1,260}")
@@ -108,12 +108,12 @@ def _missing(headers: Mapping[str, str], allowed: frozenset[str]) -> Iterator[tu
 
 
 def _shown(address: str, name: str | None) -> str:
-    """Return the address with its port, if it is one; else the name."""
+    """Return the address in lower case, with its port; the name if it has characters that no address has."""
     return address.lower() if _ADDRESS.fullmatch(address) else name or ""
 
 
 def _names_this_machine(name: str) -> bool:
-    """Whether a host name is certainly ours: an IP address, localhost, or the name of this machine."""
+    """Whether a host name can only be this machine: an IP address, localhost, or the machine's own name."""
     with contextlib.suppress(ValueError):
         ipaddress.ip_address(name)
         return True
@@ -122,7 +122,7 @@ def _names_this_machine(name: str) -> bool:
 
 
 def well_formed() -> AbstractContextManager[None]:
-    """Context in which servers start that answer 400 to unreadable requests, where viser fails with 500."""
+    """Return a context. A server started in it answers unreadable requests with 400, not 500 as viser."""
     return answering(_understood)
 
 
@@ -139,7 +139,7 @@ def _understood(answer: Answer) -> Answer:
 
 
 def only_own_page(allowed: frozenset[str] = _NOBODY) -> AbstractContextManager[None]:
-    """Context in which servers start that refuse requests from other sites' pages.
+    """Return a context. A server started in it refuses requests from other sites' pages.
 
     Args:
         allowed: further names of this server, from ``allowed_names``.
@@ -149,7 +149,7 @@ def only_own_page(allowed: frozenset[str] = _NOBODY) -> AbstractContextManager[N
 
 @contextlib.contextmanager
 def answering(change: Callable[[Answer], Answer]) -> Iterator[None]:
-    """Context in which servers start whose answers to requests are changed by ``change``.
+    """Open a context. A server started in it answers requests with ``change`` applied to its own answer.
 
     Viser has no option for this.
     """
@@ -169,7 +169,7 @@ def answering(change: Callable[[Answer], Answer]) -> Iterator[None]:
 def _guard(allowed: frozenset[str], answer: Answer) -> Answer:
     """Return the server's answer function, which now refuses requests from other sites."""
     attempts_s = dict[str, float]()
-    """Time of the last websocket of each origin."""
+    """Time at which each origin last requested a websocket, seconds."""
 
     def guarded(connection: Any, request: Any) -> Any:
         if "Upgrade" in request.headers:

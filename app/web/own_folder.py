@@ -24,6 +24,7 @@ class OwnFolder:
 
     path: Path
     lock: IO[str]
+    """The open lock file; other servers delete the folder once it is closed."""
 
     def delete(self) -> None:
         """Delete the folder and its content."""

@@ -35,7 +35,7 @@ _DIGITS = b"!#$%()*+,-./0123456789:;=?@ABCDEFGHIJKLMNOPQRSTUVWXYZ[\\]^_abcdefghi
 """The digits of the base 88 in which viser's page stores its script."""
 _PACKED = re.compile(r'<script data-p="([^"]*)" data-ss="(\d+)" data-cs="(\d+)">(.*?)</script>', re.DOTALL)
 _AT_ONCE, _IN_TURN = 'if(document.readyState==="loading")', "if(!window.packetmesh)"
-"""The condition on which viser's script waits for the page before it runs the unpacked one, and ours."""
+"""Condition under which viser's script waits before it runs the unpacked one, and its replacement."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class Page:
         self._greetings = {place: self._page(head, greeting) for place, greeting in greetings.items()}
 
     def served(self) -> AbstractContextManager[None]:
-        """Context in which servers start that send this page and its files."""
+        """Return a context. A server started in it sends this page and its files."""
         return answering(self._answering)
 
     def _page(self, head: Markup, greeting: Markup) -> File:

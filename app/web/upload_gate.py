@@ -8,8 +8,9 @@ from collections import deque
 MOST_BYTES = 256 << 20
 """Largest file, bytes; screens may have lower limits."""
 MOST_TOTAL_BYTES = 1 << 30
-"""Most bytes of all files of a session."""
+"""Most bytes of all files of one connection."""
 MOST_PARTS = 10_000
+"""Most parts of a file."""
 MOST_A_MINUTE = 300
 REFUSED = (
     f"The app takes files of up to {MOST_BYTES >> 20} MB, {MOST_TOTAL_BYTES >> 30} GB in all, and "
@@ -18,7 +19,7 @@ REFUSED = (
 
 
 class UploadGate:
-    """What one browser has uploaded so far."""
+    """Counts what one connection uploads."""
 
     def __init__(self) -> None:
         self._left: dict[str, int] = {}

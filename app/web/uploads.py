@@ -42,7 +42,7 @@ def name_in(source: Source) -> str | None:
 
 
 def plain(command: str) -> str:
-    """Return a command line without the server's folders: uploaded files have only their own names."""
+    """Return a text, such as a command line, without the server's folders before uploaded files' names."""
     return _FOLDER.sub("", command)
 
 
@@ -75,7 +75,7 @@ class _Upload:
     """The source that can be opened again; None while the folder belongs to one session only."""
     owners: set[int] = field(default_factory=set)
     left_s: float = 0.0
-    """Time at which the last session closed it."""
+    """Time at which the last session closed it, seconds."""
 
 
 class Uploads:

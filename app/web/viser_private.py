@@ -1,7 +1,7 @@
 """Access to viser's private parts that the app needs, each with its reason. Viser's version is pinned for
 this.
 
-- ``queue_from_any_thread``: viser 1.1 sets an ``asyncio.Event`` on whichever thread queues a message, then
+- ``queue_from_any_thread``: viser 1.1 sets an ``asyncio.Event`` on the thread that queues a message, then
 lets the event loop set it again. asyncio's events are not thread-safe: if the loop begins to wait at that
 moment, ``set`` fails with "deque mutated during iteration", once in some thousand visits, and leaves a page
 half built.
@@ -10,7 +10,9 @@ is a seventh of the time in which a session's panels are built.
 - ``call_in_order``: viser handles a browser's messages on any of 32 threads, so that on busy cores a click on
 *Reset* can be handled before the choice that it should undo.
 - ``listen``: viser gives every message of a browser to its handlers and has no hook before them.
-- ``find_control``, ``find_command``, ``is_live``: the target of a message, and whether a user could reach it.
+- ``find_control``, ``find_command``, ``find_node``, ``is_live``, ``awaits_render``: the target of a message,
+and whether a user could reach it.
+- ``send_value``: the control of a browser whose change was refused shows the server's value again.
 - ``contents``: the controls in a folder, so that they can be found by typing.
 - ``address_of``, ``close``, ``cookies``, ``languages``: parts of a browser's connection.
 """

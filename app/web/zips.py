@@ -1,4 +1,4 @@
-"""Reading of uploaded ZIP files."""
+"""Opens uploaded ZIP files, with one sentence for a broken one."""
 
 from __future__ import annotations
 

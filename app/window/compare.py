@@ -80,7 +80,7 @@ class CompareArea:
         self._draw()
 
     def set(self, left: str, right: str, split_share: float) -> None:
-        """Choose both pictures by name, and the place of the line."""
+        """Choose both pictures by name, and the share of the width, 0 to 1, that is left of the line."""
         self._left.value, self._right.value = self._labels[left], self._labels[right]
         self._split.value = round(100.0 * split_share)
         self._draw()

@@ -41,6 +41,7 @@ class Number:
     least: float
     most: float
     step: float
+    """Step of the slider; like its ends, in the unit shown."""
     per_unit: float = 1.0
     """Shown units per unit of the field: 100 for a field in metres shown in cm."""
     hint: str | None = None
@@ -83,7 +84,7 @@ def hint_of(control: Control) -> str:
 
 
 def shown(control: Control, config: PipelineConfig) -> Any:
-    """Return the field's value as the control shows it."""
+    """Return the field's value as the control shows it; numbers within the slider's ends."""
     value = get(config, control.path)
     if isinstance(control, Choice):
         return control.names.get(value, value)
@@ -94,7 +95,11 @@ def shown(control: Control, config: PipelineConfig) -> Any:
 
 
 def stored(control: Control, display: Any, config: PipelineConfig) -> PipelineConfig:
-    """Return ``config`` with the value that the control shows."""
+    """Return ``config`` with the value that the control shows.
+
+    Raises:
+        InputError: the config refuses the value.
+    """
     if isinstance(control, Choice):
         values = {name: value for value, name in control.names.items()}
         return put(config, control.path, values.get(display, display))
@@ -156,7 +161,11 @@ def _add(gui: Gui, control: Control, config: PipelineConfig) -> Any:
 
 
 def options_of(path: str) -> tuple[str, ...]:
-    """Return the values that a ``Literal`` field takes."""
+    """Return the values that a ``Literal`` field takes.
+
+    Raises:
+        TypeError: the field has another type.
+    """
     owner, name = _owner(path)
     hint = typing.get_type_hints(owner)[name]
     if typing.get_origin(hint) is not Literal:

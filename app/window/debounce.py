@@ -1,4 +1,4 @@
-"""A timer that every call starts again: its action runs after the last one."""
+"""A timer that each call restarts; its action runs after the last call."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 
 class Debounce:
-    """Calls ``action`` when ``wait_s`` have passed since the last ``restart``."""
+    """Calls ``action`` on its own thread when ``wait_s`` seconds have passed since the last ``restart``."""
 
     def __init__(self, wait_s: float, action: Callable[[], None]) -> None:
         self._wait_s, self._action = wait_s, action

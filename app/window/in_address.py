@@ -64,7 +64,11 @@ class Picked:
         return next((name for name in names if self.names[name] == self.handle.value), "")
 
     def take(self, place: str) -> None:
-        """Choose by name."""
+        """Choose by name; an empty name chooses the first.
+
+        Raises:
+            InputError: the list has no such name.
+        """
         name = place or next(iter(self.names))
         if name not in self.names or self.names[name] not in self.handle.options:
             raise InputError(f"The address has {name[:40]}; try one of {', '.join(self.names)}")
@@ -74,7 +78,7 @@ class Picked:
 
 
 class Awaited:
-    """A drop-down whose names come with results; an address may ask for a name before it is there."""
+    """A drop-down whose names come with results; an address may request a name before the list has it."""
 
     def __init__(self, ui: Ui, handle: viser.GuiDropdownHandle[str], action: Callable[[], object]) -> None:
         """Keep the drop-down ``handle``; ``action`` is called after a change."""
@@ -91,7 +95,12 @@ class Awaited:
         self._action()
 
     def offer(self, names: tuple[str, ...], all_there: bool = True) -> None:
-        """Set the names of the list. A name chosen or asked for before is selected if it is among them."""
+        """Set the names of the list. A name that was chosen or requested is selected if it is among them.
+
+        Args:
+            names: one name or more.
+            all_there: whether no more names will come: a requested name that is missing is then reported.
+        """
         chosen = self._requested or self.value
         if names != self._handle.options:
             self._handle.options = names
@@ -106,7 +115,7 @@ class Awaited:
             self._ui.post(tell_unknown, unknown, names)
 
     def place(self) -> str:
-        """Return the name chosen or asked for; empty for the first."""
+        """Return the name that is chosen or requested; empty for the first."""
         return self._requested or ("" if self.value == self._handle.options[0] else self.value)
 
     def take(self, place: str) -> None:

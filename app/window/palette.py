@@ -47,7 +47,8 @@ KEYS: Mapping[Name, Key] = {
 }
 """All keys that work on every screen. None is a key of viser (W A S D Q E and the arrows turn and move the
 view, Ctrl-K opens the palette), of a lesson (arrows, page keys, space, 1 2 3, S) or of a dock (arrows, space,
-Home, End, + and -). On a French keyboard Z, W, Q, A and M lie elsewhere; of these only M is a key here."""
+Home, End, + and -). On a French keyboard Z, W, Q, A and M are in other places; of these only M and
+Ctrl-Z are keys here."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +57,7 @@ class Entry:
 
     label: str
     kind: str
-    """What it is, such as "Setting on Depth"; shown below the label and found too."""
+    """What it is, such as "Setting on Depth"; shown below the label and searched, too."""
     action: Callable[[], object]
     """Runs on the session's thread."""
     key: Key | None = None
@@ -71,7 +72,7 @@ class Palette:
         self._added: dict[tuple[str, str], Any] = {}
 
     def offer(self, entries: Iterable[Entry]) -> None:
-        """Offer exactly these entries; those that were offered before keep their place."""
+        """Offer exactly these entries. One of a known label and kind keeps its place and its old action."""
         named = {(entry.label, entry.kind): entry for entry in entries}
         for name in [name for name in self._added if name not in named]:
             self._added.pop(name).remove()

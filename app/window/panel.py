@@ -76,7 +76,7 @@ class PanelSession(Protocol):
         ...
 
     def new_folder(self) -> Path:
-        """Make a folder for an upload, or for what is made of one."""
+        """Make a folder for an upload, or for files made from one."""
         ...
 
     def edit(self, change: Callable[[PipelineConfig], PipelineConfig]) -> None:
@@ -84,7 +84,7 @@ class PanelSession(Protocol):
         ...
 
     def want(self, spec: Spec) -> None:
-        """Take another spec and recompute what depends on the difference."""
+        """Change the spec and recompute what depends on the difference."""
         ...
 
     def side_job(
@@ -94,13 +94,20 @@ class PanelSession(Protocol):
         on_end: Callable[[Any], None],
         on_partial: Callable[[Any], None] = ...,
     ) -> None:
-        """Run a job next to the chain, in place of the one before."""
+        """Run a job after the chain's running step, in place of the side job before it.
+
+        ``on_partial`` gets partial results, and ``on_end`` the result or None on failure.
+        """
         ...
 
     def quick_job(
         self, job: str, *arguments: Any, on_end: Callable[[Any], None], key: Hashable = None
     ) -> None:
-        """Run a short job, of each module only the last. With a key, answers are shared."""
+        """Run a short job in parallel with the chain; it replaces an earlier one of its module.
+
+        ``on_end`` gets the answer, or None if the job failed or was stopped; it is not called for a job that
+        was replaced while it waited. Answers with a key are shared by all sessions.
+        """
         ...
 
     def cancel_side_job(self) -> None:
@@ -132,17 +139,18 @@ class Panel(ABC):
 
     title: ClassVar[str]
     step: ClassVar[Step | None] = None
-    """The step whose result it shows."""
+    """The step whose result it shows; None if it has none."""
     drawn_below: ClassVar[str]
     """Scene node under which it draws; only the current panel's node is visible."""
     only_when_shown: ClassVar[bool] = False
-    """Whether its step is computed only while it is the current one."""
+    """Whether its step is computed only while the panel is the current one."""
 
     def __init__(self, session: PanelSession) -> None:
         self.session, self.ui = session, session.ui
         self.gui, self.scene = session.ui.gui, session.ui.scene
         self.in_address: dict[str, InAddress] = {}
-        """By key, the parts whose state is in the address while this is shown; lessons under ``STOP``."""
+        """Parts whose state is in the address while this is shown, by key; keys of lessons begin with
+        ``STOP``."""
 
     @abstractmethod
     def build(self) -> None:
@@ -167,7 +175,7 @@ class Panel(ABC):
         """Called before another panel becomes the current one."""
 
     def on_action(self, action: str) -> None:
-        """Handle a press of a button for all steps."""
+        """Handle a press of a button for all steps, such as *Cancel*."""
 
     @property
     def ahead(self) -> bool:

@@ -36,6 +36,7 @@ TRUTH_ROWS = (
 )
 """Comparison with the true surface: name, explanation, key in ``MeshView.truth``, and unit."""
 PER_UNIT = {"%": 100.0, "mm": 1000.0}
+"""Factors from the stored values (shares, metres) to the units shown."""
 
 
 def term(name: str, hint: str) -> Markup:
@@ -48,7 +49,7 @@ def term(name: str, hint: str) -> Markup:
 def table(
     rows: Sequence[Row], columns: Sequence[Head] = (), colors: Sequence[tuple[int, int, int]] = ()
 ) -> Markup:
-    """Return HTML of rows of numbers; ``columns`` are the heads of the values, in ``colors`` if given."""
+    """Return HTML of rows of numbers; ``columns`` are heads of the values, in ``colors`` (RGB) if given."""
     lines = []
     if columns:
         names = [one if isinstance(one, str) else term(*one) for one in columns]
@@ -96,7 +97,7 @@ def _joined(parts: Iterable[str]) -> Markup:
 
 
 def number(value: float | None, digits: int = 1, unit: str = "", scale: float = 1.0) -> str:
-    """Return a value with its unit, or a dash if it is unknown."""
+    """Return a value times ``scale`` with its unit; a dash if it is unknown (None or NaN)."""
     if value is None or value != value:
         return UNKNOWN
     return f"{value * scale:,.{digits}f}{unit and ' '}{unit}"

@@ -1,4 +1,4 @@
-"""What the lessons of one browser share: a teacher's own lessons, and the language of the texts."""
+"""State that the lessons of one session share: a teacher's own lessons, and the language of the texts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Teaching:
     own: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     """The teacher's own lessons, ``app.lesson.files.Lesson``, by the kind of screen."""
     languages: Mapping[str, str] = field(default_factory=lambda: {ENGLISH: "English"})
-    """Names of the languages that some lesson has, in these languages, by their codes."""
+    """Names of all languages of lessons, each in its own language, by code."""
     own_language: str = ENGLISH
     """Code of the browser's language."""
     on_change: list[Callable[[], None]] = field(default_factory=list)

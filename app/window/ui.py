@@ -63,11 +63,11 @@ class Ui:
     lecture: SharedBy | None = None
     """The lecture whose browsers all show the same; None for a session of one browser."""
     teaching: Teaching = field(default_factory=Teaching)
-    """What its lessons share."""
+    """State that its lessons share."""
     closers: list[Callable[[], None]] = field(default_factory=list)
     """Functions that stop the timers and threads of the screens."""
     resets: list[Callable[[], None]] = field(default_factory=list)
-    """Functions that *Reset* calls, besides resetting the settings and the screens."""
+    """Functions that *Reset* calls before it resets the screens and the settings."""
 
     def when_changed(self, handle: Input, action: Callable[[], object]) -> Input:
         """Call ``action`` when a user, not the program, changes ``handle``. Returns the handle."""
@@ -97,7 +97,7 @@ class Ui:
             self.gui.add_button("Close").on_click(lambda _: modal.close())
 
     def when_clicked(self, below: str, action: Callable[[FloatArray, FloatArray], object]) -> None:
-        """Handle a click while the node ``below`` is shown: ``action`` gets its ray, origin and direction."""
+        """Call ``action`` with (3,) origin and direction of a click's ray, if the node ``below`` is shown."""
 
         def clicked(event: Any) -> None:
             if self.shows(below):

@@ -1,7 +1,7 @@
 """Settings that change nothing in a run, with the reason: the radio, the scheme or another setting.
 
-``without_effect`` is for settings that a user gave. Most reasons follow from the config alone. The radio's
-settings may also leave a network as it is because of the nodes' places: then all links are compared.
+``without_effect`` is for settings that a user gave. Most reasons follow from the config alone. A setting of
+the radio or of the nodes' places may also leave all links as they were; to find this, the links are compared.
 """
 
 from __future__ import annotations
@@ -200,7 +200,7 @@ def _same_links(config: NetworkConfig, key: str, before: NetworkConfig) -> str |
 
 
 def _links(config: NetworkConfig) -> list[NDArray[np.float64]]:
-    """Return all that a run reads of radio and places: arrays that are equal for runs with equal events."""
+    """Return the arrays through which radio and places affect a run; equal arrays give equal events."""
     from network_sim.fixed.collection import topology  # here, because the app imports this module
 
     places, radio, success = topology(config)

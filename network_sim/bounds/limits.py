@@ -12,7 +12,7 @@ from typing import Any
 from packetmesh.errors import InputError
 
 _MOST = {"db": 300.0, "dbm": 300.0, "s": 1e9, "m": 1e9, "hz": 1e15, "bps": 1e15, "gain": 1e9, "loss": 1e30}
-"""Largest value, and negated the smallest, by the last word of a name."""
+"""Largest absolute value, by the last word of a name."""
 _LEAST = {"s": 1e-9, "m": 1e-9, "hz": 1.0, "bps": 1.0, "gain": 1e-9}
 """Smallest value above 0; times are simulated in nanoseconds."""
 MOST_NODES = 10_000

@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 
 
 def disconnected(config: NetworkConfig) -> tuple[str, ...]:
-    """Return the names of the nodes without a route to the sink in this config, without running it."""
+    """Return the names of the nodes without a route to the sink; the network is not run."""
     places, _, success = topology(config)
     names = collection_names(config)
     return tuple(names[node] for node in shortest_paths(success, places.count - 1).unreachable)
 
 
 def topology(config: NetworkConfig) -> tuple[FixedPlaces, Radio, NDArray[np.float64]]:
-    """Return the positions, the radio, and (N, N) success probability of each link, without running it."""
+    """Return the positions, the radio, and (N, N) success probability of each link, as in a run."""
     return _topology(config, np.random.default_rng(config.run.seed).spawn(1)[0])
 
 

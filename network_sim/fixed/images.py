@@ -83,7 +83,7 @@ class Fragments:
 
 @dataclass(slots=True)
 class Image:
-    """An image that is being sent, or colour and depth of one instant."""
+    """An image that is sent; colour and depth of one instant are one image."""
 
     id: int
     node: int
@@ -129,7 +129,7 @@ class Book:
         self.cameras = 0
         """Number of cameras that will take further images."""
         self.ended = env.event()
-        """Event that every image has arrived or was given up, and no packet is left."""
+        """Event that triggers when every image has arrived or was given up, and no packet is left."""
         self._recorder = recorder
         self._data_bytes = data_bytes
         self._header_bytes = header_bytes

@@ -163,7 +163,12 @@ class Station:
         return 0
 
     def _next(self) -> Packet | None:
-        """Take the next packet from the buffer; None if there is none or the node sleeps or soon will."""
+        """Take the next packet from the buffer.
+
+        Returns:
+            The packet; None if there is none, the node sleeps or soon will, or the first packet has no route
+            at present.
+        """
         shared = self._shared
         env, sleeps_at_ns = shared.env, shared.sleeps_at_ns
         if not shared.up[self.index] or (sleeps_at_ns is not None and env.now + GUARD_NS > sleeps_at_ns):
@@ -222,7 +227,7 @@ class Camera:
     def __init__(self, shared: Shared, station: Station, phase_ns: int) -> None:
         """Start the camera; it takes its first image at ``phase_ns``."""
         self.recovered = shared.env.event()
-        """Event that the node recovers from a failure; then a new event replaces it."""
+        """Event that triggers when the node recovers from a failure; then a new event replaces it."""
         self._shared = shared
         self._station = station
         self._open: dict[int, Outgoing] = {}

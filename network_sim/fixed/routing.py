@@ -60,7 +60,8 @@ def shortest_paths(success: NDArray, sink: int) -> Routes:
         sink: destination of all routes.
 
     Returns:
-        The routes. Of equally cheap ones, that over the next node nearest to the sink, then lowest-numbered.
+        The routes. Of equally cheap ones, that over the next node with the cheapest route, then the one with
+        the fewest hops, then the one with the lowest number.
     """
     both = np.asarray(success, float) * np.asarray(success, float).T
     with np.errstate(divide="ignore"):

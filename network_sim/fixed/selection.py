@@ -102,7 +102,7 @@ def greedy_by_cost(
 def at_random(
     q: FloatArray, count: int, rng: np.random.Generator, weights: FloatArray | None = None
 ) -> Selection:
-    """Select ``count`` cameras at random, independent of ``q``."""
+    """Select ``count`` cameras at random, independent of ``q``; raises as ``greedy``."""
     _check(q, count, weights)
     return _as_given(q, [int(camera) for camera in rng.permutation(len(q))[:count]], weights)
 
@@ -110,7 +110,8 @@ def at_random(
 def nearest(
     q: FloatArray, count: int, distances_m: FloatArray, weights: FloatArray | None = None
 ) -> Selection:
-    """Select the ``count`` cameras with the least (N,) distances, for example to the sink or the scene."""
+    """Select the ``count`` cameras with the least (N,) distances, for example to the sink or the scene;
+    raises as ``greedy``."""
     _check(q, count, weights)
     order = np.argsort(distances_m, kind="stable")[:count]
     return _as_given(q, [int(camera) for camera in order], weights)

@@ -29,8 +29,8 @@ class Mac(Protocol):
     def send(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Delivery]:
         """Carry a packet to a neighbour: ``delivery = yield from mac.send(packet, a, b)``.
 
-        A sender sends one packet after the other; earlier ones may still be ``under_way``. ``Delivery.ok`` is
-        the sender's knowledge.
+        A sender calls this for one packet after the other; earlier packets may still be ``under_way``.
+        ``Delivery.ok`` is what the sender knows, ``Delivery.cause`` what happened.
         """
 
 

@@ -39,7 +39,7 @@ class MacContext:
     rng: np.random.Generator
     """Random generator of the backoffs."""
     up: Callable[[int], bool]
-    """Returns whether a node is awake."""
+    """Returns whether a node has neither failed nor fallen asleep."""
     receive: Callable[[Packet, int], None]
     """Called with a packet and the node that it has reached, at most once per ``send``."""
     report: Callable[[Packet, int, int, Delivery], None] = ignore

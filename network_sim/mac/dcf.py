@@ -290,7 +290,7 @@ class Dcf:
     def _exchange(
         self, packet: Packet, station: _Station, receiver: int
     ) -> Generator[simpy.Event, Any, Cause]:
-        """Make one attempt; returns ``NONE`` if the sender got the acknowledgement, else the cause."""
+        """Make one attempt; returns ``NONE`` if acknowledged, else the cause (``COLLISION`` without CTS)."""
         env, sender, size_bytes = self._env, station.node, packet.size_bytes
         cts, begins_ns = None, station.begins_ns
         if self._rts:

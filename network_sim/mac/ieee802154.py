@@ -1,9 +1,10 @@
 """Unslotted IEEE 802.15.4 at 2.4 GHz: CSMA/CA with acknowledgement and retries (SPEC 6.1).
 
 A node waits a random number of backoff periods, assesses the channel (CCA), switches its radio to sending
-and sends. During this turnaround it is deaf: a frame that starts then collides. Nothing is computed per slot:
-an attempt takes one simulation event for backoff and assessment, and one for each part of the exchange; if
-nothing else happens meanwhile, one up to the end of the frame and one for its acknowledgement.
+and sends. During this turnaround it hears nothing: a frame that another node starts then collides with its
+own. Nothing is computed per slot: an attempt takes one simulation event for backoff and assessment, and one
+for each part of the exchange; if nothing else happens meanwhile, one up to the end of the frame and one for
+its acknowledgement.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ class Ieee802154:
         self._env = context.env
         self._medium = context.medium
         self._next_ns = context.env.peek if context.medium.places.static else lambda: 0
-        """Returns the time of the next event; 0 if nodes move, which then counts as an event now."""
+        """Returns the time of the next event in ns; 0 if nodes move, so that no event is left out."""
         self._ack = context.config.mac.ack
         retries = context.config.mac.retries
         self._attempts = 1 + (MAX_FRAME_RETRIES if retries is None else retries) if self._ack else 1
@@ -133,8 +134,9 @@ class Ieee802154:
     def _busy(self, node: int, at_ns: int) -> bool:
         """Return whether an assessment that ends at ``at_ns`` finds the channel or the node itself busy.
 
-        The end of the assessment decides (as in ns-3's lr-wpan): only the turnaround is vulnerable. It is
-        now, or later if nothing happens before. A node is busy while it sends an acknowledgement.
+        The end of the assessment decides (as in ns-3's lr-wpan): only the turnaround is vulnerable.
+        ``at_ns`` is now, or later if nothing happens before. A node is busy while it sends an
+        acknowledgement.
         """
         return at_ns < self._acking_until_ns.get(node, 0) or self._medium.busy_until(node, at_ns)
 

@@ -150,8 +150,8 @@ class Medium:
             receiver: Node that receives.
             size_bytes: Size of the frame, from which bit errors follow if the radio has noise.
             modulation: Modulation of the frame.
-            begins_ns: Start of the frame: None for now, or later for a reply; a frame that begins before
-                this start must end after it.
+            begins_ns: Start of the frame: None for now, or later for a reply. Every frame that begins before
+                this start must also end after it, because it is counted as overlapping.
             reserve_ns: Duration of the reservation (NAV) after its end, for every node that can read it.
 
         Returns:
@@ -271,8 +271,8 @@ class Medium:
     def _lost_in_overlap(self, frame: Transmission, powers_w: list[float], interference_w: float) -> bool:
         """Return whether an 802.15.4 receiver loses a frame to the frames that overlap it.
 
-        It was busy with an earlier one, their power is too near (the same spreading code tells them apart
-        worse than noise), or overlapped bits are wrong.
+        The receiver was busy with an earlier frame, the frames' powers are too close (the same spreading
+        code separates frames worse than it suppresses noise), or overlapped bits are wrong.
         """
         if max(powers_w[: frame.earlier], default=0.0) >= self._rx_w:
             return True

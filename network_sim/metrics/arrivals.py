@@ -43,7 +43,7 @@ class Spent:
     """Bytes, losses and energy of a run until given moments: arrays of one shape, or single numbers."""
 
     sent_bytes: IntArray
-    """Bytes of all frames that had begun, including headers and retries, excluding replies."""
+    """Bytes of all frames that had begun, including headers and retries, excluding replies and the uplink."""
     lost: IntArray
     """Failed attempts to send a packet, including those on the uplink."""
     radio_j: FloatArray

@@ -33,7 +33,8 @@ FACTORS: tuple[dict[str, float], ...] = (
 )
 """Factors from every unit to the usual one, by quantity."""
 HEADER = "time_s rate_mbit/s rtt_ms loss_share"
-_WORDS = (  # "loss_rate" is a loss, "round_trip_time" no time
+"""Example of a header, for error messages."""
+_WORDS = (  # "loss_rate" is a loss, and "round_trip_time" is not a time
     (3, r"(packet[ _-]*)?(loss|lost|plr)"),
     (2, r"(rtt|round[ _-]*trip([ _-]*time)?|ping)"),
     (1, r"(data[ _-]*|bit[ _-]*)?(rate|bandwidth|throughput|goodput|capacity|bw)"),
@@ -52,9 +53,9 @@ LIMITS = ((0.0, 1e9), (1e-6, 1e9), (0.0, 1e9))
 EPOCH_S = (9e8, 5e9)
 """Seconds since 1970 from 1998 to 2128."""
 USUAL_MBPS = 300.0
-"""Rate up to which a file without a header is as the documentation says; a faster one is said."""
+"""Largest rate that is read in Mbit/s without a note to the user, if no header gives the unit."""
 FAST_MBPS, SLOW_STEP_S, SHORT_MS, LONG_MS = 1000.0, 5.0, 1.0, 5000.0
-"""Rate, step in time, and short and long round trip, beyond which another unit is as likely."""
+"""Limits of rate, step in time, and short and long round trip, beyond which another unit is as likely."""
 MOST_SHARE = 2.0
 """A loss between 1 and this may be a wrong share, or a small percentage."""
 
@@ -70,7 +71,7 @@ class Column:
 
 
 def column_named(title: str, where: str) -> Column | None:
-    """Return the quantity and unit that a column's title names; None if it names neither.
+    """Return the quantity and unit that a column's title names; None if it names no quantity.
 
     Raises:
         InputError: the quantity is known, but not the unit; or the title is a one-way latency.
@@ -89,7 +90,7 @@ def column_named(title: str, where: str) -> Column | None:
 
 
 def _unit(quantity: int, text: str, where: str) -> str | None:
-    """Return the unit in the rest of a title, such as ``_kbit/s`` or ``[ms]``."""
+    """Return the unit in the part of a title after the quantity, such as ``_kbit/s``; None without one."""
     word = re.sub(r"[\s_\[\](){}.-]", "", text).removeprefix("/").removeprefix("in")
     if quantity == 3:
         if word.lower() in ("%", "percent", "pct", "percentage", "rate%", "ratepercent", "ratepct"):

@@ -41,7 +41,7 @@ _DECIMAL_COMMA = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line of the file without its comment."""
+    """A line of the file: the text before its #, or its comment if it holds nothing else."""
 
     number: int
     text: str
@@ -77,11 +77,12 @@ class Form:
 def read_link_trace(path: str | Path) -> LinkTrace:
     """Read a recorded link: a text file with columns of time, rate, round trip and share lost.
 
-    Without a header they are in s, Mbit/s, ms and 0 to 1; a header names quantities and units in any order. A
-    loss above 2 is in per cent, a time since 1970 in the unit that its size shows. Columns are separated by
-    white space, commas, semicolons or tabs; decimal commas are recognised. Times rise from row to row and
-    count from the first one. Lines may be blank, and text after a # is a comment. A share between -1 and 0
-    counts as 0: more packets arrived during the row than were sent in it.
+    Without a header they are in s, Mbit/s, ms and 0 to 1; a header names quantities and units in any order.
+    If a loss is above 2, all are in per cent; times since 1970 are in the unit that their size shows. Columns
+    are separated by white space, commas, semicolons or tabs; decimal commas are recognised. Times rise from
+    row to row and count from the first one. Lines may be blank. Text after a # is a comment, but the last
+    comment above the rows is a header if it names the four quantities. A share between -1 and 0 counts as 0:
+    more packets arrived during the row than were sent in it.
 
     Raises:
         InputError: the file cannot be read, has no rows, or a row has the wrong number of columns, a field
@@ -209,10 +210,10 @@ def _quantities(columns: Iterable[Column | None]) -> list[int]:
 
 
 def _named_columns(titles: Sequence[str], where: str) -> list[Column | None]:
-    """Return the columns that titles name; a doubtful one is left out if the others name all four.
+    """Return the columns that titles name; an ambiguous title counts as None if the others name all four.
 
     Raises:
-        InputError: one of the four is named in doubt.
+        InputError: a title is ambiguous, and the others do not name all four quantities.
     """
     columns = [_plainly_named(title, where) for title in titles]
     if set(_quantities(columns)) == set(range(len(QUANTITIES))):
@@ -221,7 +222,7 @@ def _named_columns(titles: Sequence[str], where: str) -> list[Column | None]:
 
 
 def _plainly_named(title: str, where: str) -> Column | None:
-    """Return the column that a title names; None if it names none, or in doubt."""
+    """Return the column that a title names; None if it names none or is ambiguous."""
     try:
         return column_named(title, where)
     except InputError:
@@ -260,7 +261,7 @@ def _row(form: Form, line: Line, width: int, order: Sequence[int], path: str) ->
 
 
 def _check_ranges(table: FloatArray, units: Sequence[str], rows: Sequence[Line], path: str) -> None:
-    """Raise if a number is negative, or a loss is more than all packets."""
+    """Raise if a time, rate or round trip is negative, or a loss is not a share from -1 to 1."""
     whole = 1.0 / FACTORS[-1][units[-1]]
     for index, (name, values) in enumerate(zip(QUANTITIES, table, strict=True)):
         least, most, hint = 0.0, math.inf, "0 or more"
@@ -274,7 +275,7 @@ def _check_ranges(table: FloatArray, units: Sequence[str], rows: Sequence[Line],
 
 
 def _check_limits(scaled: Sequence[FloatArray], units: Sequence[str], lines: list[int], path: str) -> None:
-    """Raise if a time, rate or round trip is larger or smaller than any link's."""
+    """Raise if a time, rate or round trip is outside ``LIMITS``."""
     for name, unit, usual, values, (least, most) in zip(
         QUANTITIES, units, USUAL, scaled, LIMITS, strict=False
     ):
@@ -286,7 +287,7 @@ def _check_limits(scaled: Sequence[FloatArray], units: Sequence[str], lines: lis
 
 
 def _from_zero(table: FloatArray) -> list[FloatArray]:
-    """Return the columns with times that count from the first, in their own unit, so that none is rounded."""
+    """Return the columns with times from the first row on, in the file's unit, so that none is rounded."""
     return [table[0] - table[0][0], *table[1:]]
 
 

@@ -1,6 +1,6 @@
 """Propagation and reception: mean power over distance, shadowing, fading, bit errors (SPEC 6.3).
 
-All powers are in watts and all distances in metres; only the config has decibels.
+Powers are in watts and distances in metres; only names that end in ``_db`` or ``_dbm`` are in decibels.
 """
 
 from __future__ import annotations
@@ -87,7 +87,8 @@ def free_space(tx_power_w: float, wavelength_m: float, gain: float = 1.0, loss: 
 def ground_reflection(
     tx_power_w: float, wavelength_m: float, height_m: float, gain: float = 1.0, loss: float = 1.0
 ) -> PathLoss:
-    """Return two-ray: free space; from the crossover ``Pr = Pt G^2 h^4 / (d^4 L)`` (Rappaport 2002, 4.6)."""
+    """Return the two-ray law: free space up to the crossover, then ``Pr = Pt G^2 h^4 / (d^4 L)`` (Rappaport
+    2002, 4.6)."""
     near = free_space(tx_power_w, wavelength_m, gain, loss)
     far_w = tx_power_w * gain**2 * height_m**4 / loss
     return PathLoss(near.near_w, 2.0, far_w, 4.0, crossover_m(height_m, wavelength_m), near.least_m)
@@ -101,7 +102,8 @@ def power_law(
     gain: float = 1.0,
     loss: float = 1.0,
 ) -> PathLoss:
-    """Return free space to ``reference_m``, then ``(d / reference)^-exponent`` (Rappaport 2002, 4.9)."""
+    """Return the log-distance law: free space up to ``reference_m``, then a fall with
+    ``(d / reference_m)^-exponent`` (Rappaport 2002, 4.9)."""
     near = free_space(tx_power_w, wavelength_m, gain, loss)
     break_m = max(reference_m, near.least_m)
     far_w = near.power_w(break_m) * break_m**exponent
@@ -179,7 +181,8 @@ def _rate(table: list[float], b: float) -> float:
 def cck11_symbol_error_rate(sinr: float) -> float:
     """Error rate of an 8-bit symbol of 802.11b at 11 Mb/s (Pei and Henderson 2009, as in ns-3).
 
-    A symbol (1 of 256) is sent as two of 16 biorthogonal signals; noise in the 22 MHz of the channel.
+    A symbol (1 of 256) is sent as two of 16 biorthogonal signals. ``sinr`` is a factor, for the noise in the
+    22 MHz of the channel.
     """
     one = _rate(_biorthogonal_table(), math.sqrt(8.0 * sinr))
     return one * (2.0 - one)
@@ -191,12 +194,12 @@ def cck5_symbol_error_rate(sinr: float) -> float:
 
 
 def dqpsk_bit_error_rate(sinr: float) -> float:
-    """Bit error rate of 802.11b at 2 Mb/s; noise in 22 MHz. ns-3 uses its limit for strong signals."""
+    """Bit error rate of 802.11b at 2 Mb/s, for noise in 22 MHz. ns-3 approximates it for strong signals."""
     return _rate(_dqpsk_table(), math.sqrt(22.0 * sinr))
 
 
 def dbpsk_bit_error_rate(sinr: float) -> float:
-    """Bit error rate of 802.11b at 1 Mb/s: ``exp(-Eb/N0) / 2`` (Proakis 2001, 5.2); noise in 22 MHz."""
+    """Bit error rate of 802.11b at 1 Mb/s: ``exp(-Eb/N0) / 2`` (Proakis 2001, 5.2), for noise in 22 MHz."""
     return 0.5 * math.exp(-22.0 * sinr)
 
 

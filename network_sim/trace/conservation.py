@@ -36,7 +36,7 @@ class Balance:
 
 
 def balance(trace: NetworkTrace) -> Balance:
-    """Return the balance of packets. Each number comes from its own events, so the equation can fail."""
+    """Return the balance of packets. Each number is counted from other events, so that an error shows."""
     counters = trace.counters
     held = _count(counters, EventKind.ENQUEUE) - _count(counters, EventKind.DELIVER)
     return Balance(

@@ -19,7 +19,7 @@ _UNSEEN = np.iinfo(np.int64).max
 
 @dataclass(frozen=True, slots=True)
 class Delays:
-    """Distribution of delays from 1 us to 11 days; shorter ones count as 1 us."""
+    """Distribution of delays; those under 1 us or over 11 days are in the histogram's first or last bin."""
 
     count: int
     total_s: float

@@ -167,7 +167,10 @@ class Recorder:
         cause: Cause = Cause.NONE,
         duration_ns: int = 0,
     ) -> None:
-        """Record an event of a packet at ``node``, towards ``peer``; ``size_bytes`` as in ``add``."""
+        """Record an event of a packet at ``node``, towards ``peer``.
+
+        ``size_bytes`` is the size of the frame for AIR and ACK, else of the packet.
+        """
         number, packet_kind, _, _, _, image, first_byte, _ = packet
         rows = self._rows
         rows += self._pack(

@@ -1,4 +1,4 @@
-"""Averaging of measured depth over its own surface; no pixel moves farther than its noise."""
+"""Averaging of measured depth over its own surface; no pixel moves by more than ``FARTHEST_SD`` sigmas."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ def averaged(planes: LocalPlanes) -> DepthMap:
     """Average every depth over the surrounding pixels of the same surface.
 
     This is the sigma filter (Lee 1983) along the local plane, in 1/z: a neighbour counts if its distance from
-    the pixel's plane is within the noise, so that edges stay and no pixel moves beyond its noise. Where noise
+    the pixel's plane is within ``FARTHEST_SD`` standard deviations, so that edges stay and no pixel moves
+    farther. Where noise
     is as large as the point spacing, the ball of ball pivoting would get caught inside a wall; averaging
     makes the wall thin again before points are merged.
 

@@ -17,7 +17,7 @@ def back_project(
     """Convert each pixel with known depth to a point in the camera frame, after removing the distortion.
 
     Depth is z, along the optical axis, for every lens. So a pixel at 90 degrees to the axis or more, or
-    beyond the range in which the lens model holds, has none and gives no point.
+    beyond the range in which the lens model holds, has no depth and gives no point.
 
     Args:
         frame: source of colours, intrinsics and, when ``depth`` is None, the depth.
@@ -65,7 +65,7 @@ def pixels_in_front(frame: RgbdFrame, depth: DepthMap) -> BoolArray:
 
 
 def without_rayless(frame: RgbdFrame) -> RgbdFrame:
-    """Return the frame with unknown depth at the pixels that its lens gives no ray; itself without any."""
+    """Return the frame with unknown depth at pixels without a ray; the frame itself if it has none there."""
     camera = frame.intrinsics
     if frame.depth.z_m.shape != (camera.height_px, camera.width_px):
         return frame  # ``pixels_in_front`` explains the sizes
@@ -77,8 +77,8 @@ def without_rayless(frame: RgbdFrame) -> RgbdFrame:
 
 
 def _sigma_m(frame: RgbdFrame, places: IntArray, z_m: FloatArray) -> FloatArray:
-    """Return (N,) deviations of an average where there is one; else by the sensor's calibrated noise at
-    normal incidence, or by a Kinect's."""
+    """Return (N,) standard deviations, metres: that of the recording's average where it is known, else by the
+    sensor's calibrated noise at normal incidence, or by a Kinect's."""
     sd_m = depth_sigma_m(z_m) if frame.noise is None else frame.noise.sd_m(z_m)
     if frame.averaging is None:
         return sd_m

@@ -56,7 +56,7 @@ def _distances_sd(
     columns: IntArray,
     reach_px: int,
 ) -> FloatArray:
-    """Return (lines, 2, N) distances of pixels in front of the planes on either side, in standard deviations.
+    """Return (lines, 2, N) distances from the planes on either side, standard deviations, positive in front.
 
     Args:
         inverse, right, down, sd: (H, W) float32, as in ``LocalPlanes``.

@@ -64,7 +64,8 @@ def find_outliers(cloud: PointCloud, config: AcquisitionConfig, focal_px: float)
         focal_px: focal length of the camera.
 
     Raises:
-        InputError: there are at most N points, points behind the camera, or the mode is ``flying``.
+        InputError: there are at most N points, the mode is ``flying``, or points are behind the camera in a
+            mode other than ``thesis``.
     """
     if config.outlier_mode == "flying":
         raise InputError("Outlier mode 'flying' needs a depth image, not a cloud; try mode 'robust'.")

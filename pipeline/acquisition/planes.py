@@ -98,7 +98,7 @@ Steps = tuple[FloatArray, BoolArray]
 
 
 def surface_steps(inverse: FloatArray, steepest: float) -> Iterator[Steps]:
-    """Yield steps to the right, then down; ``steepest`` is the largest on a surface, per unit of depth."""
+    """Yield steps to the right, then down; ``steepest`` is the largest on a surface, as a share of 1/z."""
     for axis in (1, 0):
         following = np.roll(inverse, -1, axis)
         following[(slice(None), -1) if axis else -1] = 0.0

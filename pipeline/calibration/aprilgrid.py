@@ -34,16 +34,16 @@ BORDERS = (2, 1)
 CELLS = 6
 """Cells along a tag of 36h11 inside its border."""
 OTHER_SPACING = 0.05
-"""Difference from which on the gap between tags is not that of the board."""
+"""Difference, over a tag's side, above which the gap between the tags is not the board's."""
 ENOUGH = 0.9
-"""Share of the tags with which the search stops."""
+"""Share of the board's tags at which the search stops."""
 WINDOW, WINDOW_PX = 0.6, (2, 8)
-"""Half of the window in which a corner is refined: share of the border or the gap, and its limits in
-pixels.
+"""Half width of the window in which a corner is refined, as a share of the border or the gap, and its limits
+in pixels.
 """
 STRAY, WRONG = 0.03, 0.06
-"""Corners farther than these shares of a tag's side from where the tags around predict them are refined again
-from there, or are wrong."""
+"""Shares of a tag's side. Corners farther than the first from where the tags around predict them are refined
+again from there; corners then farther than the second are left out."""
 
 
 def find_aprilgrid(gray: ByteArray, board: Board) -> Detection:
@@ -96,7 +96,7 @@ def tag_points(board: Board, upwards: bool = True) -> IntArray:
 
 
 def _tag_spacing(board: Board, fitted: Fit, corners_px: FloatArray) -> float:
-    """Return the gap between tags over a tag's side, as it is in the image."""
+    """Return the gap between tags over a tag's side, as measured in the image."""
     corners = placed(fitted.on_board, corners_px.reshape(-1, 2)).reshape(-1, 4, 2)
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     pitch = (1.0 + board.tag_spacing) * board.spacing_m
@@ -150,7 +150,7 @@ def _turn(board: Board, points: IntArray, corners_px: FloatArray) -> list[int]:
 
 
 def _refined(gray: ByteArray, board: Board, corners_px: FloatArray, border: int) -> FloatArray:
-    """Return (T, 4, 2) corners with subpixel accuracy; those outside the image as they are."""
+    """Return (T, 4, 2) corners with subpixel accuracy; those outside the image are unchanged."""
     room_px = _sides_px(corners_px) * min(border / (CELLS + 2 * border), board.tag_spacing)
     until = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-3)
     refined = corners_px.copy()
@@ -166,7 +166,7 @@ def _refined(gray: ByteArray, board: Board, corners_px: FloatArray, border: int)
 
 
 def _predicted(board: Board, points: IntArray, indices: IntArray, corners_px: FloatArray) -> FloatArray:
-    """Return (T, 4, 2) corners where each tag and those around it put them together, by a homography.
+    """Return (T, 4, 2) corners of each tag as predicted by a homography of its corners and those around it.
 
     Args:
         board: the board.

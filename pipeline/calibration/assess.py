@@ -24,7 +24,7 @@ class Trust:
     """Accuracy of a camera at a working distance."""
 
     sd: ErrorMap
-    """Error due to noise."""
+    """Standard deviation of the error due to noise."""
     halves: HalfDifference | None
     """Difference of two halves of the views; None with too few views, or if a half determines no lens."""
     coverage: Coverage
@@ -81,10 +81,10 @@ def assess(
 
     Args:
         calibration: the camera.
-        views: the views of its calibration.
+        views: the views of its calibration, in the order of ``calibration.views``.
         board: the board in the views.
         range_m: distance of the surfaces that the camera will measure.
-        accuracy_m: largest error of a point that is accepted.
+        accuracy_m: largest accepted error of a point.
 
     Raises:
         InputError: the range or the accuracy is impossible.

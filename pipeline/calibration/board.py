@@ -21,7 +21,8 @@ centre stays dark, because detectors of dark circles look there."""
 MARKER_SHARE = 0.75
 """Ratio of a ChArUco marker's side to that of its square."""
 SPACINGS_M = 1e-4, 10.0
-"""Least and largest spacing: no printer draws a smaller one, and metres given as millimetres are smaller."""
+"""Least and largest spacing. No printer draws a smaller one, and a spacing in metres that is given where
+millimetres are expected is smaller, too."""
 MOST_POINTS = 50
 """Most points in a row or column."""
 TAG_SPACING = 0.3
@@ -30,7 +31,11 @@ TAG_SPACING = 0.3
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """A flat board; its points are in the plane z = 0, x to the right, y down, z away from the viewer."""
+    """A flat board; its points are in the plane z = 0, x to the right, y down, z away from the viewer.
+
+    Raises:
+        InputError: a value is impossible, or the dictionary has too few markers for the board.
+    """
 
     pattern: Pattern = "circles"
     columns: int = 11
@@ -38,11 +43,11 @@ class Board:
     rows: int = 9
     spacing_m: float = 0.035
     """Pitch of circles, side of a square, or side of an AprilTag. For asymmetric circles: half the distance
-    of two in a row."""
+    between neighbours in a row."""
     dictionary: str = ""
     """Dictionary of a ChArUco board's markers, such as 4X4_50; empty if any may be on the board."""
     tag_spacing: float = TAG_SPACING
-    """Gap between two AprilTags over the side of a tag, which Kalibr calls tagSpacing."""
+    """Gap between two AprilTags over the side of a tag; Kalibr calls it tagSpacing."""
 
     def __post_init__(self) -> None:
         if self.pattern not in get_args(Pattern):
@@ -95,7 +100,7 @@ class Board:
 
     @property
     def grid(self) -> tuple[int, int]:
-        """Columns and rows of points: an AprilTag has two by two."""
+        """Columns and rows of points; each AprilTag has two by two."""
         times = 2 if self.pattern == "aprilgrid" else 1
         return times * self.columns, times * self.rows
 
@@ -119,7 +124,7 @@ class Board:
 
     @property
     def nearest_m(self) -> float:
-        """Distance from a point to its nearest neighbour."""
+        """Distance from a circle or corner to its nearest neighbour; of an AprilGrid, the side of a tag."""
         return self.spacing_m * (2.0**0.5 if self.pattern == "circles-asymmetric" else 1.0)
 
     @property

@@ -92,6 +92,9 @@ def adjust(sightings: Sequence[Sighting], start: Bundle) -> Adjusted:
     Args:
         sightings: sightings of all cameras, which shared moments must link.
         start: bundle near the solution.
+
+    Raises:
+        np.linalg.LinAlgError: the sightings do not determine the bundle.
     """
     bundle, system = _nearest(sightings, start, slice(None))
     scale = 1.0 / np.sqrt(np.diag(system.normal))
@@ -112,7 +115,7 @@ def place_boards(sightings: Sequence[Sighting], start: Bundle) -> Bundle:
 
 
 def _nearest(sightings: Sequence[Sighting], start: Bundle, free: slice) -> tuple[Bundle, _System]:
-    """Return the optimal bundle over the free parameters, with its normal equations."""
+    """Return the bundle that is optimal in the ``free`` parameters, with its normal equations."""
     bundle, system = start, _System(sightings, start)
     damping = 1e-3
     for _ in range(STEPS):
@@ -147,7 +150,7 @@ class _System:
             self.coordinates += len(off_px)
 
     def damped(self, damping: float) -> FloatArray:
-        """Return the normal matrix with its diagonal increased by the share ``damping``."""
+        """Return the normal matrix with its diagonal multiplied by 1 + ``damping``."""
         return self.normal + damping * np.diag(np.diag(self.normal))
 
 

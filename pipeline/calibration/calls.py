@@ -27,7 +27,7 @@ def calibrate(
         board: the board in them; None uses a board.json next to them, or else the thesis's.
         lens: distortion model of the camera.
         held_out: number of folds of images that are left out and predicted; 0 leaves out none.
-        one_camera: whether one camera took all images even if their names or EXIF data tell several.
+        one_camera: whether one camera took all images even if their names or EXIF data indicate several.
 
     Raises:
         InputError: images are unreadable, differ in size or are of several cameras, or too few show the
@@ -57,7 +57,8 @@ def calibrate_cameras(
         held_out: number of folds of moments that are left out and predicted; 0 leaves out none.
 
     Raises:
-        InputError: as for ``calibrate``, too many cameras, or some that never see the board together.
+        InputError: as for ``calibrate``, or there are too few or too many cameras, or some never see the
+            board together with others.
         ReconstructionError: the images do not determine the lenses or the poses.
 
     >>> import packetmesh as pm

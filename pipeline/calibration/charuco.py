@@ -24,7 +24,7 @@ from pipeline.calibration.markers import (
 from pipeline.types import ByteArray
 
 FEW_CORNERS = 6
-"""Least number of corners with which a view counts."""
+"""Least number of corners for a detection."""
 
 
 def find_charuco(gray: ByteArray, board: Board) -> Detection:
@@ -49,7 +49,9 @@ def find_charuco(gray: ByteArray, board: Board) -> Detection:
 
 
 def _by_markers(gray: ByteArray, board: Board, seen: Markers) -> tuple[Detection | None, int]:
-    """Return the detection by these markers in the layout that they fit better, and the number of corners."""
+    """Return the detection by these markers, or None, and the number of corners found; the layout that the
+    markers fit better is tried first.
+    """
     if not len(seen.ids) or seen.border_cells > 1 or board.markers > markers_in(seen.dictionary):
         return None, 0
     most = 0
@@ -72,8 +74,8 @@ def _fit(board: Board, seen: Markers, legacy: bool) -> Fit | None:
 
 
 def _layouts(board: Board, seen: Markers) -> list[bool]:
-    """Return whether to try the old layout, the likelier one first; for an odd number of rows of squares,
-    both layouts are the same.
+    """Return the layouts to try as values of ``legacy``, the likelier first; for an odd number of rows of
+    squares both layouts are the same.
     """
     if board.rows % 2 == 0:
         return [False]
@@ -133,7 +135,9 @@ def _aprilgrid(seen: Markers) -> str:
 
 
 def _size_of(board: Board, seen: Markers) -> tuple[int, int] | None:
-    """Return columns and rows of the board whose places the markers fit: the given ones if they do."""
+    """Return columns and rows of a board whose places the markers fit, the given board's if they fit it; None
+    if they fit no board.
+    """
     sizes = [board.size]
     for columns in range(2, MOST_POINTS + 1):
         rows = -(-2 * (int(seen.ids.max()) + 1) // (columns + 1)) - 1

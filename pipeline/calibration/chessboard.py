@@ -18,9 +18,10 @@ CORNER_WINDOW_PX = 5
 LEAST_SIDE = 3
 """Least columns and rows of a chessboard of any size."""
 USUAL = ("5X5_1000", "4X4_1000", "6X6_1000", APRILGRID)
-"""Dictionaries whose markers are looked for if there is no chessboard."""
+"""Dictionaries whose markers are searched if no chessboard is found."""
 ALTERNATES = 0.75
-"""Least contrast of alternating squares over that of the row inside it; at the board's rim it is a half."""
+"""Least ratio of the contrast of alternating squares at a row of corners to that at the next row inside; the
+ratio is 1 at corners, and 0.5 at the board's rim."""
 INTO_A_SQUARE = 0.3
 """Distance from a corner, in squares, at which brightness is read; the outermost squares may be narrow."""
 
@@ -37,7 +38,7 @@ def find_chessboard(gray: ByteArray, board: Board) -> Detection:
 
 
 def _found(gray: ByteArray, board: Board) -> tuple[Detection | None, bool]:
-    """Return the detection, or None and whether a part of a larger board was found."""
+    """Return the detection, or None, and whether a part of a larger board was found."""
     ways: tuple[Callable[[], tuple[bool, FloatArray | None]], ...] = (
         lambda: cv2.findChessboardCornersSB(gray, board.size, flags=cv2.CALIB_CB_ACCURACY),
         lambda: cv2.findChessboardCornersSB(
@@ -88,8 +89,9 @@ def _why_not(gray: ByteArray, board: Board, goes_on: bool) -> str:
 
 
 def chessboard_size(gray: ByteArray, wide: bool) -> tuple[int, int] | None:
-    """Return columns and rows of a whole chessboard of any size, more columns if it is ``wide``; None if none
-    is seen.
+    """Return columns and rows of a whole chessboard of any size; None if none is seen.
+
+    The larger number is preferred as columns if ``wide``, else as rows.
     """
     flags = cv2.CALIB_CB_LARGER | cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_NORMALIZE_IMAGE
     found, _, meta = cv2.findChessboardCornersSBWithMeta(gray, (LEAST_SIDE, LEAST_SIDE), flags)
@@ -103,8 +105,8 @@ def chessboard_size(gray: ByteArray, wide: bool) -> tuple[int, int] | None:
 
 
 def _alternation(gray: ByteArray, board: Board, points_px: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return (4,) contrasts of alternating squares at the outermost rows and columns of corners, and (4,) one
-    row or column further out, each over its inner neighbour's: 1 at corners, 0.5 at the board's rim.
+    """Return (4,) contrasts of alternating squares at the outermost rows and columns of corners, and (4,) at
+    the rows and columns next outside, each over that at the next inside: 1 at corners, 0.5 at the rim.
     """
     grid = points_px.reshape(board.rows, board.columns, 2)
     for _ in range(2):  # extrapolate a row on either side; then, transposed, a column

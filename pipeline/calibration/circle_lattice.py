@@ -1,4 +1,4 @@
-"""Grids of circles, straight or in shifted rows and of any size, from the places of their centres alone."""
+"""Grids of circles, straight or in shifted rows and of any size, found from their centres alone."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ LEAST_SIDE = 3
 
 
 def boards_seen(blobs_px: FloatArray) -> Iterator[tuple[Pattern, IntArray]]:
-    """Yield the whole grids of circles among blobs: the pattern, and the (R, C) rows of blobs; the same grid
-    may come rotated, mirrored and transposed.
+    """Yield the pattern and the (R, C) indices of blobs of each whole grid of circles; the same grid may come
+    rotated, mirrored and transposed.
 
     Args:
         blobs_px: (B, 2) centres of blobs.
@@ -48,8 +48,8 @@ def boards_seen(blobs_px: FloatArray) -> Iterator[tuple[Pattern, IntArray]]:
 
 
 def orders_on(board: Board, blobs_px: FloatArray) -> list[IntArray]:
-    """Return the (N,) blobs of a board in each possible order of its points; empty if they are no such
-    board.
+    """Return the (N,) indices of a board's blobs for each possible order of its points; empty if the blobs do
+    not form the board.
     """
     for pattern, rows in boards_seen(blobs_px):
         if pattern != board.pattern or rows.shape != board.size[::-1]:
@@ -64,7 +64,9 @@ def orders_on(board: Board, blobs_px: FloatArray) -> list[IntArray]:
 
 
 def board_seen(blobs_px: FloatArray, like: Board) -> Board | None:
-    """Return the board of circles that blobs form, with the given one's pattern or sides if they fit."""
+    """Return the board of circles that blobs form, with the given one's pattern and orientation if they fit;
+    None if they form none.
+    """
     seen = {
         Board(pattern, rows.shape[1], rows.shape[0], like.spacing_m)
         for pattern, rows in boards_seen(blobs_px)
@@ -80,8 +82,8 @@ def board_seen(blobs_px: FloatArray, like: Board) -> Board | None:
 
 
 def _lattice(blobs_px: FloatArray) -> tuple[IntArray, IntArray]:
-    """Return (L,) blobs of the largest lattice, and their (L, 2) integer places in steps of some basis; empty
-    if too few blobs form one.
+    """Return (L,) indices of the blobs of the largest lattice, and their (L, 2) integer coordinates in some
+    basis; empty if too few blobs form one.
     """
     best: dict[int, tuple[int, int]] = {}
     if LEAST_SIDE**2 <= len(blobs_px) <= MOST_POINTS**2:
@@ -99,7 +101,7 @@ def _lattice(blobs_px: FloatArray) -> tuple[IntArray, IntArray]:
 
 
 def _grown(blobs_px: FloatArray, tree: cKDTree, middle: int, basis: FloatArray) -> dict[int, tuple[int, int]]:
-    """Return the places of the blobs that steps from blob to blob reach, the middle one at (0, 0).
+    """Return integer coordinates of the blobs that steps from blob to blob reach, with (0, 0) for the middle.
 
     Each blob inherits the step that led to it, so that the steps follow perspective and distortion.
     """
@@ -127,8 +129,12 @@ def _grown(blobs_px: FloatArray, tree: cKDTree, middle: int, basis: FloatArray) 
 
 
 def _rows(x: IntArray, y: IntArray, every: int) -> IntArray | None:
-    """Return the (R, C) blobs at every so-many-th x of each y, the second row shifted by one if every second;
-    None if they leave gaps.
+    """Return (R, C) positions in ``x`` and ``y`` of a whole grid's blobs; None if it has gaps.
+
+    Args:
+        x: (L,) integer coordinates along the rows.
+        y: (L,) integer coordinates across the rows.
+        every: 1 for straight rows; 2 for rows that use every second x, with odd rows shifted by one.
     """
     if not len(x):
         return None

@@ -19,7 +19,8 @@ SMALLEST_PX, LARGEST_SHARE = 20.0, 0.02
 """Least area of a circle in pixels, and its largest area as a share of the image. OpenCV's own limit of 5,000
 pixels would miss the circles of a board near the camera."""
 SIZES = 4.0
-"""Ratio of the largest to the smallest circle of a tilted board, and to the marked circle's core."""
+"""Largest ratio of the diameters of two circles of a tilted board, or of a circle and the marked circle's
+core."""
 MARK_STEP = 0.25
 """Least brightness at which the white ring is recognised: 0 is that of a circle, 1 that of the paper."""
 LETTER = 0.6
@@ -27,7 +28,8 @@ LETTER = 0.6
 LINK = 2.0
 """Blobs farther from the others than this many median neighbour distances are not on the board."""
 NEAR, MOST_OF_A_SIDE = 0.3, 0.8
-"""The grid continues if blobs are this near, in pitches, to this share of the points of another row."""
+"""The grid continues if another row has blobs within the first, in pitches, of at least the second share of
+its points."""
 
 
 def find_circles(gray: ByteArray, board: Board) -> Detection:
@@ -120,7 +122,7 @@ def _groups(blobs: Sequence[cv2.KeyPoint], board: Board) -> Iterator[tuple[Float
 
 
 def _together(blobs_px: FloatArray, sizes_px: FloatArray, board: Board) -> tuple[FloatArray, FloatArray]:
-    """Return the largest group of blobs linked through neighbours; all blobs, if the board has as many."""
+    """Return the largest group of blobs linked through neighbours; all, if no more than the board has."""
     if len(blobs_px) <= board.columns * board.rows:
         return blobs_px, sizes_px
     apart_px = np.linalg.norm(blobs_px[:, None] - blobs_px, axis=2)
@@ -211,8 +213,8 @@ def _more_circles(board: Board, groups: Sequence[FloatArray]) -> str:
 
 
 def _marked(gray: ByteArray, board: Board, orders: Sequence[FloatArray]) -> Detection:
-    """Return the (N, 2) points in that one of their possible orders that starts at the mark, if there is
-    one.
+    """Return the detection in the order of points that starts at the marked circle; without exactly one such
+    order, the first order, as not oriented.
     """
     if not board.ambiguous:
         return whole(board, orders[0], oriented=True)

@@ -1,4 +1,6 @@
-"""Correlations of the errors of a camera's parameters; views hardly separate correlated ones (SPEC 1.3 d)."""
+"""Correlations of the errors of a camera's parameters: the views hardly separate two parameters of strong
+correlation (SPEC 1.3 d).
+"""
 
 from __future__ import annotations
 
@@ -45,8 +47,8 @@ class Correlations:
 def correlations(lens: Calibration) -> Correlations:
     """Compute the correlations of the errors of a camera's parameters and of the board's distance.
 
-    The error of a pose has an independent part and a part due to the lens; the lens's covariance already
-    includes the poses, so both parts of the mean distance are computed view by view.
+    The error of a view's distance has a part of its own and a part due to the error of the lens, whose
+    covariance already includes the poses. Both parts of the mean distance are summed over the views.
     """
     noise = coordinate_sd_px(lens.views, lens.lens) ** 2
     count = len(lens.views)
@@ -64,8 +66,8 @@ def correlations(lens: Calibration) -> Correlations:
 
 
 def _distance(view: FittedView, optics: Optics) -> tuple[FloatArray, float]:
-    """Return the (P,) derivative of a view's distance by the lens, with its pose adapted, and the distance's
-    own variance for noise of 1 px.
+    """Return the (P,) derivative of a view's distance (m) by the lens, with its pose refitted, and the
+    distance's own variance for noise of 1 px.
     """
     linear = optics.linearised(view.board_m, view.T_camera_board)
     away = view.T_camera_board[:3, 3]

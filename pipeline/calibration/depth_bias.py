@@ -61,6 +61,7 @@ class DepthFit:
     rms_before_m: float
     """Error of the measured depth: root of the mean over views of the mean square, with Huber weights."""
     rms_after_m: float
+    """The same for the corrected depth."""
     scale_focal_correlation: float | None
     """Correlation of the errors of scale and focal length; None without a scale."""
     points: BiasPoints
@@ -68,12 +69,15 @@ class DepthFit:
     noise_points: NoisePoints
     """Data to which the noise law is fitted."""
     ink_offset_m: tuple[float, float] | None
-    """Depth error on black minus that on white, after correction, and its standard error."""
+    """Depth error on black minus that on white, after correction, and its standard error; None if fewer than
+    two views have both."""
     note: str
     """Sentence on terms that the views cannot separate, and on views to take; empty if there are none."""
 
     def bias_m(self, z_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return (N,) measured minus true depth without the map, at (N,) depths, and its 95 % half-width."""
+        """Return (N,) measured minus true depth, without the map, at (N,) depths, and half of its 95 %
+        interval.
+        """
         powers = {"offset": np.ones_like(z_m), "scale": z_m, "curvature": z_m**2}
         used = [powers[term] for term in self.terms if term in powers]
         columns = np.array(used).reshape(len(used), len(z_m))
@@ -163,7 +167,7 @@ def _points(samples: DepthSamples, problem: Problem, correction: DepthCorrection
 
 
 def _with_focal(problem: Problem, terms: tuple[str, ...], lens_focal: FloatArray) -> float | None:
-    """Return the correlation of the errors of scale and focal length."""
+    """Return the correlation of the errors of scale and focal length; None without a scale."""
     if "scale" not in terms:
         return None
     columns = columns_of(terms)
@@ -212,7 +216,9 @@ def _correction(
 
 
 def _ink_offset_m(samples: DepthSamples, correction: DepthCorrection) -> tuple[float, float] | None:
-    """Return the error on ink minus that on paper, and its sd; None if fewer than two views have both."""
+    """Return the mean error on ink minus that on paper, metres, and its standard error; None if fewer than
+    two views have both.
+    """
     off_m = correction.corrected_m(samples.measured_m, samples.pixels) - samples.true_m
     apart = [
         float(np.median(off_m[rows[ink]]) - np.median(off_m[rows[~ink]]))

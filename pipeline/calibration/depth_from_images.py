@@ -16,7 +16,11 @@ from pipeline.io.images import ReadDepth, read_depth_noted
 
 
 def depth_beside(images: Iterable[Path]) -> dict[str, Path]:
-    """Find depth_00.png next to color_00.png or color_00.jpg and so on; returns paths by the image's name."""
+    """Find the depth image of each photograph: depth_00.png next to color_00.png, color_00.jpg and so on.
+
+    Returns:
+        Paths by the photograph's file name, without its folder; photographs without depth are left out.
+    """
     beside = {path.name: path.with_name(f"depth_{path.stem.partition('_')[2]}.png") for path in images}
     return {name: path for name, path in beside.items() if path.is_file()}
 
@@ -32,7 +36,8 @@ def with_depth(
     Args:
         report: report of the node's colour camera.
         depths: depth images, by the name of the photograph of the same moment.
-        depth_camera: the camera with the depth's pixel grid, if another; its images' names are in ``depths``.
+        depth_camera: the camera with the depth's pixel grid, whose images' names are in ``depths``; None if
+            it is the colour camera.
         depth_scale: depth units per metre; by default whole numbers are millimetres.
     """
     if not depths:
@@ -75,7 +80,7 @@ def _fit(calibration: Calibration, images: Mapping[str, ReadDepth], board: Board
 
 
 def _doubts(images: Mapping[str, ReadDepth]) -> tuple[str, ...]:
-    """Return doubts about the depth scale, of the first image that has any."""
+    """Return the sentences about a doubtful depth scale of the first image that has any."""
     doubtful = ((name, read.notes) for name, read in images.items() if read.notes)
     name, notes = next(doubtful, ("", ()))
     return tuple(f"Depth beside {name}: {note}" for note in notes)

@@ -11,7 +11,8 @@ from pipeline.calibration.depth_samples import DepthSamples
 from pipeline.types import DepthNoise, FloatArray
 
 PARTS, FEWEST = 4, 60
-"""Number of parts of a view, by distance, each of which is one noise point, and least pixels per part."""
+"""Most parts of a view, by distance, each of which is one noise point, and least pixels per part; a view with
+fewer pixels is one part."""
 BENDS = 24
 """Number of distances that are tried for the bend of the law."""
 STEEPEST = 4.0
@@ -26,7 +27,7 @@ class NoisePoints:
     """Measured noise on K patches of boards."""
 
     z_m: FloatArray
-    """(K,) mean distance."""
+    """(K,) mean true depth."""
     cosine: FloatArray
     """(K,) mean cosine of incidence."""
     sd_m: FloatArray
@@ -71,8 +72,8 @@ def noise_law(points: NoisePoints) -> DepthNoise:
     """Fit max(s0, s1 z^p) / cos(angle)^q by least squares on its logarithm: near and far count equally.
 
     The law bends where s1 z^p reaches s0. For a given bend the fit is linear; the bend with the smallest sum
-    of squared residuals is chosen. Bends with p above ``STEEPEST`` are left out; if all are, p is
-    ``STEEPEST`` at the nearest bend.
+    of squared residuals is chosen. Bends with p above ``STEEPEST`` are left out; at the nearest bend p is
+    cut to ``STEEPEST``.
     """
     log_z, log_cos, log_sd = np.log(points.z_m), np.log(points.cosine), np.log(points.sd_m)
     best, least = DepthNoise(LEAST_M, LEAST_M, 0.0, 0.0), np.inf
@@ -88,7 +89,9 @@ def noise_law(points: NoisePoints) -> DepthNoise:
 
 
 def _not_negative(columns: FloatArray, values: FloatArray) -> tuple[list[float], float]:
-    """Fit (K, P) columns with all parameters but the first >= 0; returns them and the squared residuals."""
+    """Fit (K, P) columns with all parameters but the first >= 0; returns the (P,) parameters and the sum
+    of squared residuals.
+    """
     used = list(range(columns.shape[1]))
     while True:
         found = np.linalg.lstsq(columns[:, used], values, rcond=None)[0]

@@ -18,11 +18,12 @@ from pipeline.types import BoolArray, DepthMap, FloatArray, IntArray
 RIM_PX = 3
 """Pixels closer than this to the rim of the board's points are not used: sensors mix board and background."""
 INK_PX = 1.0
-"""Black areas are enlarged by this much, because pixels at their border are partly black."""
+"""Black areas are enlarged by this many pixels, because pixels at their border are partly black."""
 MOST_PER_VIEW, FEWEST = 600, 100
 """Largest number of pixels used per view, evenly spread, and smallest number with which a view is used."""
 GATE_SDS, LEAST_GATE_M = 6.0, 0.02
-"""Pixels beyond this many robust standard deviations from their view's median show a hand or background."""
+"""Gate about the median error of a view, in robust standard deviations, and its least half width: pixels
+beyond it show a hand or background."""
 MOST_SHARE = 0.25
 """Largest relative error of a view's median depth; a larger one means a wrong unit or another scene."""
 MAD_TO_SD = 1.4826
@@ -37,9 +38,9 @@ class DepthSamples:
     pixels: IntArray
     """(N, 2) u, v."""
     measured_m: FloatArray
-    """(N,) depth measured by the sensor."""
+    """(N,) depth measured by the sensor, along the optical axis."""
     true_m: FloatArray
-    """(N,) depth of the board's plane along the pixel's ray."""
+    """(N,) depth, along the optical axis, at which the pixel's ray meets the board's plane."""
     cosine: FloatArray
     """(N,) cosine of the angle between the ray and the board's normal."""
     view: IntArray
@@ -75,18 +76,19 @@ def board_depth_samples(
 ) -> DepthSamples:
     """Collect measured and true depth of a board.
 
-    The board's plane n . X = d of a view has the depth d / (n . K^-1 [u v 1]) at every pixel. The whole plane
-    is used, because at a tilted board's centre alone an error of the pose would become a bias. Pixels are at
-    least ``RIM_PX`` inside the outermost points, so that none mixes the board with the background. Pixels on
-    black are marked: they reflect less infrared, and the fit does not use them.
+    In each view the board's plane n . X = d has the depth d / (n . K^-1 [u v 1]) at pixel (u, v). The whole
+    plane is used, because at a tilted board's centre alone an error of the pose would become a bias. Pixels
+    are at least ``RIM_PX`` inside the outermost points, so that none mixes the board with the background.
+    Pixels on black circles or squares are marked: they reflect less infrared, and the fit does not use them.
+    Markers are not considered: those of a ChArUco board count as paper, an AprilGrid as a chessboard.
 
     Args:
         calibration: the lens with its uncertainty, and its views.
-        depths: (H, W) metric depth of each view on the image's pixel grid; None without depth.
+        depths: (H, W) metric depth of each view on the image's pixel grid; None for a view without depth.
         board: the board in the views.
 
     Raises:
-        InputError: there is no depth on the board, or depth images of another size or unit.
+        InputError: there is no depth on the board, or a depth image has another size or unit.
     """
     parts: list[DepthSamples] = []
     lenses, errors = _lenses(calibration), _errors(calibration)
@@ -212,7 +214,11 @@ def _evenly(count: int, most: int) -> IntArray:
 
 
 def _gate(name: str, measured_m: FloatArray, true_m: FloatArray) -> IntArray:
-    """Return the rows of one view's pixels that are not in front of or behind the board, evenly thinned."""
+    """Return the rows of one view's pixels that are not in front of or behind the board, evenly thinned.
+
+    Raises:
+        InputError: the median depth is not that of the board.
+    """
     if len(measured_m) < FEWEST:
         return np.zeros(0, np.int64)
     ratio = float(np.median(measured_m / true_m))
@@ -235,7 +241,14 @@ def _plane_m(T_camera_board: FloatArray, rays: FloatArray) -> FloatArray:
 
 
 def _on_ink(board: Board, T_camera_board: FloatArray, points_m: FloatArray, px: float) -> BoolArray:
-    """Return (N,) True for points on the board that are black or next to black."""
+    """Return (N,) True for points on or within ``px`` of a black circle or square.
+
+    Args:
+        board: the board; its markers are not considered.
+        T_camera_board: (4, 4) pose of the board.
+        points_m: (N, 3) points in the camera's frame.
+        px: widening of black areas in units of the focal length: pixels over the focal length.
+    """
     flat = apply(inverse(T_camera_board), points_m)
     rim_m = px * points_m[:, 2]
     if board.pattern.startswith("circles"):

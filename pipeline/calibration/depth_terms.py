@@ -31,7 +31,7 @@ HUBER_SDS, HUBER_ROUNDS = 3.0, 8
 
 
 def title_of(terms: Iterable[str]) -> str:
-    """Return the title of a model."""
+    """Return the title of a model: its terms, or "none"."""
     return " + ".join(terms) or "none"
 
 
@@ -46,7 +46,9 @@ def map_directions() -> FloatArray:
 
 
 def design(samples: DepthSamples, z_m: FloatArray) -> FloatArray:
-    """Return (N, 14) derivatives 1, z, z^2, z s of the true depth at depths z; s are 11 map functions."""
+    """Return (N, 14) derivatives 1, z, z^2, z s of the true depth by the terms, at depths z; s are the 11 map
+    functions.
+    """
     rows, columns = map_basis(samples.size_px, samples.pixels)
     both = np.einsum("nr,nc->nrc", rows, columns).reshape(len(z_m), -1)
     return np.column_stack([np.ones(len(z_m)), z_m, z_m**2, z_m[:, None] * (both @ map_directions())])
@@ -61,7 +63,7 @@ class Choice:
     may_map: bool
     """Whether a map may be added."""
     note: str
-    """Sentence on why other models are excluded and which views to take; empty if there are none."""
+    """Sentence on why other models are excluded and which views to take; empty if none is excluded."""
 
     @property
     def richest(self) -> tuple[str, ...]:
@@ -105,12 +107,14 @@ def _seen_parts(samples: DepthSamples) -> BoolArray:
 
 
 def rows_of_views(samples: DepthSamples) -> list[IntArray]:
-    """Return the rows of each view that has pixels."""
+    """Return the row numbers of each view's pixels, for the views that have any."""
     return [np.flatnonzero(samples.view == view) for view in np.unique(samples.view)]
 
 
 def half_width(views: int, together: int = 1) -> float:
-    """Return half a 95 % interval of ``together`` parameters, in standard errors (Student's t)."""
+    """Return half the width of the joint 95 % intervals of ``together`` parameters, in standard errors
+    (Student's t with a Bonferroni correction).
+    """
     return float(stdtrit(views - 1, 1.0 - 0.025 / together))
 
 
@@ -166,7 +170,7 @@ class Problem:
         return np.array([solved(whole - A, total - b) for A, b in zip(left, right, strict=True)])
 
     def lens_cost(self, columns: IntArray) -> float:
-        """Return how improbable the fitted lens errors are, as squared errors per view."""
+        """Return the penalty for the fitted lens errors, per view, in the unit of squared errors over sd."""
         left, right, lens = self._normal(columns)
         x = solved(left.sum(axis=0) + lens, right.sum(axis=0))
         return float(x @ lens @ x) / len(self.views)

@@ -23,7 +23,7 @@ def detect(image: ByteArray, board: Board) -> Detection:
         board: the board to find.
 
     Raises:
-        InputError: the image does not have 8 bits per channel.
+        InputError: the image is not uint8, or not of rank 2 or 3.
     """
     if image.dtype != np.uint8 or image.ndim not in (2, 3):
         raise InputError(f"An image of {image.dtype} {image.shape} cannot be searched; try 8 bits a channel")

@@ -18,7 +18,7 @@ class Detection:
     points_px: FloatArray
     """(N, 2) subpixel positions of the board's points; empty if the board was not found."""
     indices: IntArray
-    """(N,) index of each in ``Board.points_m``."""
+    """(N,) index of each point in ``Board.points_m``."""
     reason: str = ""
     """Sentence on the reason why the board was not found, with advice; empty if it was found."""
     blobs_px: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
@@ -33,7 +33,7 @@ class Detection:
 
 
 def not_found(reason: str, blobs_px: FloatArray | None = None) -> Detection:
-    """Return the detection of no board, with the reason."""
+    """Return the record of an image in which no board was found, with the reason."""
     blobs_px = np.zeros((0, 2)) if blobs_px is None else blobs_px
     return Detection(np.zeros((0, 2)), np.zeros(0, np.int64), reason, blobs_px)
 
@@ -44,6 +44,6 @@ def whole(board: Board, points_px: FloatArray, oriented: bool) -> Detection:
 
 
 def brightness(gray: ByteArray, points_px: FloatArray) -> FloatArray:
-    """Return (N,) interpolated brightness of (N, 2) positions."""
+    """Return (N,) interpolated grey levels at (N, 2) positions, 0 outside the image."""
     x, y = points_px.T.astype(np.float32)
     return cv2.remap(gray.astype(np.float32), x[None], y[None], cv2.INTER_LINEAR)[0]

@@ -48,9 +48,9 @@ class RadialResiduals:
     edges_px: FloatArray
     """(B + 1,) edges of the radius bands."""
     mean_px: FloatArray
-    """(B,) mean of ``outward_px`` in each band; NaN in an empty one."""
+    """(B,) mean of ``outward_px`` in each band; NaN in a band of fewer than two points."""
     sd_of_mean_px: FloatArray
-    """(B,) standard deviation of the mean."""
+    """(B,) standard error of the mean; NaN likewise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class RadialCurve:
     sd_px: FloatArray
     """(K,) standard deviation of ``moved_px``."""
     seen_to_px: float
-    """Radius of the outermost point in the views; beyond it the curve is extrapolated."""
+    """Radius of the outermost point in the views; the curve is extrapolated beyond it."""
 
 
 def coverage(views: Sequence[FittedView], size_px: tuple[int, int]) -> Coverage:

@@ -12,8 +12,8 @@ FAMILIES = (
     *("5X5_1000", "4X4_1000", "6X6_1000", "7X7_1000", "ARUCO_ORIGINAL", "ARUCO_MIP_36H12"),
     *("APRILTAG_36H11", "APRILTAG_36H10", "APRILTAG_25H9", "APRILTAG_16H5"),
 )
-"""Dictionaries that have all markers of OpenCV: the smaller ones of 4 x 4 to 7 x 7 cells are the first
-markers of the largest. The first is that of our own ChArUco boards."""
+"""Dictionaries that together have all of OpenCV's markers: the smaller dictionaries of 4 x 4 to 7 x 7 cells
+are the first markers of the largest. The first entry is the dictionary of our own ChArUco boards."""
 APRILGRID = "APRILTAG_36H11"
 """Dictionary of Kalibr's AprilGrid."""
 _PREFIX = "DICT_"

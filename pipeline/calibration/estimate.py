@@ -79,7 +79,7 @@ class Calibration:
     names: tuple[str, ...]
     """Names of the parameters that were estimated."""
     covariance: FloatArray
-    """(P, P) covariance of these parameters."""
+    """(P, P) covariance of these parameters; focal lengths and principal point in pixels."""
     views: tuple[FittedView, ...]
 
     @property
@@ -106,7 +106,7 @@ class Calibration:
 
     @property
     def focal_sd(self) -> float:
-        """Larger relative standard error of the two focal lengths."""
+        """Larger relative standard error of the two focal lengths, a fraction."""
         values = self.parameters
         return max(
             error / values[name] for name, error in self.standard_errors.items() if name in ("fx", "fy")
@@ -126,7 +126,7 @@ def rms_px(residuals_px: FloatArray) -> float:
 
 
 def coordinate_sd_px(views: Sequence[FittedView], lens: Lens) -> float:
-    """Return the standard deviation of a point's coordinate, from the residuals after the fit."""
+    """Return the standard deviation of a point's coordinate, pixels, from the residuals after the fit."""
     every = np.concatenate([view.residuals_px for view in views])
     freedom = max(every.size - 6 * len(views) - len(FREE[lens]), 1)
     return float(np.sqrt((every**2).sum() / freedom))
@@ -212,7 +212,7 @@ def calibration_of(
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Let OpenCV calibrate in one thread: with several, it sums the views in varying order, and the last bits
+    """Restrict OpenCV to one thread: with several, it sums the views in varying order, and the last bits
     differ between runs. One thread is as fast.
     """
     threads = cv2.getNumThreads()
@@ -280,7 +280,7 @@ def residuals(
 
 
 def place(view: View, matrix: FloatArray, distortion: FloatArray, lens: Lens = "thesis") -> FittedView:
-    """Find the pose of the board in a view that was not used for the lens.
+    """Find the pose of the board in a view for a known lens.
 
     Raises:
         ReconstructionError: no pose explains the view.
@@ -328,7 +328,7 @@ def settle(
 def held_out(
     views: Sequence[View], size_px: tuple[int, int], folds: int, lens: Lens = "thesis"
 ) -> tuple[FittedView, ...]:
-    """Fit every view by a lens estimated from the other folds: each fold is left out in turn (SPEC 1.3 c).
+    """Return every view, its pose fitted with a lens that was estimated without its fold (SPEC 1.3 c).
 
     Raises:
         InputError: there are fewer than two folds, or too few views for them.

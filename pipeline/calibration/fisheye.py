@@ -17,7 +17,7 @@ from pipeline.types import FloatArray
 FOCAL_SHARES = (0.2, 0.3, 0.45, 0.7, 1.1)
 """Starting focal lengths over the image's longer side: from a half sphere to a narrow view."""
 TRIED = 2
-"""Number of starts that are optimised: those that place the boards best."""
+"""Number of starts that are optimised: those with the least error of the placed boards."""
 STEPS, STILL = 100, 1e-10
 """Most Levenberg-Marquardt steps, and the relative gain below which they stop."""
 LARGEST_DAMPING = 1e12
@@ -83,7 +83,7 @@ def adjust(
 def _step(
     linear: Sequence[Projection], seen: Sequence[FloatArray], damping: float
 ) -> tuple[FloatArray, list[FloatArray]]:
-    """Return the changes of the lens and of each pose, with the poses eliminated first."""
+    """Return the changes of the lens and of each pose; the poses are eliminated from the normal equations."""
     count = linear[0].by_lens.shape[1]
     normal, right = np.zeros((count, count)), np.zeros(count)
     reduced, parts = np.zeros((count, count)), []

@@ -52,9 +52,9 @@ class CameraReport:
     left_out: tuple[str, ...] = ()
     """Images that the user excluded."""
     warp: BoardWarp | None = None
-    """Warp of the board, if it was requested."""
+    """Warp of the board; None if it was not requested."""
     depth: DepthFit | None = None
-    """Bias of the depth sensor, if there are depth images."""
+    """Bias of the depth sensor; None without depth images, or if it is unknown."""
     depth_reason: str = ""
     """Reason why the bias is unknown although there are depth images; else empty."""
     depth_notes: tuple[str, ...] = ()
@@ -75,7 +75,7 @@ class CameraReport:
 
     @property
     def intrinsics(self) -> CameraIntrinsics:
-        """Return the camera for the reconstruction."""
+        """The camera for the reconstruction."""
         found = self.calibration
         fisheye = found.lens == "fisheye"
         kept = 4 if fisheye else 8 if found.lens == "rational" else 5
@@ -128,8 +128,8 @@ def image_files(given: Sequence[str], one_camera: bool = False) -> list[Path]:
     """Return the images named by files, folders and patterns such as ``left*.jpg``, in order.
 
     Args:
-        given: the arguments.
-        one_camera: whether one camera took all of them even if names or EXIF data tell several.
+        given: files, folders and patterns.
+        one_camera: whether one camera took all images even if names or EXIF data indicate several.
 
     Raises:
         InputError: an argument names no image, or the images are of several cameras.
@@ -163,20 +163,22 @@ def iterate_calibration(
 ) -> Generator[Progress, None, CameraReport]:
     """Find the board in every image and estimate the camera.
 
-    Circle centres are then refined without perspective bias, using the first estimate.
+    Circle centres are then refined without perspective bias, using the first estimate; they are used if the
+    RMS does not grow.
 
     Args:
         files: images of one size.
         board: the board in them.
         lens: distortion model of the camera.
         folds: number of folds of held-out views; 0 holds none out, 2 half of them like the thesis. With few
-            views the number is increased so that three remain for the lens.
+            views a number above 0 is increased so that three remain for the lens.
         without: names of images to leave out.
-        warp: whether to also estimate the board's points, and use them if held-out views then fit better.
+        warp: whether to also estimate the board's points, and use them if held-out views then fit better;
+            it takes two folds at least.
         one_camera: whether one camera took all images even if series of their names fit better alone.
 
     Yields:
-        Progress before each image.
+        Progress before each image and each later step.
 
     Raises:
         InputError: images are unreadable, differ in size or are of several cameras, too few show the board,

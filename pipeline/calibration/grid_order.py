@@ -14,7 +14,7 @@ MOST_BEND = 0.5
 
 
 def upright_orders(board: Board, points_px: FloatArray) -> list[IntArray]:
-    """Return the orders in which detected points match the board: right-handed, shifted rows in their places.
+    """Return the orders in which detected points match the board: not mirrored, shifted rows in their places.
 
     ``cv2.findCirclesGrid`` returns an even number of shifted rows with neighbouring rows exchanged, and may
     return any grid rotated, mirrored or transposed.
@@ -31,7 +31,7 @@ def upright_orders(board: Board, points_px: FloatArray) -> list[IntArray]:
 
 
 def even_steps(points_px: FloatArray, board: Board) -> bool:
-    """Return whether every point is where its two neighbours in row and column predict it."""
+    """Return whether every point is near the place that two neighbours in its row or column predict."""
     grid = points_px.reshape(board.rows, board.columns, 2)
     alike = 2 if board.pattern == "circles-asymmetric" else 1  # every second row is shifted
     for lines in (grid, *(grid[first::alike].swapaxes(0, 1) for first in range(alike))):
@@ -69,7 +69,9 @@ def _transposed_shifted(grid: IntArray) -> IntArray:
 
 
 def _right_handed(points_px: FloatArray, board: Board) -> bool:
-    """Return whether columns turn clockwise into rows, as x into y in an image."""
+    """Return whether the grid is not mirrored: in the image the way down its columns is clockwise of the way
+    along its rows.
+    """
     first, last = points_px[0], points_px[-1]
     right, down = points_px[board.columns - 1] - first, points_px[-board.columns] - first
     turned = (right[0] * down[1] - right[1] * down[0]) > 0.0

@@ -35,7 +35,7 @@ class Projection:
     points_px: FloatArray
     """(N, 2)"""
     by_pose: FloatArray
-    """(2 N, 6) derivatives by the points' pose: OpenCV's rotation vector, then translation."""
+    """(2 N, 6) derivatives by the points' pose: OpenCV's rotation vector (radians), then translation (m)."""
     by_lens: FloatArray
     """(2 N, P) derivatives by the lens's free parameters."""
 
@@ -70,7 +70,9 @@ class Optics:
         return Projection(seen.reshape(-1, 2), J[:, :6], J[:, columns])
 
     def rays(self, points_px: FloatArray) -> FloatArray:
-        """Return (N, 3) unit directions of (N, 2) pixels; NaN where the lens model has none."""
+        """Return (N, 3) unit directions of (N, 2) pixels; NaN where the lens model has none, as for a
+        fisheye at 90° or more to the axis.
+        """
         camera = CameraIntrinsics(self.matrix, self.distortion.ravel(), 0, 0, self.lens == "fisheye")
         rays = undistorted_rays(camera, points_px)
         return rays / np.linalg.norm(rays, axis=1, keepdims=True)

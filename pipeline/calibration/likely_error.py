@@ -1,11 +1,12 @@
-"""Distribution of a camera's error at a distance, by noise, a lens that its model cannot hold, and a bent
-board.
+"""Distribution of a camera's error at a distance, due to noise, a lens model that does not fit the lens, and
+a bent board.
 
 The residuals of the views are explained by a linear model around the fit: changes of the lens's parameters
 and of the boards' poses, a free distortion (polynomials over the image) and a bend of the board (quadratic).
-The two last have a size that the evidence of the residuals decides (MacKay, "Bayesian interpolation", Neural
-Computation 1992); size 0 means that lens model and flat board are right. Each view has noise of its own,
-because some are blurred. What the residuals leave open is drawn at random.
+Free distortion and bend have several possible sizes, each pair with a probability from the evidence of the
+residuals (MacKay, "Bayesian interpolation", Neural Computation 1992); size 0 means that the lens model is
+right, or the board flat. Each view has its own noise, because some are blurred. Random draws of the changes
+that the residuals leave possible give the errors.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ from pipeline.types import FloatArray
 DEGREE = 5
 """Degree of the polynomials of the free distortion."""
 DISTORTIONS = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
-"""Sizes of the free distortion, standard deviation of a coefficient over that of the noise."""
+"""Sizes of the free distortion: standard deviation of a coefficient over that of the noise."""
 BENDS = (0.0, 3e-4, 1e-3, 3e-3, 1e-2)
-"""Sizes of the bend, standard deviation over the board's larger half side."""
+"""Sizes of the bend: standard deviation of its height over the board's larger half side."""
 DRAWS = 600
 ROUNDS = 3
 """Rounds in which the noise of the views is estimated."""
@@ -47,25 +48,27 @@ class LikelyError:
     error_m: FloatArray
     """(D, R * C) distances of points from the rays of their pixels; infinite without a ray."""
     wrong_lens: float
-    """Probability that the lens model cannot hold the lens."""
+    """Probability that the lens model does not fit the lens."""
     bent: float
     """Probability that the board is bent."""
 
     def within(self, accuracy_m: float, share: float) -> float:
-        """Return the probability that points are within an accuracy over a share of the image."""
+        """Return the probability that errors are at most ``accuracy_m`` over a ``share`` of the image."""
         return float(((self.error_m <= accuracy_m).mean(axis=1) >= share).mean())
 
     def of_share_m(self, share: float, level: float) -> float:
-        """Return the error that is not exceeded over a share of the image, with a probability."""
+        """Return the error, metres, not exceeded over a ``share`` of the image with probability ``level``."""
         of_each = np.quantile(self.error_m, share, axis=1, method="higher")
         return float(np.quantile(of_each, level, method="higher"))
 
     def share_within(self, accuracy_m: float, level: float) -> float:
-        """Return the share of the image over which points are within an accuracy, with a probability."""
+        """Return the share of the image with errors of at most ``accuracy_m``, with probability ``level``."""
         return float(np.quantile((self.error_m <= accuracy_m).mean(axis=1), 1.0 - level, method="lower"))
 
     def map_m(self, level: float) -> FloatArray:
-        """Return the (R, C) error that a point does not exceed with a probability; NaN without a ray."""
+        """Return the (R, C) error, metres, that a point does not exceed with probability ``level``; NaN where
+        there is no ray.
+        """
         exceeded = np.quantile(self.error_m, level, axis=0, method="higher").reshape(self.shape)
         return np.where(np.isfinite(exceeded), exceeded, np.nan)
 
@@ -76,7 +79,7 @@ def likely_error(calibration: Calibration, range_m: float, seed: int = 0) -> Lik
     Args:
         calibration: the camera with its views.
         range_m: distance of the points.
-        seed: of the random draws.
+        seed: seed of the random draws.
 
     Raises:
         InputError: the distance is impossible.
@@ -105,8 +108,8 @@ def likely_error(calibration: Calibration, range_m: float, seed: int = 0) -> Lik
 
 
 def _prior(sizes: tuple[float, float]) -> float:
-    """Return the logarithm of the probability of two sizes before the views: a right lens model is as likely
-    as a wrong one, a flat board as a bent one.
+    """Return the logarithm of the prior probability of two sizes: a right lens model is as likely as a wrong
+    one, a flat board as a bent one.
     """
     others = (len(DISTORTIONS) - 1, len(BENDS) - 1)
     return -sum(float(np.log(2.0 * (many if size else 1))) for size, many in zip(sizes, others, strict=True))
@@ -114,7 +117,7 @@ def _prior(sizes: tuple[float, float]) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """One view, linearised, without its pose."""
+    """One view, linearised, with its pose eliminated."""
 
     columns: FloatArray
     """(2 N, Q) derivatives of the pixels by lens, free distortion and bend, orthogonal to those by the
@@ -136,7 +139,7 @@ def _linear(view: FittedView, optics: Optics, size_px: tuple[int, int]) -> _Part
 
 
 def _free(points_px: FloatArray, size_px: tuple[int, int]) -> FloatArray:
-    """Return (2 N, K) displacements of pixels by products of Legendre polynomials over the image."""
+    """Return (2 N, K) displacements of pixels by K products of Legendre polynomials over the image."""
     scaled = 2.0 * (points_px + 0.5) / size_px - 1.0
     x, y = (np.polynomial.legendre.legvander(np.clip(one, -1.5, 1.5), DEGREE) for one in scaled.T)
     terms = [x[:, i] * y[:, j] for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i)]
@@ -146,8 +149,8 @@ def _free(points_px: FloatArray, size_px: tuple[int, int]) -> FloatArray:
 
 
 def _bends_m(board_m: FloatArray) -> FloatArray:
-    """Return (N, 3) heights of a bent board's points, for bends along x, along y and twisted, of one half
-    side.
+    """Return (N, 3) heights of a bent board's points, metres, for the bends x^2, y^2 and x y in units of the
+    larger half side.
     """
     half_m = 0.5 * float(np.ptp(board_m[:, :2], axis=0).max())
     x, y = ((board_m[:, :2] - board_m[:, :2].mean(axis=0)) / half_m).T
@@ -163,7 +166,7 @@ def _typical_px(parts: Sequence[_Part], calibration: Calibration) -> float:
 def _noise_px(
     parts: Sequence[_Part], before_px: FloatArray, explained: FloatArray | None = None
 ) -> FloatArray:
-    """Return (V,) standard deviations of the views' coordinates, from what is left of their residuals."""
+    """Return (V,) standard deviations of the views' coordinates, pixels, from the unexplained residuals."""
     if explained is None:
         explained = np.zeros(parts[0].columns.shape[1])
     left = [one.residuals_px - one.columns @ explained for one in parts]
@@ -172,7 +175,9 @@ def _noise_px(
 
 
 def _system(parts: Sequence[_Part], noise_px: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Return (Q, Q) information, (Q,) right side and the sum of squares, over the noise."""
+    """Return (Q, Q) information, (Q,) right side and the sum of squared residuals, all over the variance of
+    the noise.
+    """
     weights = noise_px**-2.0
     normal = sum(
         (w * one.columns.T @ one.columns for w, one in zip(weights, parts, strict=True)), np.zeros(())
@@ -187,7 +192,7 @@ def _system(parts: Sequence[_Part], noise_px: FloatArray) -> tuple[FloatArray, F
 
 
 def _ridge(normal: FloatArray, optics: Optics, sizes: tuple[float, float], noise_px: float) -> FloatArray:
-    """Return (Q,) inverse variances before the views; infinite for parts that are excluded."""
+    """Return (Q,) inverse prior variances; infinite for parts of size 0."""
     lens = len(FREE[optics.lens])
     ridge = np.empty(len(normal))
     ridge[:lens] = _FLAT * np.diag(normal)[:lens]
@@ -201,7 +206,7 @@ def _solved(
     normal: FloatArray, pull: FloatArray, squares: float, ridge: FloatArray
 ) -> tuple[float, FloatArray, FloatArray]:
     """Return the logarithm of the evidence up to a constant, the (Q,) most likely changes, and a (Q, U) root
-    of their covariance, where U parts have a finite ``ridge``.
+    of their covariance, where U changes have a finite ``ridge``.
     """
     used = np.isfinite(ridge)
     scale = 1.0 / np.sqrt(np.diag(normal)[used] + ridge[used])
@@ -216,8 +221,8 @@ def _solved(
 
 
 def _change(seen: Sight, views: Sequence[FittedView], optics: Optics, size_px: tuple[int, int]) -> FloatArray:
-    """Return (G, 2, Q) derivatives of the grid's pixels by lens, free distortion and bend, with the camera's
-    pose that fits the boards best.
+    """Return (G, 2, Q) derivatives of the grid's pixels by lens, free distortion and bend (0), with the
+    camera in the pose that fits the boards best.
     """
     linear = [optics.linearised(view.board_m, view.T_camera_board) for view in views]
     boards = [

@@ -1,4 +1,4 @@
-"""Square markers in an image: which dictionary they are of, and where a board has them."""
+"""Square markers in an image: their dictionary, and their agreement with their places on a board."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from pipeline.calibration.dictionaries import APRILGRID, FAMILIES, dictionary
 from pipeline.types import BoolArray, ByteArray, FloatArray, IntArray
 
 LEAST_MARKERS = 4
-"""Least number of markers that tell a dictionary: single ones are seen in noise, too."""
+"""Least number of markers by which a dictionary is recognised: noise gives single ones, too."""
 OFF = 0.3
 """Largest distance of a marker from its place on the board, in pitches of the board."""
 FITS = 0.8
-"""Least share of the markers that are in their places on the right board."""
+"""Least share of the markers that must be in their places on a board for the board to be the right one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class Markers:
 
     dictionary: str
     ids: IntArray
-    """(M,)"""
+    """(M,) numbers in the dictionary."""
     corners_px: FloatArray
     """(M, 4, 2) clockwise from the upper left of the marker's own picture."""
     border_cells: int = 1
@@ -50,12 +50,12 @@ class Markers:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """How well the numbers of markers agree with their places on a board."""
+    """Agreement of detected markers with their places on a board."""
 
     on_board: FloatArray
-    """(3, 3) homography from the image to the board's plane."""
+    """(3, 3) homography from pixels to the board's plane, in the unit of the places given to ``fit``."""
     in_place: BoolArray
-    """(M,) whether each marker is where the board has it."""
+    """(M,) whether each marker is in its place on the board."""
 
     @property
     def share(self) -> float:
@@ -87,7 +87,7 @@ def markers_of(gray: ByteArray, name: str, border_cells: int = 1) -> Markers:
 
 
 def dictionaries_in(gray: ByteArray, names: Iterable[str] = FAMILIES) -> Iterator[Markers]:
-    """Yield the markers of every dictionary of which the image shows enough to tell it."""
+    """Yield the markers of every dictionary of which the image shows at least ``LEAST_MARKERS``."""
     for name in names:
         seen = markers_of(gray, name)
         if name == APRILGRID and len(seen.ids) < LEAST_MARKERS:  # Kalibr prints a border of two cells
@@ -97,8 +97,8 @@ def dictionaries_in(gray: ByteArray, names: Iterable[str] = FAMILIES) -> Iterato
 
 
 def changed_image(gray: ByteArray) -> str:
-    """Return what was done to an image without markers, and the remedy, if its mirror image or its negative
-    shows markers; else an empty sentence.
+    """Return a sentence with the remedy if the mirror image or the negative of an image shows markers; else
+    an empty string.
     """
     for picture, what, remedy in (
         (np.ascontiguousarray(gray[:, ::-1]), "mirror images", "turn off mirroring in the camera's program"),
@@ -111,7 +111,7 @@ def changed_image(gray: ByteArray) -> str:
 
 
 def fit(seen: Markers, centres: FloatArray, pitch: float) -> Fit | None:
-    """Compare markers with a board; returns None if too few of the board's are seen.
+    """Compare markers with a board; returns None if too few of the board's are seen or in their places.
 
     Args:
         seen: markers in the image.

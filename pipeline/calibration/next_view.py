@@ -55,7 +55,7 @@ class NextView:
 
     @property
     def tilt_deg(self) -> float:
-        """Angle of the board's normal to the line of sight."""
+        """Angle between the board's normal and the line of sight to its centre."""
         sight_line = self.T_camera_board[:3, 3] / self.distance_m
         return float(np.degrees(np.arccos(np.clip(abs(self.T_camera_board[:3, 2] @ sight_line), 0.0, 1.0))))
 
@@ -138,7 +138,7 @@ def _facing(ray: FloatArray) -> FloatArray:
 
 
 def _cost_m2(seen: Sight, place: FloatArray) -> FloatArray:
-    """Return the (P, P) matrix M; trace(M C) is the mean squared error of a lens with covariance C."""
+    """Return the (P, P) matrix M; trace(M C) is the mean squared error, m^2, of a lens with covariance C."""
     change = seen.metres @ (seen.by_lens + seen.by_pose @ place)
     change = change[np.isfinite(change).all(axis=(1, 2))]
     return np.einsum("gij,gik->jk", change, change) / len(change)

@@ -17,7 +17,7 @@ def is_video(path: Path) -> bool:
 
 
 def why_no_image(path: Path) -> str:
-    """Return the rest of the sentence that a file or folder names no image: what it is, and the remedy."""
+    """Return the end of the sentence "... names no image": what the path contains instead, and the remedy."""
     if is_video(path) and path.is_file():
         return _of_video(path)
     if not path.is_dir():

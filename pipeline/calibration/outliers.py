@@ -11,7 +11,7 @@ from packetmesh.errors import ReconstructionError
 from pipeline.calibration.estimate import LEAST_VIEWS, Calibration, View, best_fit
 
 MOST_SDS = 3.5
-"""A view stands out if log RMS is this many robust standard deviations above the median."""
+"""A view stands out if its log RMS is this many robust standard deviations above the others' median."""
 LEAST_SD = 0.2
 """Least standard deviation of log RMS, so that no view with less than twice the others' error stands out."""
 
@@ -28,7 +28,7 @@ class OutlierView:
     rms_without_px: float
     """RMS of the others if the lens is estimated without the view."""
     lens_moves_sd: float
-    """Largest change of a lens parameter then, in its standard errors."""
+    """Largest change of a lens parameter if the view is left out, in its standard errors."""
 
     @property
     def reason(self) -> str:
@@ -43,12 +43,12 @@ class OutlierView:
 def outlier_views(calibration: Calibration, views: Sequence[View]) -> tuple[OutlierView, ...]:
     """Find the views whose error stands out, the worst first.
 
-    Because one wrong view affects the fit of all, they are found one after the other, each with a lens
+    Because one wrong view affects the fit of all, outliers are found one after the other, each with a lens
     estimated without those found before.
 
     Args:
         calibration: calibration from all views.
-        views: the views of the calibration.
+        views: the views of the calibration, in the order of ``calibration.views``.
     """
     found: list[OutlierView] = []
     now, left = calibration, list(views)

@@ -13,9 +13,9 @@ from pipeline.calibration.lens import Optics
 from pipeline.types import ByteArray, FloatArray
 
 REACH = 0.5
-"""Half the side of a circle's neighbourhood, over the distance to its nearest neighbour."""
+"""Radius of a circle's neighbourhood, over the distance to its nearest neighbour."""
 SAMPLES = (41, 121)
-"""Least and most samples along that side."""
+"""Least and most samples along the neighbourhood's diameter."""
 PAPER = 0.86
 """Share of the neighbourhood's radius beyond which there is only paper."""
 MIDDLE = 0.3
@@ -29,10 +29,11 @@ MOST_SHIFT_PX = 1.0
 
 
 def refined_px(gray: ByteArray, board: Board, view: FittedView, optics: Optics) -> FloatArray:
-    """Return (N, 2) refined centres of a view's circles, as seen perpendicular to the board.
+    """Return (N, 2) refined centres of a view's circles, pixels.
 
-    Each circle's neighbourhood is rectified by lens and pose; the centroid of darkness there (of brightness,
-    on dark paper) is projected back to the image.
+    Lens and pose rectify each circle's neighbourhood to a view perpendicular to the board; the centroid of
+    darkness there (of brightness, on dark paper) is projected back to the image. Centres with too little
+    contrast or too large a shift keep their old position.
 
     Args:
         gray: (H, W) uint8.
@@ -58,7 +59,7 @@ def refined_px(gray: ByteArray, board: Board, view: FittedView, optics: Optics) 
 
 
 def _samples(view: FittedView, board: Board) -> int:
-    """Return the samples along the side of a neighbourhood, about one per pixel."""
+    """Return the number of samples along a neighbourhood's diameter, about one per pixel."""
     area_px2 = cv2.contourArea(cv2.convexHull(view.points_px.astype(np.float32)))
     area_m2 = cv2.contourArea(cv2.convexHull(view.board_m[:, :2].astype(np.float32)))
     side_px = 2.0 * REACH * board.nearest_m * (area_px2 / area_m2) ** 0.5

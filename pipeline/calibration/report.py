@@ -21,8 +21,8 @@ def metrics(report: CameraReport, trust: Trust | None = None) -> dict[str, Any]:
 
 
 def write_camera_folder(report: CameraReport, folder: Path, trust: Trust | None = None) -> list[str]:
-    """Write intrinsics.json, depth_correction.json if there is one, and other programs' files; write
-    metrics.json last, so that it exists only if all files do.
+    """Write intrinsics.json, depth_correction.json if the bias is known, and files for other programs; write
+    metrics.json last, so that in a new folder it exists only if all files do.
 
     Returns:
         A sentence for each file whose format cannot store the lens.

@@ -18,10 +18,11 @@ from pipeline.kernels.geometry import inverse, rigid, rotation_angle_rad, rotati
 from pipeline.types import FloatArray
 
 LEAST_CAMERAS, MOST_CAMERAS = 2, 12
-"""Six nodes, each of which may have a separate depth camera."""
+"""Least and most cameras: six nodes, each of which may have a separate depth camera."""
 
 MISFIT, MISFIT_PX = 5.0, 2.0
-"""Largest error of the rig over that of the worst camera alone, and in pixels, that is accepted."""
+"""A rig is accepted if its RMS is at most the first times that of the worst camera alone, or at most the
+second in pixels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +48,7 @@ class RelativePose:
 
     @property
     def rotation_deg(self) -> float:
-        """Angle between the cameras."""
+        """Angle of the rotation between the cameras."""
         return float(np.degrees(rotation_angle_rad(self.T_reference_camera[:3, :3])))
 
     @property
@@ -81,6 +82,7 @@ class HeldOutRig:
     rotation_deg: Mapping[str, float]
     """Largest rotation, by camera, between its poses without a fold and with all moments."""
     position_m: Mapping[str, float]
+    """Largest shift, by camera, between the same poses, metres."""
 
     @property
     def rms_px(self) -> float:
@@ -98,7 +100,7 @@ class RigCalibration:
     adjusted: Adjusted
     sightings: tuple[Sighting, ...]
     held_out: HeldOutRig | None
-    """None if none was held out, or too few moments link the cameras for it."""
+    """None if no moment was held out, or too few moments link the cameras without a fold."""
 
     @property
     def rms_px(self) -> float:
@@ -161,7 +163,7 @@ def calibrate_rig(
 
     Args:
         cameras: every camera by name, calibrated by its own views, the reference first.
-        seen: by camera and moment, including moments seen by one camera only.
+        seen: sightings by camera and moment, including moments seen by one camera only.
         board: the board in the images.
         folds: number of folds of held-out moments; 0 holds none out.
 
@@ -234,7 +236,7 @@ def _views(
 
 
 def _turns(board: Board) -> list[FloatArray]:
-    """Return (4, 4) rotations in its plane that map the points of a board onto each other."""
+    """Return the (4, 4) rotations about a board's normal that map its points onto each other."""
     quarters = [0]
     if board.ambiguous:
         square = board.columns == board.rows and board.pattern != "circles-asymmetric"
@@ -245,7 +247,9 @@ def _turns(board: Board) -> list[FloatArray]:
 def _held_out(
     names: Sequence[str], titles: Sequence[str], sightings: Sequence[Sighting], whole: Bundle, folds: int
 ) -> HeldOutRig | None:
-    """Predict every moment with cameras estimated from the other folds; None if these do not link them."""
+    """Predict every moment with cameras estimated without its fold; None if the other folds do not link
+    them, or leave a camera too few views.
+    """
     views: dict[str, tuple[FittedView, ...]] = dict.fromkeys(names, ())
     turned_deg, moved_m = dict.fromkeys(names[1:], 0.0), dict.fromkeys(names[1:], 0.0)
     for fold in range(folds):

@@ -21,7 +21,7 @@ from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.types import FloatArray
 
 ALONE, DEPTH = 0.7, 0.85
-"""Progress when each camera is calibrated alone, and when the calibration of depth starts."""
+"""Progress when all cameras are calibrated alone, and when the calibration of depth starts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,10 +35,10 @@ class RigReport:
     rig: RigCalibration
 
     def nodes(self, T_world_first: FloatArray = LEVEL_POSE) -> dict[str, CalibratedNode]:
-        """Return the calibration of every node, for its folder.
+        """Return the calibration of every node, for its folder; separate depth cameras belong to their nodes.
 
         Args:
-            T_world_first: (4, 4) pose of the first camera; by default that of a node without a pose.
+            T_world_first: (4, 4) pose of the first camera; by default ``LEVEL_POSE``.
         """
         poses = self.rig.T_first_camera
         made = {}
@@ -103,7 +103,7 @@ def iterate_rig_calibration(
         board: the board in them.
         lens: distortion model of the cameras.
         folds: number of folds of held-out moments; 0 holds none out.
-        without: images to leave out, such as node_01/color_03.png.
+        without: images to leave out, with their camera, such as node_01/color_03.png.
         depth_scale: depth units per metre; by default whole numbers are millimetres.
 
     Yields:
@@ -190,6 +190,6 @@ def node_with_depth(
 
 
 def _seen(report: CameraReport, files: Mapping[Path, str]) -> dict[str, Seen]:
-    """Return the sightings of a camera by moment."""
+    """Return the board's views in a camera, by moment."""
     moments = {path.name: moment for path, moment in files.items()}
     return {moments[view.name]: Seen(view, report.detections[view.name].oriented) for view in report.views}

@@ -38,8 +38,8 @@ def write_rig_folder(
     T_world_first: FloatArray = LEVEL_POSE,
     trust: Mapping[str, Trust] = NO_TRUST,
 ) -> list[str]:
-    """Write every node's files for ``load_rig(..., calibration=folder)``, its camera for other programs,
-    and metrics.json last.
+    """Write the files of every node for ``load_rig(..., calibration=folder)`` and for other programs, and
+    metrics.json last.
 
     Args:
         report: report of all cameras.
@@ -48,7 +48,7 @@ def write_rig_folder(
         trust: assessments by camera.
 
     Returns:
-        A sentence for each file that is not written.
+        A sentence for each file whose format cannot store the lens.
 
     Raises:
         InputError: the folder cannot be written.
@@ -65,10 +65,10 @@ def write_rig_folder(
 
 
 def pose_like(rig: AnyPath | None, node: str) -> FloatArray:
-    """Return the (4, 4) pose of a node of a rig in whose world cameras are placed; LEVEL_POSE without a rig.
+    """Return the (4, 4) pose of a node of an existing rig, in its world frame; LEVEL_POSE without a rig.
 
     Raises:
-        InputError: the rig has no such node, or the node has no pose.
+        InputError: the rig has no such node, or the node has no readable pose.
     """
     if rig is None:
         return LEVEL_POSE

@@ -17,21 +17,23 @@ from pipeline.kernels.geometry import apply, inverse, rotation_angle_rad
 from pipeline.types import FloatArray
 
 MOST_TRIED = 12
-"""Largest number of moments whose relative pose of two cameras is tested on all their common moments."""
+"""Largest number of moments of which each gives a relative pose of two cameras to test on all their common
+moments."""
 APART_RAD = np.radians(20.0)
+"""Difference of rotation above which two poses mean different orientations of the board."""
 LOST_PX = 20.0
-"""Error above which no orientation of the board explains the views."""
+"""Median RMS above which no orientation of the board explains the views."""
 TELLING = 1.5
 """Least ratio of another orientation's error to the best one's for a decision."""
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """A sighting with the pose from its image alone."""
+    """A sighting with the board's pose from its image alone."""
 
     sighting: Sighting
     T_camera_board: FloatArray
-    """(4, 4) pose from this image."""
+    """(4, 4) pose of the board from this image."""
     oriented: bool
     """Whether a mark shows the orientation of the board."""
 
@@ -55,7 +57,7 @@ def start(
     Cameras are linked in the order of the number of moments that they share with linked ones.
 
     Args:
-        looks: sightings of all cameras, with every moment from 0 on in at least one.
+        looks: sightings of all cameras; their moments are numbered from 0 without gaps.
         optics: lens of every camera.
         names: names of the cameras, for error messages.
         turns: (4, 4) motions after which the board looks the same, the identity first.
@@ -101,7 +103,11 @@ def _unlinked(linked: Sequence[int], names: Sequence[str]) -> str:
 def _linked(
     pairs: Sequence[tuple[Look, Look]], optics_b: Optics, turns: Sequence[FloatArray], who: str
 ) -> FloatArray:
-    """Return the (4, 4) T_a_b of one moment and orientation that explains all moments best."""
+    """Return the (4, 4) T_a_b, of one moment and orientation, that explains all moments best.
+
+    Raises:
+        ReconstructionError: another orientation explains them nearly as well.
+    """
     every = -(-len(pairs) // MOST_TRIED)
     tried = [
         a.T_camera_board @ turn @ inverse(b.T_camera_board)
@@ -128,7 +134,7 @@ def _possible(seen: Sequence[Look], turns: Sequence[FloatArray]) -> Sequence[Flo
 def _error_px(
     T_a_b: FloatArray, pairs: Sequence[tuple[Look, Look]], optics_b: Optics, turns: Sequence[FloatArray]
 ) -> float:
-    """Return the median over moments of camera b's error, with the board's pose from camera a."""
+    """Return the median over moments of camera b's RMS, pixels, with the board's pose from camera a."""
     errors = [
         min(
             _off_px(b.sighting, optics_b, inverse(T_a_b) @ a.T_camera_board @ turn)

@@ -1,6 +1,4 @@
-"""Images of several cameras in one folder: told apart by their names, their sizes and what the camera
-wrote.
-"""
+"""Recognition of several cameras among the images of one folder, by file names and EXIF data."""
 
 from __future__ import annotations
 
@@ -14,7 +12,7 @@ from PIL import ExifTags, Image
 from packetmesh.errors import InputError
 
 LEAST_IMAGES = 2
-"""Least number of images whose names have the same camera in them."""
+"""Least number of images with the same camera in their names."""
 _CAMERAS = tuple(
     re.compile(sign)
     for sign in (
@@ -25,20 +23,20 @@ _CAMERAS = tuple(
         r"(?i)(?<![a-z])(c\d|rgb|colou?r|infra(?:red)?\d?|ir\d?|nir|thermal|mono)(?![a-z\d])",
     )
 )
-"""Signs of a camera in a file's name: the group tells the cameras apart."""
+"""Patterns of a camera in a file's name; images with equal matches are of one camera."""
 LEAST_MOMENTS = 3
-"""Least number of moments that unknown cameras have in common."""
+"""Least number of moments that cameras without a recognised name have in common."""
 _PARTS = re.compile(r"[^\W\d_]+|\d+|[\W_]+")
-"""Words, numbers and what is between them in a file's name."""
+"""Words, numbers and separators in a file's name."""
 _BODY = (ExifTags.Base.Make, ExifTags.Base.Model, ExifTags.Base.BodySerialNumber)
 _FOCAL = ExifTags.Base.FocalLength
 
 
 def camera_series(files: Sequence[Path]) -> dict[str, dict[Path, str]]:
-    """Return images by the camera that their names tell, with the rest of each name; empty if they tell none
-    or one.
+    """Return images by the camera in their names, each with its name without the camera; empty if the names
+    show fewer than two cameras.
 
-    Names such as left-0000.jpg and right-0000.jpg tell two cameras, and so do cam0_01.png and cam1_01.png.
+    Names such as left-0000.jpg and right-0000.jpg show two cameras, and so do cam0_01.png and cam1_01.png.
     """
     for sign in _CAMERAS:
         found: dict[str, dict[Path, str]] = {}
@@ -54,8 +52,10 @@ def camera_series(files: Sequence[Path]) -> dict[str, dict[Path, str]]:
 
 
 def same_moments(files: Sequence[Path]) -> dict[str, dict[Path, str]]:
-    """Return images by the word or number of their names that has fewest values, each with the same moments,
-    such as front_1.png and back_1.png, front_2.png and back_2.png; empty if there is none.
+    """Return images by that word or number in their names that has fewest values with common moments, such as
+    front_1.png and back_1.png, front_2.png and back_2.png; empty if there is none.
+
+    The values share at least three moments, and at least half of the moments of the longest series.
 
     These may be several cameras, or several series of one.
     """
@@ -77,7 +77,7 @@ def same_moments(files: Sequence[Path]) -> dict[str, dict[Path, str]]:
 
 
 def check_one_camera(files: Sequence[Path]) -> None:
-    """Check that names and EXIF data do not tell several cameras, or several focal lengths of one.
+    """Check that names and EXIF data do not show several cameras, or several focal lengths of one.
 
     Raises:
         InputError: they do.
@@ -104,7 +104,7 @@ def check_one_camera(files: Sequence[Path]) -> None:
 
 
 def _pattern(mine: Sequence[Path], files: Sequence[Path]) -> str:
-    """Return the advice to name one camera's images by a pattern; empty if none names them alone."""
+    """Return the advice to give one camera's images by a pattern; empty if no pattern matches only them."""
     names = [path.name for path in mine]
     first = _common(names)
     last = _common([name[len(first) :][::-1] for name in names])[::-1]
@@ -116,7 +116,7 @@ def _pattern(mine: Sequence[Path], files: Sequence[Path]) -> str:
 
 
 def _common(words: Sequence[str]) -> str:
-    """Return the letters with which all words begin."""
+    """Return the longest prefix that all words share."""
     shortest = min(words, key=len)
     apart = (k for k in range(len(shortest)) if any(word[k] != shortest[k] for word in words))
     return shortest[: next(apart, len(shortest))]

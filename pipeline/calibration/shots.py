@@ -57,7 +57,8 @@ def node_shots(folders: Sequence[AnyPath]) -> tuple[NodeShots, ...]:
         folders: one that contains node_00, node_01 and so on, or one per camera.
 
     Raises:
-        InputError: there are no images, too many nodes, a repeated folder, or two images of one moment.
+        InputError: a path is no folder, a folder is repeated or has no images, there are too many nodes, or
+            two images of a node are of one moment.
     """
     paths = [Path(folder) for folder in folders]
     for path in paths:
@@ -83,14 +84,15 @@ def node_shots(folders: Sequence[AnyPath]) -> tuple[NodeShots, ...]:
 
 
 def series_shots(files: Sequence[Path]) -> tuple[NodeShots, ...]:
-    """Return the images of several cameras in one folder, told apart by their names: node_00 and so on, in
-    the order of the cameras' names.
+    """Group the images of one folder by the cameras in their names: node_00 and so on, in the order of the
+    cameras' names.
 
-    The moment is all that is left of a name without its camera if the last number does not tell the moments
-    apart, as in left-1700000000.250.png.
+    The moment is the last number of a name. If a camera has the same last number twice, as in
+    left-1700000000.250.png, it is the whole name without the camera's part.
 
     Raises:
-        InputError: the names tell no cameras apart, an image is of none of them, or two are of one moment.
+        InputError: the names distinguish no cameras, an image is of none of them, there are too many cameras,
+            or two images of a camera are of one moment.
     """
     series = camera_series(files) or same_moments(files)
     if not series:
@@ -143,11 +145,14 @@ def board_beside(
     dictionary: str | None = None,
     tag_spacing: float | None = None,
 ) -> Board:
-    """Return the board in images: the given values, else those of a board.json in or above their folder, else
-    the thesis's. A dictionary in the file counts for its own pattern only.
+    """Return the board in images: the given values, else those of a board.json, else the thesis's.
+
+    The file is searched next to a given image, and in and directly above a given folder. A dictionary in it
+    is used only for its own pattern.
 
     Raises:
-        InputError: the file lacks pattern, columns, rows or spacing_mm, or the board is impossible.
+        InputError: the file is unreadable or lacks pattern, columns, rows or spacing_mm, or the board is
+            impossible.
     """
     known = Board()
     for path in (one / BOARD_FILE for word in images for one in (Path(word), Path(word).parent)):
@@ -170,7 +175,8 @@ def read_board(path: AnyPath) -> Board:
     """Read the board from a file.
 
     Raises:
-        InputError: the file lacks pattern, columns, rows or spacing_mm, or the board is impossible.
+        InputError: the file is unreadable or lacks pattern, columns, rows or spacing_mm, or the board is
+            impossible.
     """
     values = read_json(path, "board file")
     try:
@@ -214,7 +220,11 @@ def _shots(folder: Path) -> tuple[Shot, ...]:
 
 
 def _by_moment(images: Mapping[Path, str], numbered: bool = True) -> dict[str, Path]:
-    """Return images by moment, from the part of each name that holds it: its last number, or all of it."""
+    """Return images by moment: the last number in each name if ``numbered``, else the whole name.
+
+    Raises:
+        InputError: two images are of one moment.
+    """
     found: dict[str, Path] = {}
     for path, stem in images.items():
         moment = _moment(stem) if numbered else stem

@@ -28,7 +28,7 @@ SUB_PIXEL = 6
 
 @dataclass(frozen=True, slots=True)
 class Disc:
-    """A filled circle, in millimetres from the upper left."""
+    """A filled circle, black or white; its centre is in millimetres from the sheet's upper left."""
 
     x_mm: float
     y_mm: float
@@ -38,7 +38,7 @@ class Disc:
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """A black rectangle."""
+    """A black rectangle; x and y are those of its upper left corner."""
 
     x_mm: float
     y_mm: float
@@ -48,7 +48,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A line of text; x and y are those of the left end of its base line."""
+    """A line of text; x and y are those of the left end of its baseline."""
 
     x_mm: float
     y_mm: float
@@ -94,7 +94,7 @@ def place_of_first_mm(board: Board) -> FloatArray:
 
 
 def _around_mm(board: Board) -> float:
-    """Return the distance from the outermost points to the board's edge; circles have a white border."""
+    """Return the distance from the outermost points to the board's edge; around circles it is white."""
     if board.pattern == "aprilgrid":
         return 1000.0 * board.tag_spacing * board.spacing_m
     squares = board.pattern in ("chessboard", "charuco")
@@ -164,12 +164,12 @@ def _foot(board: Board, top_mm: float) -> Iterator[Box | Text]:
 def write_target(board: Board, path: Path, pixel_mm: float | None = None) -> Board:
     """Write the board in the format of the suffix; returns the board with the spacing that was written.
 
-    On a monitor the spacing is rounded to whole pixels, so that all squares are equal.
+    In a PNG the spacing is rounded to whole pixels, so that all squares are equal.
 
     Args:
         board: the board to draw.
         path: a .pdf, .svg or .png file.
-        pixel_mm: size of a pixel of the monitor that shows a PNG.
+        pixel_mm: size of a pixel of the monitor that shows a PNG; other formats ignore it.
 
     Raises:
         InputError: the suffix is none of these, or a PNG has no pixel size from 0.01 to 5 mm.

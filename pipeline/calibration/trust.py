@@ -42,7 +42,7 @@ class ErrorMap:
     """An error over the image, for points at one distance."""
 
     range_m: float
-    """Distance from the camera, along the pixel's ray."""
+    """Distance of the points from the camera, along the pixel's ray."""
     columns_px: FloatArray
     """(C,) centres of the cells."""
     rows_px: FloatArray
@@ -58,7 +58,7 @@ class HalfDifference:
     """Difference of two cameras, one calibrated from the even views and one from the odd views."""
 
     map: ErrorMap
-    """Length of the difference."""
+    """Length of the difference of the two projections of a point."""
     ratio: float
     """Difference over that expected from noise alone, root mean square over the image: near 1 if the lens
     model is right."""
@@ -81,9 +81,9 @@ class Sight:
     points_m: FloatArray
     """(G, 3) points row by row, in the camera's frame; NaN where the lens has no ray."""
     by_pose: FloatArray
-    """(G, 2, 6) derivatives of their pixels by their common pose."""
+    """(G, 2, 6) derivatives of the points' pixels by their common pose."""
     by_lens: FloatArray
-    """(G, 2, P) derivatives by the lens."""
+    """(G, 2, P) derivatives of the pixels by the lens."""
     metres: FloatArray
     """(G, 2, 2) conversion of pixels to metres perpendicular to the ray."""
 
@@ -174,7 +174,8 @@ def half_difference_px(
 ) -> HalfDifference:
     """Calibrate one camera with the even views and one with the odd views, and compare their projections.
 
-    A wrong lens model has other best parameters for each half, so that they differ by more than noise.
+    A wrong lens model fits each half best with other parameters, so that the halves differ by more than
+    noise.
 
     Args:
         views: six or more.

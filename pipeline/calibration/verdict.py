@@ -19,17 +19,18 @@ LEAST_SHARE = 0.95
 LEVEL = 0.95
 """Probability with which stated errors are not exceeded."""
 PASS, FAIL = 0.75, 0.25
-"""A camera passes from the first probability on that it is accurate enough, and fails up to the second;
-between them its views do not decide (chosen by the sessions of seed 100 of ``python -m lab.verdicts``)."""
+"""A camera passes if the probability that it is accurate enough is at least the first, and fails if it is at
+most the second; between them its views do not decide (chosen by the sessions of seed 100 of
+``python -m lab.verdicts``)."""
 CERTAIN = 0.95
-"""Probability from which on a wrong lens model or a bent board is named."""
+"""Least probability at which a wrong lens model or a bent board is named."""
 LENS_REMEDY: dict[Lens, str] = {
     "thesis": "try --lens brown",
     "brown": "try --lens rational",
     "rational": "try --lens fisheye if the lens is one, or sharper images",
     "fisheye": "try --lens rational, or sharper images",
 }
-"""What to try if the residuals have a pattern: a lens model with more parameters, or of another kind."""
+"""Advice if the residuals have a pattern: a lens model with more parameters, or of another kind."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +49,9 @@ class Verdict:
     """Share of the image in which points are within ``accuracy_m``, with the probability ``LEVEL``."""
     error_of_most_m: float
     """Error that is not exceeded over ``LEAST_SHARE`` of the image, with the probability ``LEVEL``; infinite
-    if too much has no rays."""
+    if too much of the image has no rays."""
     wrong_lens: float
-    """Probability that the lens model cannot hold the lens."""
+    """Probability that the lens model does not fit the lens."""
     bent: float
     """Probability that the board is bent."""
     sentence: str
@@ -63,12 +64,12 @@ class Verdict:
 
     @property
     def failed(self) -> bool:
-        """Whether it is not; False also if the views do not decide."""
+        """Whether the camera is not accurate enough; False also if the views do not decide."""
         return self.probability <= FAIL
 
     @property
     def word(self) -> str:
-        """The verdict in a word or two."""
+        """The verdict: pass, fail or not decided."""
         return _word(self.probability)
 
 
@@ -84,8 +85,8 @@ def verdict(
     Args:
         calibration: the camera.
         likely: result of ``likely_error``.
-        accuracy_m: largest error of a point that is accepted.
-        following: the best view to take next, for the advice.
+        accuracy_m: largest accepted error of a point.
+        following: the best view to take next, for the advice; None if there is none.
         outliers: names of views that do not fit the others.
 
     Raises:
@@ -110,7 +111,7 @@ def verdict(
 
 
 def percent(probability: float) -> str:
-    """Return a probability from random draws in whole per cent, never as certain."""
+    """Return a probability from random draws in whole per cent, never as 0 or 100 %."""
     if probability < 0.01:
         return "below 1 %"
     return "above 99 %" if probability > 0.99 else f"{100.0 * probability:.0f} %"

@@ -33,7 +33,8 @@ class BoardWarp:
     """The estimated shape of a board."""
 
     board_m: FloatArray
-    """(N, 3) points of the board; the first, the last and the upper right define its frame and scale."""
+    """(N, 3) points of the board; the first, the upper right and the height of the last define its frame and
+    scale."""
     off_plane_m: FloatArray
     """(N,) distances of the points from their best-fitting plane, along z."""
     calibration: Calibration
@@ -45,7 +46,7 @@ class BoardWarp:
 
     @property
     def warp_m(self) -> float:
-        """Distance from the deepest point of the board to the highest, along z."""
+        """Distance between the deepest and the highest point of the board, along z."""
         return float(np.ptp(self.off_plane_m))
 
     @property
@@ -72,7 +73,8 @@ def board_warp(
         lens: distortion model of the camera.
 
     Raises:
-        InputError: the lens is a fisheye, a view shows only part of the board, or the folds need more views.
+        InputError: the lens is a fisheye, a view shows only part of the board, or the folds need more
+            views.
         ReconstructionError: the views do not determine lens and board.
     """
     if lens == "fisheye":

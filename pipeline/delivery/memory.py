@@ -11,14 +11,15 @@ from pipeline.types import RgbdFrame
 
 Result = TypeVar("Result")
 COLOR_ONLY, DEPTH_ONLY = ("inferred",), ("outliers",)
-"""Stages that use only colour, or only depth; placement by sensor clouds also uses only depth."""
+"""Stages that use only colour, or only depth. Placement by sensor clouds also counts as using only depth,
+although the search for unknown poses, and ``hicp``, use colours."""
 
 
 class Memory:
     """Cache with the newest result of each stage of one delivery, whose settings never change."""
 
     def __init__(self, places_by_sensor: bool) -> None:
-        """Create an empty cache; ``places_by_sensor`` means that registration uses measured depth only."""
+        """Create an empty cache; ``places_by_sensor`` is True if sensor clouds are registered."""
         self._places_by_sensor = places_by_sensor
         self._color: Hashable = None
         self._depth: Hashable = None
@@ -37,7 +38,7 @@ class Memory:
     def remember(
         self, key: tuple[Hashable, ...], compute: Callable[[], Generator[Progress, None, Result]]
     ) -> Generator[Progress, None, Result]:
-        """Return a result as ``pipeline.stages.Cache.remember`` does; the key is the images of the stage."""
+        """Return the kept result of stage ``key[0]`` if its images are the same, else compute and keep it."""
         stage, images = key[0], self._images(key[0])
         kept = self._kept.get(stage)
         if kept is not None and kept[0] == images:

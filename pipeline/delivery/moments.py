@@ -46,7 +46,7 @@ class Moment:
     delivered_bytes: int
     """Bytes of the images at the sink, each counted once."""
     packets_lost: int
-    """Number of failed attempts."""
+    """Number of failed attempts to send a packet."""
     radio_j: float
     """Energy of all nodes' radios until then."""
     energy_j: float
@@ -66,7 +66,7 @@ NOTHING: Rebuilt = None, None, {}
 
 
 class Rebuilder:
-    """Reconstructs moments of a delivery. Order of time is fastest, because unchanged results are kept."""
+    """Reconstructs moments of a delivery, fastest in order of time, because unchanged results are kept."""
 
     def __init__(self, sending: Sending) -> None:
         self.sending = sending

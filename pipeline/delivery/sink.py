@@ -50,7 +50,7 @@ def frame_at_sink(frame: RgbdFrame, received: Received) -> RgbdFrame:
     """Return the received frame: unknown depth is invalid, unknown colour is filled in for the depth network.
 
     Args:
-        frame: the node's frame, of which the sink knows name, intrinsics and given pose.
+        frame: the node's frame, of which the sink knows everything except the images.
         received: the decoded images.
     """
     known, units = received.rgb_known, units_per_m(frame.depth)

@@ -108,7 +108,8 @@ def affine_depth(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.rando
 def affine_inverse(z: FloatArray, p: FloatArray, overlap: BoolArray, rng: np.random.Generator) -> Aligned:
     """Fit 1/z' = a/z + b, the right model for networks whose output is disparity up to scale and shift.
 
-    Depths beyond three times the sensor's farthest become unknown, because their disparity is near zero.
+    Like ``affine_depth`` it uses the median scale if the pixels determine no positive slope. Depths beyond
+    three times the sensor's farthest become unknown, because their disparity is near zero.
     """
     a, b = fit_line(1.0 / z[overlap], 1.0 / p[overlap], rng)
     if not a > 0.0:
@@ -139,7 +140,8 @@ def corrected(line: FloatArray, p: FloatArray, overlap: BoolArray) -> FloatArray
 
 
 def masked_blur(residual: FloatArray, known: BoolArray) -> FloatArray:
-    """Compute sum_s G_s*(m r) / sum_s G_s*m with Gaussians of 4, 12 and 40 px at 320 px width.
+    """Compute sum_s G_s*(m r) / (``LOCAL_PRIOR`` + sum_s G_s*m), with Gaussians of 4, 12 and 40 px at 320 px
+    width.
 
     Args:
         residual: (H, W) float32, zero where unknown.
@@ -157,7 +159,7 @@ def masked_blur(residual: FloatArray, known: BoolArray) -> FloatArray:
 
 
 def positive(depth_m: FloatArray) -> BoolArray:
-    """Return True where a depth is finite and in front of the camera."""
+    """Return an (H, W) mask of the depths that are finite and in front of the camera."""
     return (depth_m > 0.0) & (depth_m < np.inf)
 
 

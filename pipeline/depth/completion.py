@@ -26,9 +26,9 @@ class CompletedDepth:
     depth: DepthMap
     """(H, W) metres; measured depth is unchanged. NaN where a user's own network gives no depth."""
     log_scale: FloatArray
-    """(H, W) float32, the network's estimate of its error: log of the scale of logarithmic depth."""
+    """(H, W) float32, logarithm of the estimated mean absolute error of logarithmic depth."""
     fine: bool = False
-    """Whether it has the image's resolution, so that it replaces aligned depth up to the holes' rims."""
+    """Whether the depth has the image's resolution; it then replaces aligned depth up to the holes' rims."""
 
 
 def complete(sensor: DepthMap, rgb: ByteArray, model: Path = SHIPPED_COMPLETION) -> CompletedDepth:
@@ -43,7 +43,7 @@ def complete(sensor: DepthMap, rgb: ByteArray, model: Path = SHIPPED_COMPLETION)
         model: ONNX file of the completion network.
 
     Raises:
-        InputError: the images differ in size, or no pixel is measured.
+        InputError: the images differ in size, no pixel is measured, or the file is missing or not readable.
     """
     require_same_grid(sensor, rgb)
     grid = coarse(sensor.z_m, sensor.valid, rgb)
@@ -81,7 +81,7 @@ def enlarged(plane: FloatArray, shape: tuple[int, int]) -> FloatArray:
 
 
 def meeting(log_z: FloatArray, sensor: DepthMap, rgb: ByteArray) -> FloatArray:
-    """Correct completed depth to meet the measured pixels around every hole; returns (H, W) metres."""
+    """Correct completed log depth (H, W) to meet the measured depth around every hole; returns metres."""
     measured_log = np.log(np.where(sensor.valid, sensor.z_m, 1.0)).astype(np.float32)
     mismatch = np.where(sensor.valid, measured_log - log_z, np.float32(0.0))
     usable: BoolArray = sensor.valid & (np.abs(mismatch) < LARGEST_MISMATCH)

@@ -28,7 +28,7 @@ ACCEPTED = (
     "depth map; or it takes both in one input [1, 4, H, W]"
 )
 MASKS = ("mask", "valid")
-"""Parts of the names of inputs that say where the depth is measured."""
+"""Parts of the names of inputs that mask the measured pixels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +53,11 @@ class CompletionSignature:
     """Inputs and output of a network that completes depth."""
 
     image: Signature
-    """The image, and the depth that comes out."""
+    """Input image and output depth."""
     depth: MapInput | None
-    """None if depth is the fourth channel of the image."""
+    """Input of measured depth; None if depth is the fourth channel of the image."""
     mask: MapInput | None
+    """Input of the mask of measured pixels; None if the network takes none."""
 
 
 def takes_depth(session: Any) -> bool:
@@ -72,7 +73,7 @@ def completion_signature_of(session: Any, name: str) -> CompletionSignature:
     """Read the signature of an onnxruntime session; ``name`` is the network's name in errors.
 
     Raises:
-        InputError: the graph does not map an image and its depth to depth.
+        InputError: the graph does not map an image and depth of one size to depth.
     """
     inputs, outputs = session.get_inputs(), session.get_outputs()
     images = [entry for entry in inputs if _channels(entry.shape) in (3, 4) and entry.type in FLOATS]
@@ -127,7 +128,7 @@ def _is_mask(entry: Any) -> bool:
 
 
 def _output(outputs: Sequence[Any]) -> Any:
-    """Return the output named depth, else the largest one, else the first."""
+    """Return the largest output with depth in its name, or of all outputs; of equal ones the first."""
     named = [entry for entry in outputs if "depth" in entry.name.lower()]
     return max(named or outputs, key=lambda entry: prod(side for side in entry.shape if is_fixed(side)))
 
@@ -137,7 +138,7 @@ def _map_input(entry: Any, layout: Layout) -> MapInput:
 
 
 def _channel_last(shape: Shape, layout: Layout) -> bool:
-    """Return whether a map's channel is its last side; where both ends are open, as the image's is."""
+    """Return whether a map's channel is its last side; if the graph leaves this open, as in the image."""
     if len(shape) != 4 or shape[1] == 1:
         return False
     return shape[3] == 1 or (layout == "NHWC" and not is_fixed(shape[3]))

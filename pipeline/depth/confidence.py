@@ -17,8 +17,8 @@ from pipeline.depth.extension import extrapolated
 from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray
 
 COMPLETED_FROM = 0.0125
-"""Distance from a rim, as a share of the diagonal, at which completed and aligned depth weigh the same: of
-0, 5, 10, 20 and 40 px at 640 x 480 the best on validation rooms (``fit_confidence`` prints the errors)."""
+"""Distance from a rim, as a share of the diagonal, at which completed and aligned depth weigh the same: 10 px
+at 640 x 480, best of 0, 5, 10, 20 and 40 px on validation rooms (``fit_confidence`` prints the errors)."""
 AT_ONCE = 1e-9
 """The same for completed depth that has the image's resolution."""
 COMPLETED_ODDS = (-1.92, -1.24, 0.20, -0.08, -0.68)
@@ -195,8 +195,9 @@ def odds_of_completion(
 def features_of_completion(aligned: DepthMap, completed: CompletedDepth, distance: FloatArray) -> FloatArray:
     """Return (4, H, W) features that predict whether completed depth is right.
 
-    They are the network's log scale, its square, the log of the distance as a share of the diagonal, and the
-    log of the difference between completed and aligned depth, which counts as 0 without aligned depth.
+    They are the network's log scale minus ``TYPICAL_LOG_SCALE``, its square, the log of the distance as a
+    share of the diagonal, and the log of the difference between the logarithms of completed and aligned
+    depth, which counts as 0 without aligned depth.
     """
     scale = completed.log_scale - TYPICAL_LOG_SCALE
     ratio = np.where(positive(aligned.z_m), aligned.z_m, completed.depth.z_m) / completed.depth.z_m
@@ -227,7 +228,9 @@ def flying_pixels(depth: DepthMap, sensor: DepthMap) -> BoolArray:
 
 
 def log_range(z_m: FloatArray, side_px: int) -> tuple[FloatArray, FloatArray]:
-    """Return (H, W) logarithms of the least and greatest known depth within a square window."""
+    """Return (H, W) logarithms of the least and greatest known depth in a square window; inf and -inf if none
+    is known.
+    """
     known, window = positive(z_m), np.ones((side_px, side_px), np.uint8)
     log_z = np.log(np.where(known, z_m, 1.0)).astype(np.float32)
     least = cv2.erode(np.where(known, log_z, np.float32(np.inf)), window)
@@ -238,10 +241,10 @@ def log_range(z_m: FloatArray, side_px: int) -> tuple[FloatArray, FloatArray]:
 def meet_rims(alignment: AlignmentResult, sensor: DepthMap, rgb: ByteArray) -> DepthMap:
     """Correct aligned depth in the sensor's holes so that it continues the measured depth around them.
 
-    z' = z^g exp(C), where g is the share of the network's relief that the sensor confirms in this frame, and
-    C = log p - g log z is extended from the measured pixels with its slope, along similar colours (joint
-    bilateral weights, Kopf et al. 2007), from the rims inwards. So the relief of a poor network has little
-    effect.
+    z' = z^g exp(C), where g is the share of the network's relief that the sensor confirms in this frame
+    (``RELIEF_AFTER_LOCAL`` after ``local`` alignment), and C = log p - g log z is extended from the measured
+    pixels with its slope, along similar colours (joint bilateral weights, Kopf et al. 2007), from the rims
+    inwards. So the relief of a poor network has little effect.
 
     Args:
         alignment: (H, W) inferred depth in metres.
@@ -265,7 +268,9 @@ def meet_rims(alignment: AlignmentResult, sensor: DepthMap, rgb: ByteArray) -> D
 
 
 def confirmed_relief(log_z: FloatArray, log_p: FloatArray, known: BoolArray) -> float:
-    """Return the slope of the sensor's depth differences over the inferred ones, 0 to 1, without edges."""
+    """Return the regression slope, 0 to 1, of the sensor's log depth differences on the inferred ones; steps
+    above ``RELIEF_STEP`` are left out.
+    """
     apart_px = max(1, round(RELIEF_APART * np.hypot(*known.shape)))
     product, square = 0.0, 1e-12
     for near, far in (

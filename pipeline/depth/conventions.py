@@ -1,12 +1,12 @@
 """Conventions of depth networks: formats of input and output, read from the file, a preset or flags.
 
-An ONNX file stores it in its ``metadata_props``. All keys are optional text, plain or JSON:
+An ONNX file stores its convention in ``metadata_props``. All keys are optional text, plain or JSON:
 
     preset             name of a preset, for the values that other keys do not set
     depth_kind         metric: metres; relative: depth up to scale; inverse: disparity up to scale and shift
     depth_range_m      0.1,100: the output is a sigmoid between the disparities of these depths (monodepth2)
     input_size_px      320x256: width and height; 518: any size whose shorter side is that long
-    input_multiple_px  14: the sides of such a size are multiples of it
+    input_multiple_px  14: both sides are multiples of it, unless the graph fixes them
     input_fit_px       320x240: the centre box of the input into which the image is fitted
     input_resize       fit (keeps the aspect and pads by reflection) or stretch
     input_scale        255 or 1: divisor of pixel values
@@ -16,7 +16,7 @@ An ONNX file stores it in its ``metadata_props``. All keys are optional text, pl
     input_channels     RGB or BGR
     input_layout       NCHW or NHWC
 
-If the shapes in the graph are fixed, they override size and layout.
+A fixed size or layout in the graph overrides the others.
 """
 
 from __future__ import annotations
@@ -127,9 +127,11 @@ def convention_of(
 ) -> Convention:
     """Return a network's convention: flags override a preset, which replaces the file's metadata.
 
+    Without a kind, a network of 320 x 256 pixels gets the convention of the preset packetmesh.
+
     Args:
         session: onnxruntime session.
-        preset: name in ``PRESETS``; it replaces all metadata.
+        preset: name in ``PRESETS``; it replaces all metadata. None uses the metadata.
         overrides: parts set by flags.
         name: name of the network for error messages.
 

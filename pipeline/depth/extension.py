@@ -13,7 +13,8 @@ FILL_WIDTH_PX = 320
 WINDOW_PX = 3
 SPACE_SIGMA_PX = 1.7
 SLOPE_SIGMA_PX = 6.0
-"""Window and sigmas in pixels at the filling width; these three fit hidden sensor depth best."""
+"""Half width of the window and sigmas, in pixels at the filling width; these three fit hidden sensor depth
+best."""
 COLOR_SIGMA = 7.0
 """Root mean square of the three channels' differences, in grey levels."""
 LEAST_WEIGHT = 1e-6
@@ -27,6 +28,8 @@ LARGEST_SLOPE = 0.03
 
 def extrapolated(field: FloatArray, known: BoolArray, rgb: ByteArray) -> FloatArray:
     """Return the (H, W) field with its unknown pixels inpainted at ``FILL_WIDTH_PX`` and upsampled.
+
+    If no pixel is known at that width, the unknown pixels get the median.
 
     Args:
         field: (H, W) float32.
@@ -132,7 +135,7 @@ def _likeness(color: FloatArray, other: FloatArray) -> float:
 
 
 def slopes(field: FloatArray, known: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Return the (H, W) slopes, down and to the right, to continue; zero where no slope is known nearby."""
+    """Return the two (H, W) slopes, down and to the right, that holes continue; 0 far from known slopes."""
     found = []
     for axis in (0, 1):
         before, after = (np.roll(field, way, axis) for way in (1, -1))

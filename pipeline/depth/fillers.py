@@ -30,7 +30,7 @@ LEAST_WEIGHT = 1e-6
 def inpainted(method: int, sensor: DepthMap, rgb: ByteArray) -> DepthMap:
     """Inpaint depth as 16-bit numbers with OpenCV; measured pixels are unchanged, colours are not used.
 
-    ``method`` is fast marching (Telea 2004) or Navier-Stokes (Bertalmio et al. 2001).
+    ``method`` is OpenCV's flag for fast marching (Telea 2004) or Navier-Stokes (Bertalmio et al. 2001).
     """
     require_depth(sensor)
     step_m = float(np.nanmax(sensor.z_m)) / FULL_SCALE

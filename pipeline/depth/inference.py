@@ -37,8 +37,8 @@ class DepthNetwork:
             overrides: parts of the convention that replace the file's or the preset's.
 
         Raises:
-            InputError: the file is missing, damaged, no ONNX or no depth network, or neither it nor the call
-                gives its convention.
+            InputError: the file is missing, damaged, no ONNX or no depth network, neither it nor the call
+                gives its convention, or a preset of another network is given without a file.
         """
         if model_path is None and preset not in (None, "packetmesh"):
             raise InputError(f"The preset {preset} is for a network of that kind: name its ONNX file as well")

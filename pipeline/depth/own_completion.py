@@ -1,10 +1,10 @@
 """Completion of measured depth by a user's own network, which takes image and depth.
 
-The form of the image is read as for other depth networks (``pipeline.depth.conventions``); by default its
-values go from 0 to 1, as for LingBot-Depth. Depth goes in and comes out in metres, or in the unit of the
+The format of the input image is read as for other depth networks (``pipeline.depth.conventions``); by default
+its values go from 0 to 1, as for LingBot-Depth. Depth goes in and comes out in metres, or in the unit of the
 file's metadata:
 
-    depth_unit_m  0.001: its depth is in millimetres; 10: its depth 1 is 10 m
+    depth_unit_m  0.001: depth is in millimetres; 10: a depth of 1 means 10 m
 
 Unknown depth is 0, in and out.
 """
@@ -49,10 +49,11 @@ class OwnCompletion:
 
         Args:
             model_path: network that maps image and depth to depth.
-            normalisation: scaling of the image; None takes it from the file, else from 0 to 1.
+            normalisation: scaling of pixel values; None takes the file's, or 0 to 1 if it has none.
 
         Raises:
-            InputError: the file is missing, damaged, no ONNX or no completion network.
+            InputError: the file is missing, damaged, no ONNX or no completion network, or its metadata are
+                invalid.
         """
         self.model_path, name = Path(model_path), str(model_path)
         self._session = open_session(self.model_path, modified_ns(self.model_path))
@@ -92,8 +93,8 @@ class OwnCompletion:
     def complete(self, sensor: DepthMap, rgb: ByteArray) -> CompletedDepth:
         """Extend measured depth into its holes; unknown where the network gives no depth.
 
-        The output is scaled by the median ratio at the measured pixels. Its certainty is measured: a fifth of
-        the measured depth is hidden in squares, and the network completes it in a second run.
+        The output is scaled by the median ratio at the measured pixels. Its error, one value for the image,
+        is measured: a fifth of the measured depth is hidden in squares and completed in a second run.
 
         Args:
             sensor: (H, W) metric depth with holes; at least one pixel is measured.
@@ -115,7 +116,9 @@ class OwnCompletion:
         )
 
     def _log_scale(self, sensor: DepthMap, rgb: ByteArray) -> float:
-        """Return the log of the mean error of logarithmic depth at hidden squares; the largest if unknown."""
+        """Return the log of the mean absolute error of logarithmic depth in hidden squares; the upper end of
+        ``LOG_SCALES`` if it is unknown.
+        """
         hidden = hidden_squares(sensor.valid)
         rest = DepthMap(np.where(hidden, np.float32(np.nan), sensor.z_m))
         if not rest.valid.any():
@@ -183,7 +186,7 @@ def completed_by(config: DepthConfig, sensor: DepthMap, rgb: ByteArray) -> Compl
 
 
 def on_grid(plane: FloatArray, size_px: tuple[int, int], shape: tuple[int, ...]) -> FloatArray:
-    """Return a plane at (width, height) by the nearest pixel, in the middle of (H, W) zeros."""
+    """Resize a plane to (width, height) by nearest pixels, and centre it in (H, W) zeros."""
     small = cv2.resize(plane, size_px, interpolation=cv2.INTER_NEAREST_EXACT)
     whole = np.zeros(shape, np.float32)
     unpad(whole, size_px[1], size_px[0])[:] = small
@@ -191,7 +194,7 @@ def on_grid(plane: FloatArray, size_px: tuple[int, int], shape: tuple[int, ...])
 
 
 def hidden_squares(valid: BoolArray) -> BoolArray:
-    """Return (H, W) the measured pixels of every fifth square, no two of which share a side."""
+    """Return an (H, W) mask of the measured pixels in every fifth square; these squares share no side."""
     side_px = max(1, round(valid.shape[1] / PATCHES_ACROSS))
     row, column = (np.arange(count) // side_px for count in valid.shape)
     return valid & ((row[:, None] + 2 * column) % 5 == 0)

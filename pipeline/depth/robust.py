@@ -19,7 +19,7 @@ def fit_line(x: FloatArray, y: FloatArray, rng: np.random.Generator) -> tuple[fl
     """Fit slope and intercept of y = a x + b with Tukey's biweight, iteratively reweighted.
 
     The start is least squares, or the best of 200 random pairs of points if more than 40 % of the points
-    are farther than 5 % of y from the least-squares line.
+    are farther than 5 % of y from the least-squares line. Of more than 40,000 points every k-th is used.
 
     Args:
         x: (N,) abscissas.
@@ -45,7 +45,7 @@ def fit_line(x: FloatArray, y: FloatArray, rng: np.random.Generator) -> tuple[fl
 
 
 def weighted_line(x: FloatArray, y: FloatArray, weights: FloatArray) -> tuple[float, float]:
-    """Fit a line by weighted least squares; it is horizontal if all x are equal."""
+    """Fit slope and intercept by weighted least squares; the line is horizontal if all x are equal."""
     total = float(weights.sum())
     if not total > 0.0:
         return 0.0, float(np.median(y))
@@ -62,7 +62,9 @@ def weighted_line(x: FloatArray, y: FloatArray, weights: FloatArray) -> tuple[fl
 
 
 def best_random_line(x: FloatArray, y: FloatArray, rng: np.random.Generator) -> tuple[float, float]:
-    """Return, of 200 lines through two random points, the rising one with the most points within 5 % of y."""
+    """Return slope and intercept of the rising line with the most points within 5 % of y, of 200 lines
+    through two random points; a line that does not rise if none does.
+    """
     first, second = rng.integers(len(x), size=(2, DRAWS))
     run = x[second] - x[first]
     slopes = np.where(run != 0.0, (y[second] - y[first]) / np.where(run != 0.0, run, 1.0), -1.0)
@@ -75,7 +77,7 @@ def best_random_line(x: FloatArray, y: FloatArray, rng: np.random.Generator) -> 
 
 @compiled
 def _points_near(slopes: FloatArray, intercepts: FloatArray, x: FloatArray, y: FloatArray) -> IntArray:
-    """Count, for each of (L,) lines, the (N,) points within ``INLIER_BAND`` of it."""
+    """Count, for each of (L,) lines, the (N,) points within ``INLIER_BAND`` times y of it."""
     counts = np.zeros(len(slopes), np.int64)
     for line in range(len(slopes)):
         for i in range(len(x)):

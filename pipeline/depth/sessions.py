@@ -23,7 +23,11 @@ MOST_BYTES = 1_500_000_000
 
 
 def modified_ns(model_path: Path) -> int:
-    """Return the time of the last change of a network's file, nanoseconds."""
+    """Return the time of the last change of a network's file, nanoseconds.
+
+    Raises:
+        InputError: there is no such file.
+    """
     if not model_path.is_file():
         raise InputError(f"There is no depth network at {model_path}: name an ONNX file, or none at all.")
     return model_path.stat().st_mtime_ns
@@ -31,7 +35,10 @@ def modified_ns(model_path: Path) -> int:
 
 @lru_cache(maxsize=2)
 def open_session(model_path: Path, modified_ns: int) -> onnxruntime.InferenceSession:
-    """Open a session with two non-spinning threads; the last two are cached: opening is as slow as a run.
+    """Open a session with two non-spinning threads.
+
+    The last two sessions are cached, because opening one takes as long as a run. ``modified_ns`` is the time
+    of the file's last change: a changed file is opened again.
 
     Raises:
         InputError: the file is no ONNX network, or needs too much time or memory.

@@ -19,11 +19,11 @@ from pipeline.types import BoolArray, ByteArray, FloatArray
 
 GRID_WIDTH_PX = 160
 DISTANCES = (1, 4, 16)
-"""Distances, in grid cells, of the pixels of a difference; long ones carry depth across wide holes."""
+"""Distances, in grid cells, between the cells of a difference; long ones carry depth across wide holes."""
 CHANNELS_IN = 8
 CHANNELS_OUT = 2 + 4 * len(DISTANCES)
 MULTIPLE = 16
-"""The network's sides are multiples of this; padding is unknown and black."""
+"""Both sides of the network's input are multiples of this; padding has unknown depth and is mid-grey."""
 SLOPE_CLIP = 0.05
 SLOPE_SIGMA = 2.0
 LARGEST = 1.5
@@ -49,7 +49,7 @@ class Grid:
 def coarse(z_m: FloatArray, known: BoolArray, rgb: ByteArray) -> Grid:
     """Reduce colours to means over grid cells, and depth to the measured pixel nearest to a cell's centre.
 
-    Image sizes that are no multiple of the cell are padded with unknown depth.
+    Images whose sides are no multiples of the cell are padded with unknown depth.
     """
     rows, columns = known.shape
     step = cell_px(columns)
@@ -175,12 +175,12 @@ def _balance(grid: Grid, guess: FloatArray, predicted: FloatArray) -> tuple[csr_
 
 
 def _stiffness(log_scale: FloatArray) -> FloatArray:
-    """Return the inverse variance of a Laplace distribution."""
+    """Return the inverse variance of Laplace distributions, by their log scales cut to ``LOG_SCALES``."""
     return 0.5 * np.exp(-2.0 * np.clip(log_scale, *LOG_SCALES))
 
 
 def _ends(rows: int, columns: int) -> Iterator[tuple[tuple[slice, ...], tuple[slice, ...]]]:
-    """Yield the areas of the differences' near and far ends, for each distance along x, then y."""
+    """Yield the slices of the near and far cells of all differences, for each distance along x, then y."""
     for distance in DISTANCES:
         yield np.s_[:, : max(0, columns - distance)], np.s_[:, distance:]
         yield np.s_[: max(0, rows - distance), :], np.s_[distance:, :]

@@ -39,7 +39,7 @@ def raw_bytes(delivery: Delivery) -> int:
 def write_delivery_folder(delivery: Delivery, metrics: dict[str, Any], preset: str, folder: Path) -> None:
     """Write everything but the report into ``folder``, each file whole or not at all.
 
-    ``clear_run_folder`` comes first if the folder may have an earlier run. Writes what ``packetmesh
+    Call ``clear_run_folder`` first if the folder may contain an earlier run. Writes what ``packetmesh
     reconstruct`` writes, for all that arrived; if that was too little for a surface, only config.json,
     metrics.json and moments.csv.
 

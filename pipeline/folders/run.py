@@ -33,7 +33,9 @@ MESH_FILES = ("surface_before.ply", "surface_after.ply", "surface.glb")
 
 
 def clear_run_folder(folder: Path) -> None:
-    """Delete what an earlier run wrote, complete or interrupted, the metrics first.
+    """Delete the files of an earlier run, complete or interrupted, the metrics first.
+
+    These are the files of ``write_run_folder`` and the keyframes; reports, baselines and moments.csv stay.
 
     Raises:
         InputError: the folder cannot be written.
@@ -56,8 +58,8 @@ def write_run_folder(
 ) -> list[Path]:
     """Write everything but the report and keyframes into ``folder``, each file whole or not at all.
 
-    ``clear_run_folder`` comes first if the folder may have an earlier run. The metrics are written last: if
-    they exist, all files exist and belong to one run. A surface without triangles, if the ball rests
+    Call ``clear_run_folder`` first if the folder may contain an earlier run. The metrics are written last: if
+    they exist, all these files exist and belong to one run. A surface without triangles, if the ball rests
     nowhere, gets no mesh file.
 
     Args:

@@ -42,7 +42,7 @@ def write_trajectory(folder: Path, walk: Walk) -> list[Path]:
 
 
 def walk_metrics(walk: Walk, elapsed_s: float) -> dict[str, Any]:
-    """Return the numbers of a recording: counts of frames, metres, frames a second.
+    """Return the numbers of a recording: counts, lengths in metres, frames per second.
 
     Args:
         walk: the recording.

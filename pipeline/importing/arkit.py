@@ -22,7 +22,7 @@ from pipeline.io.intrinsics import check_camera
 from pipeline.types import CameraIntrinsics, FloatArray
 
 Y_DOWN = np.diag([1.0, -1.0, -1.0, 1.0])
-"""From camera axes with z forward and y down to ARKit's, with z backward and y up."""
+"""(4, 4) transform from camera axes with z forward, y down to ARKit's, with z backward and y up."""
 POLYCAM_HIGHEST = 255
 """Value of high confidence in Polycam's images; low is 0, medium 127 by its documents and 54 in its files."""
 
@@ -33,7 +33,9 @@ def is_polycam(folder: Path) -> bool:
 
 
 def read_polycam(folder: Path, intrinsics: Path | None) -> Sequence:
-    """Read the keyframes of Polycam's raw data, corrected if they are; depth in millimetres.
+    """Read the keyframes of Polycam's raw data; depth in millimetres.
+
+    The corrected images and cameras are read if the folder has both.
 
     Raises:
         InputError: no keyframe has a photograph, a camera and depth, or a camera has another form.
@@ -144,7 +146,7 @@ def read_scanner_app(folder: Path, intrinsics: Path | None) -> Sequence:
 def _scanner_app_camera(
     file: Path, size_px: tuple[int, int]
 ) -> tuple[CameraIntrinsics, FloatArray, float | None]:
-    """Read the camera of a frame, its (4, 4) T_world_camera in metres, and its time if it has one."""
+    """Read the camera of a frame, its (4, 4) T_world_camera, metres, and its time, seconds, or None."""
     values: Mapping[str, Any] = read_json(file, "frame of 3D Scanner App")
     try:
         matrix = np.array(values["intrinsics"], np.float64).reshape(3, 3)

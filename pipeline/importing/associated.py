@@ -33,7 +33,7 @@ def read_associated(folder: Path, intrinsics: Path | None) -> Sequence:
     """Read the pairs of colour and depth that a list names, with 5000 units in a metre.
 
     Raises:
-        InputError: a line is not a time and a file, twice, or the files do not exist.
+        InputError: a line is not a time and a file, twice; no files exist; or the camera has another size.
     """
     file = _list_in(folder)
     assert file is not None
@@ -86,7 +86,7 @@ def _is_depth(path: Path) -> bool:
 
 
 def _time_of_color(row: tuple[float, list[str]], depth: int) -> float:
-    """Return the time of a line's colour image: the first or the third word."""
+    """Return the time of a line's colour image, seconds; it is the second image if ``depth`` is 0."""
     first_s, words = row
     if depth == 1:
         return first_s
@@ -97,7 +97,7 @@ def _time_of_color(row: tuple[float, list[str]], depth: int) -> float:
 
 
 def _trajectory(folder: Path) -> tuple[Path | None, tuple[str, ...]]:
-    """Return the file of the poses, and a note if several could be it."""
+    """Return the file of the poses, None without one, and a note if there are several."""
     files = list(dict.fromkeys(path for name in _TRAJECTORIES for path in sorted(folder.glob(name))))
     if len(files) < 2:
         return next(iter(files), None), ()

@@ -28,14 +28,21 @@ class BagNodes:
     candidates: int
     """Number of colour images of the first camera."""
     units_per_metre: float
+    """Depth units per metre of the last node's depth image."""
     notes: tuple[str, ...]
 
 
 def iterate_bag(path: Path, frames: int, depth_scale: float | None) -> Generator[Progress, None, BagNodes]:
     """Read several cameras' images of one moment, or ``frames`` evenly spread moments of a single camera.
 
+    Args:
+        path: the bag's file or folder.
+        frames: number of moments of a single camera.
+        depth_scale: depth units per metre; None takes those of the SDK or of the images' encoding.
+
     Raises:
-        InputError: the bag is unreadable, lacks colour, depth or camera_info, or has no images of one time.
+        InputError: the bag is unreadable, lacks colour, depth or camera_info, or has no images of one time;
+            NoDepthError if a chosen image has no depth.
     """
     with opened_bag(path) as reader:
         scanned = yield from iterate_scan(reader)
@@ -61,7 +68,7 @@ def iterate_bag(path: Path, frames: int, depth_scale: float | None) -> Generator
 
 
 def _poses(transforms: Transforms, frames: list[str]) -> tuple[list[FloatArray | None], tuple[str, ...]]:
-    """Return the (4, 4) T_world_camera of the cameras by their frames, or None for all and the reason."""
+    """Return the (4, 4) T_world_camera, metres, of cameras by frame, or None for all and the reason."""
     unknown: list[FloatArray | None] = [None] * len(frames)
     if len(frames) == 1:
         return unknown, ("Moving transforms are not read; reconstruct looks for their poses",)

@@ -31,11 +31,11 @@ class FoundCamera:
     """A sentence with a remedy; empty if there is a camera."""
     notes: tuple[str, ...] = ()
     by_name: bool = True
-    """Whether the camera_info has the usual name, rather than only the frame of the images."""
+    """Whether the camera_info was found by its name, not only by the frame of the images."""
 
 
 def sdk_stream(topic: str) -> str | None:
-    """Return the stream of an image topic of the RealSense SDK, such as /device_0/sensor_1/Color_0."""
+    """Return the RealSense SDK's stream of an image topic, such as /device_0/sensor_1/Color_0; else None."""
     found = _SDK.match(topic)
     return found[1] if found else None
 
@@ -83,14 +83,14 @@ def common_parts(first: str, second: str) -> int:
 def camera_in(
     message: Any, topic: str, size_px: tuple[int, int], rectified: bool
 ) -> tuple[CameraIntrinsics, tuple[str, ...]]:
-    """Return the camera of images from a CameraInfo, and notes; its field names are capitals in ROS 1.
+    """Return the camera of images from a CameraInfo of ROS 1 (fields D, K, P) or ROS 2 (d, k, p), and notes.
 
     Rectified images have the camera P and no distortion, others K and D. The camera is fitted to the images'
     size: by its binning, by its region of interest, or, with a note, in proportion.
 
     Args:
         message: the CameraInfo.
-        topic: its name.
+        topic: name of its topic.
         size_px: width and height of the images.
         rectified: whether the images are rectified.
 
@@ -159,7 +159,11 @@ def _names(topic: str) -> list[str]:
 def _of_images(
     whole: CameraIntrinsics, message: Any, topic: str, size_px: tuple[int, int]
 ) -> tuple[CameraIntrinsics, tuple[str, ...]]:
-    """Return the camera of images of a size, from that of the whole sensor, and notes."""
+    """Return the camera of images of ``size_px``, from the camera of the whole sensor, and notes.
+
+    Raises:
+        InputError: neither binning, nor the region of interest, nor resizing in proportion gives this size.
+    """
     if size_px == (whole.width_px, whole.height_px):
         return whole, ()
     roi, bins = message.roi, (max(1, message.binning_x), max(1, message.binning_y))
@@ -186,7 +190,7 @@ def _of_images(
 
 
 def _binned(camera: CameraIntrinsics, bins: tuple[int, int]) -> CameraIntrinsics:
-    """Return the camera of images whose pixels are so many columns wide and rows high (SPEC 1.1: centres)."""
+    """Return the camera after binning of ``bins`` columns and rows; pixel centres are integers (SPEC 1.1)."""
     matrix = camera.matrix.copy()
     matrix[[0, 1], [0, 1]] /= bins
     matrix[:2, 2] = (matrix[:2, 2] + 0.5) / bins - 0.5

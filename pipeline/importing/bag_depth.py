@@ -26,11 +26,11 @@ class BagScale:
 
     topic: str
     units_per_metre: float | None
-    """None takes that of the images' encoding."""
+    """Depth units per metre; None takes those of the images' encoding."""
 
     @classmethod
     def of(cls, reader: BagReader, topic: str, given: float | None) -> BagScale:
-        """Return the scale that was given, or else that which the RealSense SDK recorded."""
+        """Return the scale that the user gave, or else the one that the RealSense SDK recorded, if any."""
         return cls(topic, given or sdk_units_per_metre(reader, topic))
 
     def read(self, message: Any) -> ReadDepth:
@@ -49,7 +49,17 @@ class BagScale:
 def place_of_depth(
     color: Topic, depth: Topic, shape: tuple[int, ...], transforms: Transforms
 ) -> tuple[DepthCamera | None, tuple[str, ...]]:
-    """Return the depth camera, None if depth is on the colour image's pixels, and notes."""
+    """Return the depth camera, None if depth is on the colour image's pixels, and notes.
+
+    Args:
+        color: the colour topic.
+        depth: the depth topic.
+        shape: height and width of the depth images.
+        transforms: transforms of the bag.
+
+    Raises:
+        InputError: the depth camera or its place is unknown, or depth is not in proportion to colour.
+    """
     if sdk_stream(depth.name):
         T_color_depth, notes = transforms.between_streams(color.name, depth.name)
         if depth.found.camera is None:
@@ -73,7 +83,11 @@ def place_of_depth(
 def _in_one_frame(
     color: Topic, depth: Topic, shape: tuple[int, ...]
 ) -> tuple[DepthCamera | None, tuple[str, ...]]:
-    """Return the camera of depth in the colour image's frame: its own camera_info's, or the same view's."""
+    """Return the camera of depth in the colour images' frame, and notes.
+
+    It is that of its own camera_info, or the colour camera, resized; None if depth is on the
+    colour image's pixels.
+    """
     own = depth.found.camera if depth.found.by_name else None
     if own is not None and not alike(own, color.camera):
         note = (

@@ -15,9 +15,9 @@ from pipeline.types import BoolArray, FloatArray
 TRANSFORMS, ODOMETRY = "tf2_msgs/msg/TFMessage", "nav_msgs/msg/Odometry"
 LONGEST_GAP_S, BEYOND_S = 1.0, 0.05
 """Longest time between two samples that are interpolated, and longest time before the first and after the
-last one at which these still count."""
+last sample at which this sample is still used."""
 _SAME = 1e-6
-"""Largest difference of the numbers of a transform that does not change."""
+"""Largest difference between the samples of a constant transform, metres or quaternion units."""
 _COLUMNS = 9
 
 
@@ -28,9 +28,9 @@ class TransformLink:
     parent: str
     child: str
     is_static: bool
-    """Whether it came as a static transform."""
+    """Whether it was in the topic tf_static."""
     samples: array[float] = field(default_factory=lambda: array("d"), compare=False)
-    """Time in the header and in the bag, seconds, then position, metres, and quaternion (x, y, z, w)."""
+    """Nine numbers a sample: time in the header and in the bag, s, position, m, quaternion (x, y, z, w)."""
 
     @property
     def table(self) -> FloatArray:
@@ -39,7 +39,7 @@ class TransformLink:
 
     @property
     def is_constant(self) -> bool:
-        """Whether it does not change."""
+        """Whether it is static or all its samples are equal."""
         table = self.table
         return self.is_static or bool((np.ptp(table[:, 2:], axis=0) <= _SAME).all())
 
@@ -85,7 +85,7 @@ class Links:
         """Links from odometry by topic."""
 
     def add(self, message: Any, msgtype: str, topic: str, at_ns: int) -> None:
-        """Add the transforms of a TFMessage or Odometry; those without a rotation are left out."""
+        """Add the transforms of a message that came into the bag at ``at_ns``; invalid ones are left out."""
         if msgtype == ODOMETRY:
             parent, child = message.header.frame_id.lstrip("/"), message.child_frame_id.lstrip("/")
             if child:
@@ -112,7 +112,7 @@ class Links:
 
 
 def _sample(stamp: Any, at_ns: int, position: Any, rotation: Any) -> tuple[float, ...]:
-    """Return the numbers of a sample; none if they are no pose."""
+    """Return the nine numbers of a sample; empty if one is not finite or the quaternion is near 0."""
     values = (position.x, position.y, position.z, rotation.x, rotation.y, rotation.z, rotation.w)
     if not np.isfinite(values).all() or np.linalg.norm(values[3:]) < 0.5:
         return ()

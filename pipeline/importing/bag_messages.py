@@ -1,4 +1,4 @@
-"""Conversion of ROS messages to images, cameras and transforms."""
+"""Conversion of ROS messages to images and transforms."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _COMPRESSED_DEPTH = "compressedDepth"
 _BRIGHTNESS = re.compile(
     r"(?:^|[_/])(?:ir|infra\d?|infrared|confidence|amplitude|intensity|gr[ae]y|mono)(?:[_/]|$)"
 )
-"""Part of the names of topics such as /ir/image_raw, /kinect2/sd/image_ir and /tof/confidence_image."""
+"""Part of the names of topics with brightness: /ir/image_raw, /kinect2/sd/image_ir, /tof/confidence_image."""
 _PNG = b"\x89PNG\r\n\x1a\n"
 _PNG_HEADER_BYTES, _GREY_16 = 26, b"\x10\x00"
 """Size of a PNG up to its bit depth and colour type, and these two for one channel of 16 bits."""
@@ -61,7 +61,7 @@ def _is_png_of_16_bits(message: Any) -> bool:
 
 
 def stamp_s(raw: bytes, is_ros2: bool) -> float:
-    """Read the time from a message's header without deserialising the message.
+    """Read the time in seconds from a message's header without deserialising the message.
 
     It follows the sequence number in ROS 1, or four bytes that describe the encoding in ROS 2.
     """
@@ -105,8 +105,10 @@ def color_of(message: Any, topic: str) -> ByteArray:
 def depth_values_of(message: Any, topic: str) -> NDArray[Any]:
     """Return (H, W) values: integer millimetres of 16UC1, or floating-point metres of 32FC1 (REP 118).
 
+    The message must be one of depth (``is_depth``).
+
     Raises:
-        InputError: the encoding is unknown, or the image is damaged.
+        InputError: the image is damaged.
     """
     if hasattr(message, "format"):
         return _compressed_depth(message, topic)

@@ -1,4 +1,4 @@
-"""Opened bags: connections, and messages in order of time, of ROS and of Foxglove."""
+"""Readers of bags of ROS and of Foxglove: their connections, and their messages in order of time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pipeline.importing.stored import is_file
 
 SUFFIXES = (".bag", ".db3", ".mcap")
 _MAGIC, _PROFILE_AT = b"\x89MCAP0\r\n", 17
-"""Begin of an MCAP file, and the offset of its profile: after the header's opcode and length."""
+"""First bytes of an MCAP file, and the offset of its profile: after the header's opcode and length."""
 _ROS2 = struct.pack("<I", 4) + b"ros2"
 
 
@@ -42,7 +42,7 @@ class BagReader(Protocol):
         ...
 
     def deserialize(self, raw: Any, msgtype: str) -> Any:
-        """Return the message in a message's data."""
+        """Decode the data of a message."""
         ...
 
     def stamp_s(self, raw: Any) -> float:

@@ -17,19 +17,19 @@ from pipeline.importing.bag_topics import connections_of
 from pipeline.types import IntArray
 
 _SKIPPED = 16
-"""Most messages that are read past, rather than looked up by their time."""
+"""Most messages that are skipped by reading on; farther messages are looked up by their time."""
 
 
 class BagStream:
     """Messages of an image topic by their index; reading on is fast. Threads may share it."""
 
     def __init__(self, path: Path, topic: str, recorded_ns: IntArray) -> None:
-        """Keep where the messages are; the bag is opened with the first one.
+        """Store the times of the messages; the bag is opened when the first one is read.
 
         Args:
             path: the bag.
             topic: name of the image topic.
-            recorded_ns: (N,) times at which its messages came into the bag.
+            recorded_ns: (N,) times at which its messages came into the bag, ns.
         """
         self.topic = topic
         self._path, self._recorded_ns = path, recorded_ns
@@ -37,7 +37,7 @@ class BagStream:
         weakref.finalize(self, self._stack.close)
         self._reader: BagReader | None = None
         self._ahead: Iterator[tuple[int, tuple[Any, int, Any]]] = iter(())
-        """Messages that follow, with their indices."""
+        """The messages that are read next, with their indices."""
         self._next = -1
         """Index of the first of these; -1 if there are none."""
 
@@ -45,7 +45,7 @@ class BagStream:
         """Read a message by its index.
 
         Raises:
-            InputError: the bag is damaged there.
+            InputError: the bag cannot be opened, or is damaged there.
         """
         with self._lock, readable(self._path):
             if not 0 <= self._next <= index <= self._next + _SKIPPED:
@@ -60,7 +60,7 @@ class BagStream:
         raise InputError(f"The bag {self._path} has lost an image of {self.topic}; try to record again")
 
     def _look_up(self, index: int) -> None:
-        """Begin at the time of a message."""
+        """Start reading at the time of a message."""
         if self._reader is None:
             self._reader = enter_bag(self._path, self._stack)
         begin_ns = int(self._recorded_ns[index])

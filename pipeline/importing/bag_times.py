@@ -32,10 +32,10 @@ class Timed(Protocol):
 
 
 def times_of(topics: Sequence[Timed]) -> tuple[list[FloatArray], tuple[str, ...]]:
-    """Return (N,) times of the messages of each topic, and a note.
+    """Return (N,) times of the messages of each topic, seconds, and a note if headers lack them.
 
-    They are those in the headers, or, if a topic has none or only one for all its messages, the times at
-    which the messages of all topics came into the bag.
+    They are the times in the headers. If one header has no time, or all headers of a topic have the same
+    time, they are the times at which the messages of all topics came into the bag.
     """
     unstamped = [topic for topic in topics if not _stamped(topic.stamps_s)]
     if not unstamped:
@@ -56,7 +56,7 @@ def _stamped(stamps_s: FloatArray) -> bool:
 
 
 def moments_of(path: Path, times_s: Sequence[FloatArray], frames: int, one_camera: bool) -> IntArray:
-    """Return (moments, topics) indices of the messages of each chosen moment; none is in two moments.
+    """Return (moments, topics) indices of the messages of each chosen moment; no message is in two moments.
 
     Args:
         path: the bag.
@@ -94,10 +94,12 @@ def all_moments(path: Path, times_s: Sequence[FloatArray]) -> IntArray:
 
 
 def _together(path: Path, times_s: Sequence[FloatArray]) -> tuple[IntArray, FloatArray, IntArray]:
-    """Return (N, topics) indices of each topic's nearest messages, their times, and which are of one moment.
+    """Return (N, topics) indices of the messages nearest to those of the first topic, and their times.
+
+    The times are in seconds. Also returns the indices of the rows whose messages are of one moment.
 
     Raises:
-        InputError: none are.
+        InputError: there is no such row.
     """
     nearest = np.stack([_nearest(own_s, times_s[0]) for own_s in times_s], axis=1)
     chosen_s = np.stack([own_s[at] for own_s, at in zip(times_s, nearest.T, strict=True)], axis=1)
@@ -112,7 +114,7 @@ def _together(path: Path, times_s: Sequence[FloatArray]) -> tuple[IntArray, Floa
 
 
 def _apart(chosen_s: FloatArray, together: IntArray) -> IntArray:
-    """Return the moments that share no time of any topic, the closest messages first kept, in order."""
+    """Return the moments, ascending, so that no two share a message; those with closer messages are kept."""
     taken: set[tuple[int, float]] = set()
     kept = []
     for moment in together[np.argsort(np.ptp(chosen_s[together], axis=1), kind="stable")]:
@@ -124,7 +126,7 @@ def _apart(chosen_s: FloatArray, together: IntArray) -> IntArray:
 
 
 def _nearest(times_s: FloatArray, wanted_s: FloatArray) -> IntArray:
-    """Return the (M,) indices of the times nearest to (M,) wanted times; the earlier one of two as near."""
+    """Return the (M,) indices of the times nearest to (M,) other times; the earlier of two equally near."""
     order = np.argsort(times_s, kind="stable")
     ascending = times_s[order]
     after = np.searchsorted(ascending, wanted_s).clip(1, max(1, len(ascending) - 1))

@@ -1,4 +1,4 @@
-"""Image topics of a bag: their cameras and times, and which depth belongs to which colour; transforms."""
+"""Image topics of a bag with their cameras and times, pairs of colour and depth topics, and transforms."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from pipeline.kernels.geometry import scaled_to
 from pipeline.types import MAX_NODES, CameraIntrinsics, FloatArray, IntArray
 
 _RESIZED_WITHIN_PX = 1.0
-"""Drivers do not agree on where the first pixel's centre goes."""
+"""Tolerance for the matrix of a resized camera: drivers differ in where the first pixel's centre is."""
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 
 
@@ -40,7 +40,7 @@ class Topic:
 
     @property
     def camera(self) -> CameraIntrinsics:
-        """The camera, of a topic that has one."""
+        """The camera; the topic must have one."""
         assert self.found.camera is not None
         return self.found.camera
 
@@ -55,12 +55,12 @@ class Scanned:
     """Depth topics, sorted by name."""
     transforms: Transforms
     notes: list[str]
-    """A sentence on each other image topic."""
+    """A sentence on each image topic that is left out because it has brightness."""
 
 
 @dataclass(slots=True)
 class _Seen:
-    """Messages of one image topic."""
+    """First message and message times of one image topic."""
 
     first: Any
     stamps_s: array[float] = field(default_factory=lambda: array("d"))
@@ -68,7 +68,7 @@ class _Seen:
 
 
 def iterate_scan(reader: BagReader) -> Generator[Progress, None, Scanned]:
-    """Read a bag once: times of all images, their cameras, and transforms. No image is kept."""
+    """Read the times and cameras of all images of a bag, and its transforms; one image a topic is kept."""
     wanted = [own for own in reader.connections if own.msgtype in (*_IMAGES, TRANSFORMS, ODOMETRY)]
     images: dict[str, _Seen] = {}
     links = Links()
@@ -105,7 +105,7 @@ def pairs_of(
 ) -> tuple[list[tuple[Topic, Topic]], list[str]]:
     """Pair each depth topic with the colour topic of its frame, or else of the most similar name.
 
-    Every colour topic is used once. Also returns a sentence for each topic that is left out.
+    Every colour topic is used at most once. Also returns a sentence for each topic that is left out.
 
     Raises:
         InputError: there is no colour, no depth, or no camera of the colour images.
@@ -147,7 +147,7 @@ def pairs_of(
 def of_separate_cameras(
     pairs: list[tuple[Topic, Topic]],
 ) -> tuple[list[tuple[Topic, Topic]], list[str]]:
-    """Return the pairs without those of a camera that another pair has in more pixels, and notes on them."""
+    """Return the pairs without those whose camera another pair has in more pixels, and notes on these."""
     largest = sorted(pairs, key=lambda pair: -pair[0].camera.width_px)
     kept: list[tuple[Topic, Topic]] = []
     notes = []
@@ -169,7 +169,11 @@ def _is_resized(small: Topic, large: Topic) -> bool:
 
 
 def message_of(reader: BagReader, name: str, recorded_ns: IntArray, index: int) -> Any:
-    """Return the message of an image topic with an index, in the order of recording."""
+    """Return the message of an image topic by its index in the order of recording.
+
+    Raises:
+        InputError: the bag does not have it.
+    """
     at_ns = int(recorded_ns[index])
     before = int((recorded_ns[:index] == at_ns).sum())
     for connection, _, raw in reader.messages(connections_of(reader, name), at_ns, at_ns + 1):

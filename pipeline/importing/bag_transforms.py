@@ -1,4 +1,4 @@
-"""Transforms between the frames of a bag, and what the RealSense SDK records in place of them.
+"""Transforms between the frames of a bag, and between the streams of the RealSense SDK.
 
 The SDK's topics are those of librealsense's ``src/media/ros/ros_file_format.h``.
 """
@@ -28,7 +28,7 @@ class PosesOverTime:
     known: BoolArray
     """(N,) whether each is known."""
     source: str
-    """Where they are from."""
+    """Description of the messages that they are from, for a note."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class Transforms:
     constant: Mapping[str, Mapping[str, FloatArray]]
     """(4, 4) T_a_b, metres, by the frames a and b that constant transforms link."""
     parents: Mapping[str, str]
-    """Parents by constant transforms."""
+    """Parent of each frame in a constant transform."""
     streams: Mapping[str, FloatArray]
     """(4, 4) T_stream_reference, metres, by streams of the RealSense SDK."""
 
@@ -49,14 +49,17 @@ class Transforms:
         return np.eye(4) if frame == other else self.constant.get(frame, {}).get(other)
 
     def poses(self, frames: Sequence[str]) -> list[FloatArray | None]:
-        """Return the (4, 4) T_world_frame of frames; the world is the topmost ancestor of the first."""
+        """Return the (4, 4) T_world_frame, metres, of each frame; None if no constant transforms link it.
+
+        The world is the topmost ancestor of the first frame.
+        """
         root = _root(frames[0], self.parents)
         return [self.constant.get(root, {}).get(frame) for frame in frames]
 
     def over_time(self, frame: str, times_s: FloatArray, in_bag: bool) -> PosesOverTime | None:
         """Return a frame's poses in the world; None if nothing moves it.
 
-        The world is the frame's topmost ancestor, or else that of odometry.
+        The world is the frame's topmost ancestor, or else the parent frame of the odometry.
 
         Args:
             frame: name of the frame.
@@ -79,7 +82,10 @@ class Transforms:
         return None
 
     def between_streams(self, color: str, depth: str) -> tuple[FloatArray, tuple[str, ...]]:
-        """Return the (4, 4) T_color_depth of two image topics of the RealSense SDK, and a note if assumed."""
+        """Return the (4, 4) T_color_depth, metres, of two image topics of the RealSense SDK.
+
+        If the bag does not have it, the identity is assumed, with a note.
+        """
         streams = [sdk_stream(color), sdk_stream(depth)]
         missing = [stream for stream in streams if stream not in self.streams]
         if missing:

@@ -31,15 +31,16 @@ def camera_of(
     """Return the camera of a recording, and a note if it had to be assumed.
 
     Args:
-        folder: folder of the recording; JSON and YAML files in it, then \\*intrinsic\\*.txt and
-            camera_matrix.csv in it, then \\*intrinsic\\*.txt above are tried.
+        folder: folder of the recording. These are tried in it and its ``_FOLDERS``: JSON and YAML files,
+            first those for images of this size, then \\*intrinsic\\*.txt and camera_matrix.csv; then
+            \\*intrinsic\\*.txt in the folder above.
         color: one of the colour images.
         given: intrinsics file given by the user, which is preferred.
-        default: camera to assume if there is no such file.
+        default: camera to assume if there is no such file; None raises an error then.
         default_name: description of the default, for the note.
 
     Raises:
-        InputError: no camera is found, or it is for images of another size.
+        InputError: no camera is found, files have different ones, or it is for images of another size.
     """
     height_px, width_px = read_color_of(color).shape[:2]
     size_px = width_px, height_px
@@ -65,7 +66,7 @@ def camera_of(
 
 
 def _file_in(folder: Path, size_px: tuple[int, int]) -> tuple[Path | None, list[str]]:
-    """Return the intrinsics file of a recording, and the names of files that may have been meant as such.
+    """Return the intrinsics file of a recording, or None, and the names of files without a camera.
 
     Raises:
         InputError: several files hold different cameras for images of this size.
@@ -105,7 +106,11 @@ def _of_color(paths: Iterable[Path]) -> list[Path]:
 
 
 def _only(folder: Path, fitting: dict[Path, CameraIntrinsics]) -> Path:
-    """Return the file of the colour camera, if it is clear which one that is."""
+    """Return the file of the colour camera.
+
+    Raises:
+        InputError: several files hold different cameras.
+    """
     paths = _of_color(fitting)
     first = fitting[paths[0]]
     if any(not alike(fitting[path], first) for path in paths[1:]):

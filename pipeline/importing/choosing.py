@@ -10,7 +10,7 @@ from pipeline.kernels.straight_view import bends_strongly, straight_view
 from pipeline.types import CameraIntrinsics, FloatArray
 
 LEAST_OVERLAP = 0.5
-"""Share of a chosen frame that another chosen frame also sees; registration needs about half."""
+"""Least share of a chosen frame that another chosen frame also sees; registration needs about half."""
 MOST_COMPARED = 150
 """Largest number of frames, spread over the recording, that are compared; the work grows with its square."""
 _GRID_PX = 12
@@ -43,7 +43,7 @@ def choose(sequence: Sequence, count: int, typical_depth_m: float) -> tuple[int,
 
 
 def apart_but_overlapping(shared: FloatArray, count: int) -> list[int]:
-    """Choose at most ``count`` views; fewer if no other view overlaps with those chosen.
+    """Return the indices of at most ``count`` views; fewer if no other view overlaps with those chosen.
 
     Args:
         shared: (N, N) symmetric overlaps, 0 to 1.

@@ -35,7 +35,7 @@ def is_colmap(folder: Path) -> bool:
 
 
 def read_colmap(folder: Path, intrinsics: Path | None) -> Sequence:
-    """Read the registered images with depth; with ``intrinsics``, those of the camera that took most of them.
+    """Read the registered images with depth; with ``intrinsics``, only those of the most frequent camera.
 
     Depth is read from ``stereo/depth_maps``, in the model's unit, or from a depth sensor's images in
     ``depth/`` with the names of the photographs, which then determine the model's scale.
@@ -86,7 +86,11 @@ def read_colmap(folder: Path, intrinsics: Path | None) -> Sequence:
 
 
 def _with_depth(folder: Path, model: Model) -> list[tuple[ModelImage, Path, Path]]:
-    """Return the images whose photograph and depth exist, with both files."""
+    """Return the images whose photograph and depth exist, with both files.
+
+    Raises:
+        InputError: there is none.
+    """
     images, listed = model.images, model.files["images"].name
     photographed = [
         (image, color) for image in images if (color := _beside(folder, _IMAGE_FOLDERS, image.name, listed))
@@ -111,7 +115,7 @@ def _with_depth(folder: Path, model: Model) -> list[tuple[ModelImage, Path, Path
 
 
 def _no_camera(model: Model, camera: int) -> InputError:
-    """Return the error of a camera that an image has and that cannot be used."""
+    """Return the error for a camera that images use and that cannot be read."""
     file = model.files["cameras"]
     if camera not in model.others:
         listed = model.files["images"].name
@@ -149,7 +153,11 @@ def _metres_a_unit(
     cameras: dict[int, CameraIntrinsics],
     units_per_metre: float,
 ) -> float:
-    """Return the metres per unit of the model: median ratio of measured depth to depth of model points."""
+    """Return the metres per unit of the model: median ratio of measured depth to depth of model points.
+
+    Raises:
+        InputError: fewer than ``LEAST_POINTS`` points have measured depth.
+    """
     points = model.points()
     ratios = [np.empty(0)]
     for image, depth in frames[:: -(-len(frames) // 20)]:
@@ -183,7 +191,7 @@ def _model_folder(folder: Path, suffix: str) -> Path | None:
 
 
 def _beside(folder: Path, places: tuple[str, ...], name: str, listed: str) -> Path | None:
-    """Find a file that ``listed`` names in the first of several subfolders; None if none has it."""
+    """Return a file that ``listed`` names, in the first subfolder of ``places`` that has it; else None."""
     named_inside(folder, name, listed)
     return next((path for place in places if (path := folder / place / name).is_file()), None)
 

@@ -49,7 +49,7 @@ _IMAGE = struct.Struct("<I7dI")
 _FEATURE = np.dtype([("x", "<f8"), ("y", "<f8"), ("point", "<i8")])
 _POINT = struct.Struct("<Q3d3BdQ")
 _TRACK_BYTES = 8
-"""Bytes of each image in which a point is seen."""
+"""Bytes of one entry in the list of images that see a point."""
 
 
 class _File:

@@ -48,7 +48,7 @@ class ModelImage:
     T_camera_model: FloatArray
     """(4, 4), in the model's unit."""
     features: Callable[[], FloatArray]
-    """Returns (N, 3) column, row and id of the point of each feature; -1 is no point."""
+    """Returns (N, 3) column and row, COLMAP's pixels, and id of the point of each feature; -1 is no point."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ class Model:
 
 
 def files_of(folder: Path, suffix: str) -> dict[str, Path]:
-    """Return the files of a model, which may be missing."""
+    """Return the paths of a model's files, which need not exist, by what they hold."""
     return {name: folder / f"{name}{suffix}" for name in ("cameras", "images", "points3D")}
 
 

@@ -26,8 +26,8 @@ from pipeline.io.images import NoDepthError, ReadDepth
 from pipeline.types import DepthMap, FloatArray
 
 MEDIUM_WEIGHT = 0.25
-"""Factor of the map's weight of depth that is neither of the lowest nor of the highest confidence: twice the
-standard deviation. It is assumed, not measured; telephones state no deviation."""
+"""Factor of the weight in the map of depth with medium confidence, as if its standard deviation were twice as
+large. It is assumed, not measured, because telephones state no deviation."""
 _ROTATED_SHARE = 0.95
 
 
@@ -41,7 +41,7 @@ def depth_in(candidate: Candidate, sequence: Sequence) -> ReadDepth:
 
 
 def weighted_depth_in(candidate: Candidate, sequence: Sequence) -> tuple[ReadDepth, FloatArray | None]:
-    """Read a depth image as ``depth_in``, and the factor of its pixels' weights, as in ``DepthView.weight``.
+    """Read a depth image as ``depth_in``, and the factor of its weights as ``DepthView.weight`` has it.
 
     Raises:
         InputError: as ``depth_in``.
@@ -84,7 +84,7 @@ def _depth_in(image: AnyImage, sequence: Sequence) -> ReadDepth:
 
 
 def depth_of(name: str, values: NDArray[Any], units_per_metre: float, stated: bool) -> ReadDepth:
-    """Convert (H, W) values to metres, without depths that a rig's folder cannot store.
+    """Convert (H, W) values to metres; depths that a rig's folder cannot store (``FARTHEST_M``) become NaN.
 
     Args:
         name: name of the image, for the error.

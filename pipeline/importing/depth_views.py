@@ -20,7 +20,7 @@ from pipeline.types import ByteArray, CameraIntrinsics, DepthMap, DepthNoise, Fl
 KINECT = DepthNoise(s0_m=0.0012, s1_m=0.0015, p=2.0, q=1.0)
 """Noise that is assumed for every sensor: within a tenth of ``acquisition.depth_sigma_m`` from 1.5 to 4 m."""
 MOST_DAMAGED = 10
-"""Number of damaged depth images at the start of a recording at which it is refused."""
+"""A recording is refused if so many damaged depth images come before the first one with depth."""
 Read = TypeVar("Read")
 
 
@@ -94,13 +94,13 @@ def frame_of(
 
 
 def first_with_depth(reads: Iterable[Callable[[], Read]]) -> Read | None:
-    """Return the first depth image that has depth; None if none has. A few damaged ones are passed over.
+    """Return the first depth image that has depth; None if none has. A few damaged ones are skipped.
 
     Args:
-        reads: read the images of a recording, in order.
+        reads: functions that read the images of a recording, in order.
 
     Raises:
-        InputError: the first ``MOST_DAMAGED`` images that can have depth are damaged, or all of them.
+        InputError: ``MOST_DAMAGED`` damaged images come before it, or images are damaged and none has depth.
     """
     damaged: list[InputError] = []
     for read in reads:
@@ -118,7 +118,7 @@ def first_with_depth(reads: Iterable[Callable[[], Read]]) -> Read | None:
 
 
 def unreadable_note(unreadable: Mapping[int, str]) -> tuple[str, ...]:
-    """Return a sentence on depth images that could not be read, by their errors; none if all could."""
+    """Return a note on the depth images that could not be read, from their errors by frame, if any."""
     if not unreadable:
         return ()
     first = unreadable[min(unreadable)]

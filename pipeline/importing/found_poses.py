@@ -26,7 +26,7 @@ class FoundPoses:
     lost: int
     """Number of poses with infinite or undefined numbers, as recordings have where they lost track."""
     departure: float
-    """Largest departure from orthonormal of a rotation in use."""
+    """Largest departure from orthonormal (``departure``) of the rotations of ``T_world_camera`` as read."""
 
     @property
     def count(self) -> int:
@@ -76,7 +76,7 @@ def found_poses(matrices: Mapping[Any, FloatArray], unreadable: Iterable[str] = 
 
 
 def scanned_transform(path: Path) -> tuple[FloatArray, float]:
-    """Read a (4, 4) rigid transform that a recording has next to its images, and its departure from one.
+    """Read the (4, 4) rigid transform, metres, in a file of a recording, and its ``departure`` as read.
 
     Raises:
         InputError: the file holds no rigid transform.

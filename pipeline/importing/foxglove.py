@@ -1,4 +1,4 @@
-"""Foxglove's schemas as messages of ROS: images, cameras and transforms.
+"""Conversion of Foxglove's messages to those of ROS: images, cameras and transforms.
 
 Protocol buffers and JSON have the same fields (https://docs.foxglove.dev/docs/sdk/schemas).
 """
@@ -67,7 +67,7 @@ SCHEMAS: dict[str, tuple[str, Callable[[Any], SimpleNamespace]]] = {
     "foxglove.FrameTransform": (_TF, transform),
     "foxglove.FrameTransforms": (_TF, transforms),
 }
-"""The type of ROS, and the conversion to it, by the schema's name."""
+"""Type of the ROS message and the conversion to it, by the name of the schema."""
 
 
 def from_json(data: bytes) -> Any:
@@ -104,11 +104,11 @@ def _stamp(time: Any) -> SimpleNamespace:
 
 
 def _bytes(data: bytes | str) -> np.ndarray:
-    """Return bytes, which JSON holds in base64."""
+    """Return data as (N,) uint8; JSON holds it in base64."""
     return np.frombuffer(base64.b64decode(data) if isinstance(data, str) else data, np.uint8)
 
 
 def _numbers(values: Any, count: int) -> FloatArray:
-    """Return so many numbers; zeros if there are others."""
+    """Return (count,) numbers; zeros if there are more or fewer."""
     array = np.array(values, float).reshape(-1)
     return array if len(array) == count else np.zeros(count)

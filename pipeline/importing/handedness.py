@@ -17,12 +17,12 @@ from pipeline.types import CameraIntrinsics, FloatArray
 
 _MIRROR = np.diag([1.0, -1.0, 1.0, 1.0])
 _STEPS = (1, 2, 5, 10, 20, 50, 100)
-"""Numbers of frames between two that are compared."""
+"""Distances, in frames, between two frames that are compared."""
 _EVERY_PX = 8
 _WITHIN = 0.02
 """Share of the depth within which two frames agree."""
 _CLEARLY = 1.1
-"""Ratio of agreements from which one hand is taken for the other."""
+"""Ratio of agreeing points, with mirrored to those with plain poses, above which poses are mirrored."""
 
 
 def y_points_up(sequence: Sequence) -> bool:
@@ -44,7 +44,7 @@ def y_points_up(sequence: Sequence) -> bool:
 
 
 def mirrored_poses(sequence: Sequence, note: str) -> Sequence:
-    """Return the sequence with poses of a right-handed world and cameras whose y axis points down."""
+    """Return the sequence with poses of a right-handed world and cameras with y down, and with a note."""
     candidates = tuple(
         candidate
         if candidate.T_world_camera is None
@@ -64,7 +64,7 @@ def _relative(one: Candidate, other: Candidate) -> FloatArray | None:
 def _agreeing(
     own_m: FloatArray, other_m: FloatArray, T_other_own: FloatArray, camera: CameraIntrinsics
 ) -> int:
-    """Return the number of points of one depth image that the other sees at their depth."""
+    """Return the number of points of one depth image that agree with the depth of the other."""
     if own_m.shape != (camera.height_px, camera.width_px) or other_m.shape != own_m.shape:
         return 0
     step = slice(None, None, _EVERY_PX)

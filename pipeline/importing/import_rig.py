@@ -72,11 +72,12 @@ def iterate_import(
     """Import a few frames of another program's recording as a rig folder, completely or not at all.
 
     Args:
-        path: the recording's folder, or a folder with only this recording.
+        path: the recording's folder or file, a bag, or a folder with only this recording.
         out: the rig's folder, new or empty.
         frames: number of nodes, 1 to ``MAX_NODES``; there are fewer nodes if fewer frames overlap.
         depth_scale: depth units per metre; by default that of the kind of recording.
-        intrinsics: intrinsics file of the colour camera; by default the recording's, or those of its kind.
+        intrinsics: intrinsics file of the colour camera; by default the recording's, or those of its kind; a
+            bag takes none.
 
     Raises:
         InputError: the path is no usable recording, or the folder cannot be written.
@@ -137,7 +138,9 @@ def _from_bag(
 
 
 def _chosen(sequence: Sequence, frames: int) -> tuple[Sequence, tuple[int, ...], ReadDepth]:
-    """Choose frames; returns the sequence without frames that have no depth, their indices, and its middle.
+    """Choose frames with depth; returns the sequence, their indices in it, and the depth of its middle frame.
+
+    Frames that were tried and have no depth are removed from the sequence.
 
     Raises:
         InputError: no frame has depth, or one cannot be read.
@@ -163,7 +166,7 @@ def _chosen(sequence: Sequence, frames: int) -> tuple[Sequence, tuple[int, ...],
 
 
 def _same_view_notes(sequence: Sequence, node: NodeImages) -> tuple[str, ...]:
-    """Return a sentence if the depth camera is not the recording's own but the colour camera, resized."""
+    """Return a note if the depth camera of a node is the colour camera, resized, not the recording's own."""
     if sequence.depth_camera is not None or node.depth_camera is None:
         return ()
     return (same_view_note(node.camera, node.depth_camera),)

@@ -1,4 +1,4 @@
-"""All frames of a recording as a folder in TUM's form, which many programs for RGB-D images read."""
+"""Conversion of a recording to a folder in TUM's form, which many programs for RGB-D images read."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from pipeline.io.same_view import alike
 from pipeline.types import AnyPath, CameraIntrinsics, FloatArray, RgbdFrame
 
 FARTHEST_M = 65534 / UNITS_PER_METRE
-"""Largest depth of the form."""
+"""Largest depth that the form stores in 16 bits."""
 
 
 @dataclass(frozen=True, slots=True)
 class KeptReport:
-    """Result of keeping a recording."""
+    """Result of ``iterate_keep``."""
 
     kind: str
     folder: str
-    """The recording."""
+    """Path of the recording."""
     candidates: int
-    """Number of frames of the recording."""
+    """Number of frames of the opened recording, at most ``reading.MOST_FRAMES``."""
     frames: int
     """Number of frames that were written."""
     notes: tuple[str, ...]
@@ -42,7 +42,9 @@ class KeptReport:
 def iterate_keep(
     path: AnyPath, out: AnyPath, depth_scale: float | None = None, intrinsics: AnyPath | None = None
 ) -> Generator[Progress, None, KeptReport]:
-    """Write all frames of a recording in TUM's form, completely or not at all.
+    """Write the frames of a recording in TUM's form, completely or not at all.
+
+    Of more than ``reading.MOST_FRAMES`` frames every n-th is written; unreadable frames are left out.
 
     The folder gets ``rgb/``, ``depth/`` (registered to colour, 5000 units in a metre), ``rgb.txt``,
     ``depth.txt``, ``intrinsics.json`` and, if poses are known, ``groundtruth.txt``.
@@ -85,7 +87,7 @@ def iterate_keep(
 
 @dataclass(slots=True)
 class _Writer:
-    """A folder in TUM's form."""
+    """Writer of a folder in TUM's form."""
 
     folder: Path
     camera: CameraIntrinsics | None = None
@@ -93,7 +95,7 @@ class _Writer:
     """Number of depths that were left out."""
     lines: dict[str, list[str]] = field(default_factory=lambda: {"rgb": [], "depth": []})
     path: list[tuple[float, FloatArray]] = field(default_factory=list)
-    """Times and poses of the frames that have one."""
+    """Times, seconds, and (4, 4) poses, metres, of the frames that have a pose."""
 
     def write(self, frame: RgbdFrame, time_s: float) -> None:
         """Write the images of a frame, and keep its pose; depths beyond ``FARTHEST_M`` are written as 0.

@@ -127,7 +127,7 @@ def recognise(path: Path) -> tuple[Kind, Path]:
 
 
 def kind_of(path: Path) -> Kind | None:
-    """Return the kind of recording in a folder or file; None if it is none."""
+    """Return the kind of recording in a folder or file; None if it is of no known kind."""
     return next((kind for kind in KINDS if kind.recognised(path)), None)
 
 

@@ -31,19 +31,19 @@ from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
 
 CALIBRATION = "calibration.json"
 _DEPTH_TAG = "b16g"
-"""16 bits, the larger byte first."""
+"""FFmpeg's tag of 16-bit grey, big-endian."""
 _DEPTH_MODES = {
     (320, 288): (512, (96, 90)),
     (640, 576): (1024, (192, 180)),
     (512, 512): (512, (0, 0)),
     (1024, 1024): (1024, (0, 0)),
 }
-"""By size of the images: columns and rows of the whole sensor, and the first ones that the images have."""
+"""By width and height of the images: side of the square sensor, and its first column and row in them."""
 _RAW_COLORS = {"BGRA": 4.0, "NV12": 1.5, "YUY2": 2.0}
 """Bytes of a pixel by the tag of the colour track."""
 _MODEL = "CALIBRATION_LensDistortionModelBrownConrady"
 _CUT_S = 1.0
-"""A file that ends so long before its stated end is cut."""
+"""A file whose images end so long before its stated duration is cut off."""
 
 
 def read_kinect(file: Path, intrinsics: Path | None) -> Sequence:
@@ -147,7 +147,11 @@ def _calibration(
 
 
 def _color_camera(values: Mapping[str, Any], track: Track) -> CameraIntrinsics:
-    """Return the camera of a mode: all columns, and the middle rows of a sensor of 4 : 3."""
+    """Return the camera of a colour mode: images of all columns and the middle rows of a 4 : 3 sensor.
+
+    Raises:
+        ValueError: the sensor or the images have other proportions.
+    """
     cx, cy, fx, fy = _unit_lens(values)
     width_px, height_px = track.width_px, track.height_px
     rows = 0.75 * width_px
@@ -163,7 +167,11 @@ def _color_camera(values: Mapping[str, Any], track: Track) -> CameraIntrinsics:
 
 
 def _depth_camera(values: Mapping[str, Any], track: Track) -> CameraIntrinsics:
-    """Return the camera of a depth mode, told by the size of its images."""
+    """Return the camera of the depth mode with this size of images.
+
+    Raises:
+        ValueError: no mode has this size.
+    """
     size_px = track.width_px, track.height_px
     if size_px not in _DEPTH_MODES:
         raise ValueError(f"depth of {size_px[0]} x {size_px[1]}")
@@ -173,7 +181,7 @@ def _depth_camera(values: Mapping[str, Any], track: Track) -> CameraIntrinsics:
 
 
 def _unit_lens(values: Mapping[str, Any]) -> tuple[float, float, float, float]:
-    """Return cx, cy, fx and fy in units of the sensor's sides; pixels begin at their corners."""
+    """Return cx, cy, fx and fy as shares of the sensor's sides; (0, 0) is the corner of the first pixel."""
     if values["Intrinsics"]["ModelType"] != _MODEL:
         raise ValueError(values["Intrinsics"]["ModelType"])
     cx, cy, fx, fy = map(float, values["Intrinsics"]["ModelParameters"][:4])
@@ -183,7 +191,7 @@ def _unit_lens(values: Mapping[str, Any]) -> tuple[float, float, float, float]:
 def _camera(
     values: Mapping[str, Any], lens_px: tuple[float, float, float, float], track: Track
 ) -> CameraIntrinsics:
-    """Return a camera with fx, fy, cx and cy, which count pixels from their corners, and its distortion."""
+    """Return the camera of fx, fy, cx, cy, with (0, 0) at the first pixel's corner, and its distortion."""
     fx, fy, cx, cy = lens_px
     pinhole = CameraIntrinsics.pinhole(fx, fy, cx - 0.5, cy - 0.5, track.width_px, track.height_px)
     k1, k2, k3, k4, k5, k6, _, _, p2, p1 = map(float, values["Intrinsics"]["ModelParameters"][4:14])

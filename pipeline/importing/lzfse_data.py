@@ -13,7 +13,7 @@ _END, _COPY, _SHORT, _LONG = b"bvx$", b"bvx-", b"bvxn", b"bvx2"
 _HEADER_BYTES = 32
 """Smallest header of a long block."""
 _MOST_BYTES = 2 << 30
-"""Twice the bound on what 960 x 720 depths, Record3D's largest images, can need by their blocks."""
+"""Largest bound (``_sizes``) of data that is unpacked: twice that of Record3D's largest depth, 960 x 720."""
 _MOST_OF_A_MATCH = 315 + 2359
 """Bytes that a match of a long block gives at most: literals and copied bytes."""
 _MOST_OF_A_BYTE = 136
@@ -26,7 +26,7 @@ def stated_size(data: bytes) -> int:
 
 
 def unpack_lzfse(data: bytes) -> bytes:
-    """Return the unpacked data; none if it is damaged.
+    """Return the unpacked data; empty if it is damaged or may be too large.
 
     The decoder ignores the sizes that blocks state, so that a small file could fill the memory: data that
     could exceed ``_MOST_BYTES`` is not unpacked.
@@ -43,7 +43,7 @@ def unpack_lzfse(data: bytes) -> bytes:
 
 
 def _sizes(data: bytes) -> tuple[int, int]:
-    """Return the unpacked size that the blocks state, and the largest that they can have; 0 if damaged."""
+    """Return the unpacked size that the blocks state, and a bound on the real one, bytes; 0, 0 if damaged."""
     try:
         return _added_sizes(data)
     except struct.error:

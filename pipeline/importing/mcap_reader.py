@@ -19,7 +19,7 @@ from pipeline.importing.bag_messages import stamp_s
 from pipeline.importing.foxglove import SCHEMAS, from_json
 
 RECORD_LIMIT_BYTES = 1 << 30
-"""Largest record that is read; larger ones are damaged, or none of a camera's."""
+"""Largest record that is read; a larger one is damaged, or holds no image."""
 Decoder = Callable[[bytes], Any]
 
 
@@ -90,7 +90,7 @@ class McapReader:
                 yield by_channel[channel.id], message.log_time, raw
 
     def deserialize(self, raw: Raw, msgtype: str) -> Any:
-        """Return the message in a message's data."""
+        """Decode the data of a message."""
         return raw.decode(raw.data)
 
     def stamp_s(self, raw: Raw) -> float:

@@ -22,13 +22,13 @@ from pipeline.types import CameraIntrinsics, FloatArray
 _FILE = "transforms.json"
 _DEPTHS = ("depth_file_path", "depth_path")
 _CAMERA = ("camera_model", "fl_x", "fl_y", "cx", "cy", "w", "h", "k1", "k2", "p1", "p2", "k3", "k4")
-"""Keys of the camera, of the file or of a frame."""
+"""Keys of a camera in the file or in one of its frames."""
 _Y_DOWN = np.diag([1.0, -1.0, -1.0, 1.0])
-"""From camera axes with z forward and y down to OpenGL's, with z backward and y up."""
+"""(4, 4) transform from camera axes with z forward, y down to OpenGL's, with z backward and y up."""
 
 
 def is_nerfstudio(folder: Path) -> bool:
-    """Return whether a folder contains transforms.json with a depth image of a frame."""
+    """Return whether a folder contains transforms.json that names the depth image of a frame."""
     try:
         return bool(_frames(folder)[1])
     except InputError:
@@ -93,7 +93,11 @@ def _pose(frame: Mapping[str, Any]) -> FloatArray | None:
 
 
 def _camera(folder: Path, values: Mapping[str, Any], frame: Mapping[str, Any]) -> CameraIntrinsics:
-    """Return the camera of a frame, its own or that of the file."""
+    """Return the camera of a frame; its own keys replace those of the file.
+
+    Raises:
+        InputError: there is no camera, or it has impossible values.
+    """
     of = {key: own[key] for own in (values, frame) for key in _CAMERA if key in own}
     if "fl_x" not in of:
         raise InputError(

@@ -35,7 +35,11 @@ def is_seven_scenes(folder: Path) -> bool:
 
 
 def read_seven_scenes(folder: Path, intrinsics: Path | None) -> Sequence:
-    """Read frames of 7-Scenes (Shotton et al., CVPR 2013), 3DMatch or BundleFusion; depth in millimetres."""
+    """Read frames of 7-Scenes (Shotton et al., CVPR 2013), 3DMatch or BundleFusion; depth in millimetres.
+
+    Raises:
+        InputError: no frame has colour and depth, or the images have another size than the camera.
+    """
     found = []
     colors = sorted(folder.glob("frame-*.color.*"))
     for color in colors:
@@ -116,7 +120,7 @@ def read_open3d(folder: Path, intrinsics: Path | None) -> Sequence:
 
 
 def _trajectory(folder: Path) -> tuple[FoundPoses, str, tuple[str, ...]]:
-    """Return the poses of a recording's trajectory, what to call them if they are missing, and notes."""
+    """Return the poses of a recording's trajectory, a name for them if they are missing, and notes."""
     logs = [log for where in (folder, folder / "scene") for log in sorted(where.glob("*.log"))]
     named = [log for log in logs if "traj" in log.name]
     if not named:
@@ -146,7 +150,7 @@ def read_trajectory_log(file: Path) -> dict[int, FloatArray]:
 
 
 def is_sunrgbd(folder: Path) -> bool:
-    """Return whether a folder contains one image in image/, depth_bfx/ or depth/, and intrinsics.txt."""
+    """Return whether a folder contains image/ with one file, depth_bfx/ or depth/, and intrinsics.txt."""
     depth = (folder / "depth_bfx").is_dir() or (folder / "depth").is_dir()
     image = (folder / "image").is_dir() and len(visible((folder / "image").iterdir())) == 1
     return image and depth and (folder / "intrinsics.txt").is_file()

@@ -26,7 +26,7 @@ _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """A colour and a depth image of one number."""
+    """A colour and a depth image with the same number in their names."""
 
     position: int
     """Position of its number among all numbers in both folders, from 0."""
@@ -65,7 +65,7 @@ def paired(colors: Path, depths: Path) -> tuple[list[Pair], tuple[str, ...]]:
 def pose_indices(pairs: list[Pair], count: int) -> list[int]:
     """Return the index of each pair's pose in a list of poses that has one for each frame of a recording.
 
-    If images were deleted, there are more poses than pairs; then the numbers in the folders tell the frame.
+    If images were deleted, there are more poses than pairs; then the numbers in the names are used.
 
     Args:
         pairs: all pairs of the recording.
@@ -79,7 +79,7 @@ def pose_indices(pairs: list[Pair], count: int) -> list[int]:
 
 
 def depth_images(folder: Path, pattern: str) -> list[Path]:
-    """List the depth images, sorted by name."""
+    """Return the depth images of a folder that match a pattern, sorted by name."""
     return [path for path in visible(folder.glob(pattern)) if path.suffix.lower() in DEPTH_SUFFIXES]
 
 
@@ -110,7 +110,7 @@ def _is_time(path: Path) -> bool:
 
 
 def _at_nearest_time(colors: _Numbered, depths: _Numbered) -> _Numbered:
-    """Return the depth images by the time of the colour image that is less than 20 ms apart, if there is."""
+    """Return the depth images by the time of the colour image less than 20 ms away, or else by their own."""
     keys = sorted(colors), sorted(depths)
     near = associate(*(np.array([float(key[0]) for key in own]) for own in keys))
     renamed = {keys[1][j]: keys[0][i] for i, j in near}
@@ -118,7 +118,7 @@ def _at_nearest_time(colors: _Numbered, depths: _Numbered) -> _Numbered:
 
 
 def require(items: list, folder: Path, missing: str) -> None:
-    """Raise an InputError if a recording has no frame."""
+    """Raise an InputError with the text ``missing`` if ``items``, a recording's frames, is empty."""
     if not items:
         raise InputError(f"{folder} has no frame with colour and depth: it lacks {missing}; check the names")
 

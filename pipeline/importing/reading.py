@@ -1,4 +1,4 @@
-"""Reading the frames of a recording's folder, of any kind."""
+"""Reader of a recording's folder or file of any kind, and bounds on its number of frames."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ time and memory."""
 
 
 def of_many(frames: int, most: int) -> tuple[slice, tuple[str, ...]]:
-    """Return which of a recording's frames are used, and a note if not all."""
+    """Return a slice with at most ``most`` of a recording's frames, and a note if it lacks some."""
     step = max(1, -(-frames // most))
     note = f"Of the {frames} frames one in {step} is used, so that there are at most {most}"
     return slice(None, None, step), (note,) if step > 1 else ()
 
 
 def check_scale(depth_scale: float | None) -> None:
-    """Raise an InputError for a depth scale that cannot be."""
+    """Raise an InputError for a depth scale that is not a positive finite number."""
     if depth_scale is not None and not (np.isfinite(depth_scale) and depth_scale > 0):
         raise InputError(f"The depth scale is {depth_scale}; try 1000 for images in millimetres")
 
@@ -46,10 +46,10 @@ def check_bag_intrinsics(bag: Path, intrinsics: AnyPath | None) -> None:
 def read_sequence(
     path: Path, depth_scale: float | None, intrinsics: AnyPath | None, most: int
 ) -> tuple[Kind, Path, Sequence]:
-    """Return kind, folder and frames of a recording, each moment once; no image is read.
+    """Return kind, place and frames of a recording, each moment once; only a few images are read.
 
     Args:
-        path: the recording's folder, or a folder with only this recording.
+        path: the recording's folder or file, or a folder with only this recording.
         depth_scale: depth units per metre; None takes that of the kind of recording.
         intrinsics: intrinsics file of the colour camera; None takes the recording's, or those of its kind.
         most: largest number of frames; of more every n-th is used.

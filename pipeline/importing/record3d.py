@@ -67,13 +67,13 @@ class _Package:
 
     place: Path
     names: tuple[str, ...]
-    """Names from the folder of the metadata on."""
+    """Names relative to the folder of the metadata."""
     read: Callable[[str, int], bytes]
-    """Returns a file by name, up to so many bytes; raises an InputError."""
+    """Returns the bytes of a file by name; raises an InputError if it has more than the given number."""
 
 
 def is_record3d(folder: Path) -> bool:
-    """Return whether a folder contains metadata with a camera and poses, and images or rgbd/."""
+    """Return whether a folder contains metadata with a camera (K, w and h), and images or rgbd/."""
     file = _metadata_in(folder)
     if file is None or not (_has_images(folder) or (folder / "rgbd").is_dir()):
         return False
@@ -155,7 +155,7 @@ def _sequence(
     intrinsics: Path | None,
     notes: tuple[str, ...],
 ) -> Sequence:
-    """Return the frames with their cameras, poses and times; ``images`` has those of each frame."""
+    """Return the frames with their cameras, poses and times; ``images`` has the images by frame number."""
     poses = found_poses({k: T for k, T in metadata.T_world_camera.items() if k in images})
     cameras = {} if intrinsics else dict(enumerate(metadata.each))
     times = dict(enumerate(metadata.times_s))
@@ -244,7 +244,7 @@ def _pixels(package: _Package, name: str, dtype: np.dtype[Any], metadata: _Metad
 
 
 def _proportional(pixels: int, camera: CameraIntrinsics) -> tuple[int, int] | None:
-    """Return rows and columns of so many pixels with a camera's proportions; None if there are none."""
+    """Return rows and columns of an image of so many pixels in a camera's proportions; None if none fits."""
     columns = round((pixels * camera.width_px / camera.height_px) ** 0.5)
     if not columns or pixels % columns or scaled_to(camera, columns, pixels // columns) is None:
         return None

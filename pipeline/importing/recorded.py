@@ -63,13 +63,13 @@ class FolderRecording:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes; none on missing poses, because the camera of a recording is tracked or stands."""
+        """Notes; none on missing poses, because poses can be tracked and a camera may stand still."""
         return (*self.sequence.notes, *unreadable_note(self.unreadable))
 
     def view(self, index: int) -> DepthView:
         """Read the depth of a frame; it is all NaN without any depth, or if the image cannot be read.
 
-        ``notes`` says how many cannot be read.
+        ``notes`` has the number of those that cannot be read.
         """
         candidate, weight = self.sequence.candidates[index], None
         try:
@@ -106,7 +106,7 @@ class FolderRecording:
         """Return the camera of a frame's depth.
 
         Raises:
-            InputError: depth of this height and width is of another camera.
+            InputError: depth of this height and width does not fit its camera.
         """
         camera, T_color_depth = self.sequence.depth_camera, self.sequence.T_color_depth
         if camera is None or T_color_depth is None:
@@ -142,9 +142,10 @@ def iterate_opening(
     """Open a recording; depth images are read until one has depth. A bag is read once, for its index.
 
     Args:
-        path: the recording's folder, a bag, or a folder with only this recording or bag.
+        path: the recording's folder or file, a bag, or a folder with only this recording or bag.
         depth_scale: depth units per metre; by default that of the kind of recording.
-        intrinsics: intrinsics file of the colour camera; by default the recording's, or those of its kind.
+        intrinsics: intrinsics file of the colour camera; by default the recording's, or those of its kind; a
+            bag takes none.
 
     Raises:
         InputError: the path is no usable recording, or no frame has depth.

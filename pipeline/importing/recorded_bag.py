@@ -43,7 +43,7 @@ class BagRecording:
     times_s: FloatArray
     """(N,) time of each colour image, ascending."""
     T_world_camera: tuple[FloatArray | None, ...] | None
-    """(4, 4) poses of the colour camera, metres, None where it is unknown; None if none is known."""
+    """(4, 4) poses of the colour camera, metres, None where unknown; None if no pose is known."""
     camera: CameraIntrinsics
     depth_camera: DepthCamera | None
     """None if depth is on the colour image's pixels."""
@@ -51,7 +51,7 @@ class BagRecording:
     """Height and width of the depth images."""
     scale: BagScale
     found: tuple[str, ...]
-    """Assumptions on the whole bag."""
+    """Notes on the whole bag, one sentence each."""
     unreadable: dict[int, str] = field(default_factory=dict, compare=False)
     """Error of each frame whose depth image could not be read, entered when it is read."""
 
@@ -68,7 +68,7 @@ class BagRecording:
     def view(self, index: int) -> DepthView:
         """Read the depth of a frame; it is all NaN without any depth, or if the image cannot be read.
 
-        ``notes`` says how many cannot be read.
+        ``notes`` has the number of those that cannot be read.
         """
         try:
             z_m = self._depth(index).depth.z_m

@@ -29,7 +29,7 @@ class NodeImages:
     rgb: ByteArray
     """(H, W, 3)."""
     depth: DepthMap
-    """(H, W), or (h, w) in a separate depth camera."""
+    """(H, W), or (h, w) of a separate depth camera."""
     camera: CameraIntrinsics
     T_world_camera: FloatArray | None
     """(4, 4) pose, metres; None if it is unknown."""
@@ -49,7 +49,11 @@ def check_new(out: Path) -> None:
 
 @contextmanager
 def new_folder(out: Path) -> Iterator[Path]:
-    """Create a sibling folder that is renamed to ``out`` if the body succeeds, and deleted if not."""
+    """Create a sibling folder that is renamed to ``out`` if the body succeeds, and deleted if not.
+
+    Raises:
+        InputError: a folder or a file in it cannot be written.
+    """
     sibling = out.with_name(f".{out.name}-{secrets.token_hex(4)}")
     try:
         sibling.mkdir(parents=True)

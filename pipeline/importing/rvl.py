@@ -11,10 +11,10 @@ MAX_PIXELS = 50_000_000
 
 
 def decode_rvl(data: bytes, width_px: int, height_px: int) -> IntArray:
-    """Decode (H, W) uint16 depth: runs of zeros, then of differences, with numbers in groups of three bits.
+    """Decode (H, W) uint16 depth: alternating runs of zeros and of differences, in groups of three bits.
 
     Raises:
-        ValueError: the data end too early, or have more pixels than the image.
+        ValueError: the data end too early or have more pixels than the image, or it exceeds ``MAX_PIXELS``.
     """
     if not 0 < width_px * height_px <= MAX_PIXELS:
         raise ValueError(f"an image of {width_px} x {height_px} pixels")

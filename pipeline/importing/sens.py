@@ -40,10 +40,10 @@ _RAW_DEPTH, _ZLIB, _OCCIPITAL = 0, 1, 2
 
 @dataclass(frozen=True, slots=True)
 class _Header:
-    """What a file says before its first frame."""
+    """The header of a file."""
 
     cameras: tuple[CameraIntrinsics, CameraIntrinsics]
-    """Those of colour and depth."""
+    """Cameras of colour and depth."""
     T_color_depth: FloatArray
     color_compression: int
     depth_compression: int
@@ -54,10 +54,10 @@ class _Header:
 
 @dataclass(frozen=True, slots=True)
 class _Frame:
-    """Where a frame is in the file."""
+    """Pose and time of a frame, and the place of its images in the file."""
 
     pose: FloatArray
-    """(4, 4) camera to world; infinite where tracking was lost."""
+    """(4, 4) T_world_camera, metres; infinite where tracking was lost."""
     time_us: int
     color_at: tuple[int, int]
     """First byte and number of bytes."""

@@ -17,7 +17,7 @@ from pipeline.types import CameraIntrinsics, FloatArray
 DEPTH_SUFFIXES = (".png", ".tif", ".tiff", ".npy", ".pfm", ".exr", ".pgm")
 """File name suffixes of depth images."""
 SAME_VIEW_REMEDY = "try a recording whose depth shows the view of its colour images"
-"""What to try where depth is not in proportion to colour."""
+"""Remedy in the error for depth that is not in proportion to colour."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,10 +27,10 @@ class Candidate:
     color: AnyImage
     depth: AnyImage
     T_world_camera: FloatArray | None = None
-    """(4, 4) pose of the colour camera, metres."""
+    """(4, 4) pose of the colour camera, metres; None if it is unknown."""
     time_s: float | None = None
     camera: CameraIntrinsics | None = None
-    """Colour camera of this moment, if it differs from moment to moment."""
+    """Colour camera of this moment; None takes ``Sequence.camera``."""
     confidence: AnyImage | None = None
     """Image of the depth image's size: 0 where the sensor has low confidence in its depth, larger values for
     more, up to ``Sequence.highest_confidence``."""
@@ -46,10 +46,10 @@ class Sequence:
     """The frames of one recording in order of time, with their common properties."""
 
     candidates: tuple[Candidate, ...]
-    """Candidates, either all with poses or all without."""
+    """Candidates; some may lack a pose (``only_posed``)."""
     camera: CameraIntrinsics
     units_per_metre: float = 1000.0
-    """Depth units per metre of integer images, or of all images if ``scale_stated``."""
+    """Depth units per metre of integer images and COLMAP's maps, or of all images if ``scale_stated``."""
     scale_stated: bool = False
     """Whether the user gave the scale."""
     rotated_bits: bool = False
@@ -63,7 +63,7 @@ class Sequence:
     highest_confidence: int = 2
     """Value of confidence images where the sensor has high confidence; 2 is ARKit's."""
     without_poses: str = ""
-    """Sentence on a recording without any pose, of whose poses none was refused; empty for others."""
+    """Note on a recording without any pose; empty if it has one, or if ``notes`` has the reason."""
     notes: tuple[str, ...] = ()
     """Assumptions, one sentence each."""
 
@@ -82,7 +82,7 @@ class Sequence:
         )
 
     def only_posed(self) -> Sequence:
-        """Return the sequence without frames that lack a pose, which a note says; itself if none has one."""
+        """Return the sequence without the frames that lack a pose, and a note; itself if no frame has one."""
         known = tuple(one for one in self.candidates if one.T_world_camera is not None)
         if len(known) in (0, len(self.candidates)):
             return self
@@ -91,7 +91,7 @@ class Sequence:
 
 
 def named_inside(folder: Path, name: str, file: str) -> Path:
-    """Return the path of ``name``, which a file of a recording contains, with any system's separators.
+    """Return the path in ``folder`` of a name that ``file`` contains, with the separators of any system.
 
     Raises:
         InputError: it is outside the recording's folder.

@@ -34,12 +34,12 @@ AnyImage: TypeAlias = Path | StoredImage
 
 
 def is_file(path: Path, suffixes: tuple[str, ...]) -> bool:
-    """Return whether a path is a file with one of some lower-case suffixes, in any case."""
+    """Return whether a path is a file whose suffix, in lower case, is one of ``suffixes``."""
     return path.suffix.lower() in suffixes and path.is_file()
 
 
 def exists(image: AnyImage) -> bool:
-    """Return whether an image is there: a file, or an image that its file has."""
+    """Return whether an image exists; a ``StoredImage`` always does."""
     return isinstance(image, StoredImage) or image.is_file()
 
 

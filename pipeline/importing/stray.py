@@ -125,7 +125,11 @@ def _pose(row: dict[str, float]) -> FloatArray | None:
 
 
 def _odometry(file: Path) -> dict[int, dict[str, float]]:
-    """Return the numbers of each row by their titles, by the number of the frame; empty without a file."""
+    """Return the rows of a trajectory by frame number, each as numbers by title; empty without a file.
+
+    Raises:
+        InputError: the file has another form.
+    """
     if not file.is_file():
         return {}
     lines = [

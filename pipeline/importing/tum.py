@@ -41,10 +41,11 @@ def is_tum(folder: Path) -> bool:
 
 
 def read_tum(folder: Path, intrinsics: Path | None) -> Sequence:
-    """Read frames whose colour, depth and (if groundtruth.txt exists) pose are less than 20 ms apart.
+    """Read the pairs of colour and depth less than 20 ms apart, with poses at most 20 ms away, if any.
 
     Raises:
-        InputError: a list has an invalid line, or no two images are of one moment.
+        InputError: a list has an invalid line, no two images are of one moment, or the camera has another
+            size.
     """
     (rgb_s, pictures), (depth_s, depths) = listed(folder / "rgb.txt"), listed(folder / "depth.txt")
     pairs = associate(rgb_s, depth_s)
@@ -110,9 +111,18 @@ def listed(file: Path) -> tuple[FloatArray, list[str]]:
 
 
 def rows_in(file: Path, what: str, least: int, form: str) -> list[tuple[float, list[str]]]:
-    """Return time in seconds and words of each line, sorted by time.
+    """Return the time in seconds and the other words of each line, sorted by time.
 
-    Clocks that count milliseconds, microseconds or nanoseconds since 1970 are told by their size.
+    Times in milliseconds, microseconds or nanoseconds since 1970 are recognised by their size.
+
+    Args:
+        file: the text file; empty lines and lines that begin with # are ignored.
+        what: name of the file for errors.
+        least: least number of words after the time.
+        form: form of a line, for errors.
+
+    Raises:
+        InputError: the file cannot be read, or a line has no finite time or too few words.
     """
     rows = []
     for line in _text(file, what).splitlines():
@@ -131,7 +141,7 @@ def rows_in(file: Path, what: str, least: int, form: str) -> list[tuple[float, l
 
 
 def seconds(time: float) -> float:
-    """Return a time in seconds; a larger one than the year 5138 counts thousandths, millionths and so on."""
+    """Return a time in seconds; above ``LARGEST_TIME_S`` it counts milli-, micro- or nanoseconds."""
     while abs(time) > LARGEST_TIME_S:
         time /= 1000.0
     return time
@@ -142,7 +152,9 @@ def _text(file: Path, what: str) -> str:
 
 
 def poses_at(file: Path, wanted_s: FloatArray) -> dict[int, FloatArray]:
-    """Return T_world_camera by the index of each of (N,) times that has a pose at most 20 ms away.
+    """Return (4, 4) T_world_camera, metres, by the index of each of (N,) times with a pose within 20 ms.
+
+    The result is empty if the file does not exist.
 
     Raises:
         InputError: the lines are not a time, a position and a quaternion.
@@ -174,7 +186,7 @@ def poses_at(file: Path, wanted_s: FloatArray) -> dict[int, FloatArray]:
 
 
 def known_camera(folder: Path) -> tuple[CameraIntrinsics, str]:
-    """Return the camera of a TUM sequence by its folder's name, else a Kinect's, and what to call it."""
+    """Return the camera of a TUM sequence by its folder's name, else a Kinect's, and its description."""
     series = re.search(r"(?:freiburg|fr)([123])(?!\d)", folder.resolve().name)
     if series is None:
         return PRIMESENSE, "a Kinect's from the factory"

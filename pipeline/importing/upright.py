@@ -1,4 +1,4 @@
-"""A world with z up for cameras whose world has other axes."""
+"""Rotation to a world with z up, for cameras whose world has other axes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MOST_TILT_DEG = 35.0
 
 
 def upright(T_world_camera: Sequence[FloatArray]) -> FloatArray | None:
-    """Return the rotation that makes the cameras' mean upward direction +z; None if z is already up.
+    """Return the (4, 4) rotation that makes the cameras' mean upward direction +z; None if z is already up.
 
     Many recordings use the first camera's axes as world axes, but a rig's world has z up.
 

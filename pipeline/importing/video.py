@@ -17,11 +17,11 @@ from packetmesh.errors import InputError
 from pipeline.types import ByteArray, FloatArray
 
 _FORMATS = {".mkv": "matroska", ".mp4": "mov"}
-"""FFmpeg's names of the formats that are read; others can name further files and addresses."""
+"""FFmpeg's names of the formats that are read; others may refer to further files and addresses."""
 KEPT = 4
 """Number of images of a file that are kept after they were read."""
 NEAR = 60
-"""A wanted image at most this many images ahead is reached by reading on, not by a jump."""
+"""An image at most this many images ahead is reached by reading on, not by a jump."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,13 +41,13 @@ class Track:
     time_base_s: float
     """Seconds in a unit of ``stamps``."""
     stamps: tuple[int, ...]
-    """Times of the images, ascending."""
+    """Times of the images, in units of ``time_base_s``, ascending."""
     jumps: tuple[int, ...]
-    """Times of the images from which decoding can begin, ascending."""
+    """Those of the images from which decoding can begin, ascending."""
 
     @property
     def times_s(self) -> FloatArray:
-        """(N,) times of the images."""
+        """(N,) times of the images, seconds."""
         return self.time_base_s * np.array(self.stamps, np.float64)
 
 
@@ -63,7 +63,7 @@ class Contents:
 
 
 def contents_of(file: Path) -> Contents:
-    """Read which images a video file has, in one pass, and its attachments.
+    """Read the times of all images of a video file, in one pass, and its attachments.
 
     Raises:
         InputError: it is no video file or is damaged, or PyAV is missing.
@@ -105,7 +105,7 @@ class TrackReader:
     """
 
     def __init__(self, file: Path, tracks: tuple[Track, ...], decoded: bool) -> None:
-        """Begin.
+        """Store the file and the tracks; the file is opened when the first image is read.
 
         Args:
             file: the video file.
@@ -158,7 +158,7 @@ class TrackReader:
             return found
 
     def _read_to(self, track: Track, stamp: int) -> Any:
-        """Read on until an image; returns it, or None if it does not come."""
+        """Read on until the image with a time; returns it, or None if the track does not have it."""
         for index, at, image in self._images:
             kept = self._kept[index]
             kept[at] = image
@@ -170,7 +170,7 @@ class TrackReader:
         return None
 
     def _from(self, track: Track, start: int) -> Iterator[tuple[int, int, Any]]:
-        """Yield track, time and image from the last place before a time at which reading can begin."""
+        """Yield track, time and image, from the last place before ``start`` where decoding can begin."""
         with _opened(self._file) as container:
             streams = [container.streams[index] for index in self._tracks]
             container.seek(start, stream=container.streams[track.index])

@@ -1,1 +1,1 @@
-"""Reading and writing of images, intrinsics, poses, clouds, meshes and rigs, with no partly written file."""
+"""Reading and writing of images, intrinsics, poses, clouds, meshes and rigs; no file remains half written."""

@@ -53,9 +53,9 @@ class CalibratedNode:
     T_world_camera: FloatArray | None = None
     """(4, 4) pose, metres; None keeps the rig's own."""
     depth_intrinsics: CameraIntrinsics | None = None
-    """Intrinsics of a separate depth camera, whose images are not registered to the colour camera's."""
+    """Intrinsics of a separate depth camera, whose images are not registered to colour; None without one."""
     T_color_depth: FloatArray | None = None
-    """(4, 4) pose of the depth camera in the colour camera's frame, metres."""
+    """(4, 4) pose of the depth camera in the colour camera's frame, metres; given with its intrinsics."""
     focal_sd: float | None = None
     """Standard error of the focal lengths as a share of them; None if unknown."""
 

@@ -19,7 +19,7 @@ from pipeline.io.lenses import is_fisheye_name, ros_name
 from pipeline.types import AnyPath, CameraIntrinsics
 
 COLMAP_MIDDLE, MATLAB_MIDDLE = 0.5, 1.0
-"""Coordinate of the first pixel's centre."""
+"""Coordinate of the first pixel's centre in COLMAP and in MATLAB, px."""
 _COLMAP = re.compile(r"^\s*\d+\s+(PINHOLE|OPENCV|FULL_OPENCV|OPENCV_FISHEYE)\s+(.*)$", re.MULTILINE)
 _COLMAP_NUMBERS = {"PINHOLE": 4, "OPENCV": 8, "FULL_OPENCV": 12, "OPENCV_FISHEYE": 8}
 """Number of parameters after the image size."""
@@ -33,7 +33,7 @@ _MATLAB = re.compile(
 
 
 def opencv_yaml(camera: CameraIntrinsics) -> str:
-    """Return the camera in the YAML of ``cv2.FileStorage``, a fisheye marked as in its sample."""
+    """Return the camera in the YAML of ``cv2.FileStorage``; a fisheye has the key of OpenCV's sample."""
     return "\n".join(
         (
             "%YAML:1.0",
@@ -120,7 +120,7 @@ def kalibr_yaml(camera: CameraIntrinsics) -> str:
     """Return Kalibr's camchain of one camera: equidistant if a fisheye, else radtan, which has no k3.
 
     Raises:
-        InputError: the camera's k3 is not 0.
+        InputError: k3 or a later coefficient is not 0.
     """
     _refuse(camera, camera.distortion[4:], "Kalibr's radtan", "calibrate with the lens 'thesis'")
     places = np.array([camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px])
@@ -185,6 +185,8 @@ def is_fisheye(text: str, model: str) -> bool:
 
 def camera_in(path: AnyPath, text: str, size_px: tuple[int, int] | None) -> CameraIntrinsics | None:
     """Read a COLMAP, Kalibr or MATLAB camera; returns None if the text is none of these.
+
+    Of several cameras it is the one for images of the size ``size_px``, or else the first.
 
     Raises:
         InputError: several different cameras in the file have images of the size ``size_px``.

@@ -47,7 +47,7 @@ def camera_of_keys(
         path: the file, for errors.
         values: its keys and values.
         size_px: width and height of the images, if known.
-        fisheye: whether the file names a fisheye's model, which orders k1 to k4 otherwise.
+        fisheye: whether the file names a fisheye's model, whose coefficients are k1 to k4.
 
     Raises:
         InputError: a key that seems to hold the lens or the size is none of those that are read.

@@ -21,11 +21,11 @@ _KITTI, _NUSCENES = 4, 5
 _MOST_RINGS = 128
 _LARGEST_INTENSITY = 255.0
 FARTHEST_M, NEAREST_M = 1e5, 1e-30
-"""Largest plausible coordinate of a sweep, and the least: labels read as floats are smaller."""
+"""Largest and least plausible magnitude of a sweep's coordinates; labels read as floats are smaller."""
 _WIDEST = 50
-"""An array of few rows that are longer than this has a point in each column."""
+"""An array of 3, 4 or 6 rows with more columns than this has a point in each column."""
 _MIXED = 0.1
-"""Two columns are alike if their distribution functions differ by less."""
+"""Two columns are alike if their distribution functions differ by less than this everywhere."""
 _LEAST_ROWS = 200
 """Fewer rows do not show whether columns are alike."""
 
@@ -64,7 +64,7 @@ def parse_sweep(path: AnyPath, data: bytes, layout: Layout) -> np.ndarray:
     """Read a LiDAR sweep of four-byte numbers, by given columns, or as KITTI's or nuScenes' format.
 
     KITTI has x, y, z and reflectance (Geiger et al. 2013), nuScenes x, y, z, intensity and the index of the
-    laser's ring, a whole number (Caesar et al. 2020). The values tell them apart, or else the file's name.
+    laser's ring, a whole number (Caesar et al. 2020). The file's name, or else the values tell them apart.
 
     Raises:
         InputError: the length is no multiple of a row, the numbers are no positions, or may be either format.
@@ -129,7 +129,7 @@ def _plausible(rows: FloatArray) -> bool:
 
 
 def _mixed(rows: FloatArray) -> bool:
-    """Return whether columns two apart are alike, as if rows of another width were read."""
+    """Return whether columns two apart have alike values, as where rows are read with a wrong width."""
     if len(rows) < _LEAST_ROWS:
         return False
     from scipy.stats import ks_2samp  # takes a second to import

@@ -26,7 +26,7 @@ _OPAQUE = 255
 _TIME_ROWS = 20
 """Fewer rows do not show whether a column rises like a time."""
 _TIME_SHARE = 0.5
-"""Least share of distinct values in a rising column that is taken for a time or a number."""
+"""A rising column with a larger share of distinct values is taken for a time or a row number."""
 _FARTHEST_ON_EARTH = 1e8
 _LARGEST_DEGREES = 0.02
 _UPRIGHT = 100.0
@@ -37,7 +37,7 @@ def parse_columns(text: str) -> tuple[str, ...]:
     """Return the field of each column from text such as ``x,y,z,_,r,g,b``; ``_`` is a column without use.
 
     Raises:
-        InputError: an unknown name, a name twice, or a part of a position, normal or colour.
+        InputError: a name is unknown or given twice, or names of a position, normal or colour are missing.
     """
     words = [word.strip().lower() for word in text.replace(" ", ",").split(",") if word.strip()]
     unknown = next((word for word in words if word not in _OPTION_NAMES), None)
@@ -101,7 +101,7 @@ def guessed_columns(path: AnyPath, rows: FloatArray, places: Sequence[int] | Non
 def say_columns(
     path: AnyPath, names: Sequence[str], titles: Sequence[str] | None = None, decimal_comma: bool = False
 ) -> None:
-    """Log which column is taken for what.
+    """Log the field as which each column is read.
 
     Args:
         path: the file.
@@ -136,7 +136,7 @@ def table_of_columns(path: AnyPath, rows: FloatArray, given: tuple[str, ...] | N
 
 
 def table_named(rows: FloatArray, names: Sequence[str]) -> np.ndarray:
-    """Return a structured array; its colours are integers (0 to 255) if all are whole and any exceeds 1."""
+    """Return a structured array; its colours are integers if all are whole and any exceeds 1, else floats."""
     used = [(name, k) for k, name in enumerate(names) if name != UNUSED]
     colors = rows[:, [k for name, k in used if name in COLOR]]
     whole = colors.size > 0 and bool(np.all(colors == np.rint(colors))) and colors.max() > 1

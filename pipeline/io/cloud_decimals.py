@@ -69,7 +69,7 @@ def dialect_of(path: AnyPath, lines: Sequence[str]) -> Dialect:
 
 
 def split_titles(line: str, dialect: Dialect, width: int) -> list[str]:
-    """Return the titles in a line above a table; the numbers' separator goes before others.
+    """Return the titles in a line above a table; the separator of the numbers is tried before others.
 
     A separator at the end of every line of numbers makes an empty last column, which may lack a title.
     """

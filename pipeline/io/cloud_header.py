@@ -62,14 +62,14 @@ _ALIASES = _aliases()
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What the titles of a table's columns say."""
+    """Fields and unit of a table's columns, from their titles."""
 
     titles: tuple[str, ...]
     """The titles as they are in the file."""
     names: tuple[str, ...]
     """Field of each column, ``_`` for one without use."""
     metres_per_unit: float | None
-    """Unit of the position; None if no title says it."""
+    """Metres per unit of the position; None if no title has a known unit."""
 
     @property
     def plain(self) -> bool:
@@ -79,7 +79,7 @@ class Header:
 
 
 def header_of(path: AnyPath, titles: Sequence[str]) -> Header | None:
-    """Return what the titles say; None if they do not name x, y and z.
+    """Return the fields and the unit that the titles name; None if they do not name x, y and z.
 
     Raises:
         InputError: two columns have the same name, or the position's units differ or are angles.
@@ -160,7 +160,11 @@ def _field(word: str) -> str | None:
 
 
 def _unit(path: AnyPath, titled: list[tuple[str, str | None]]) -> float | None:
-    """Return the unit of the position in metres; None if it is not said or not known."""
+    """Return the unit of the position in metres; None if no title has a known unit.
+
+    Raises:
+        InputError: the units are angles, or differ.
+    """
     if any(unit in _ANGLES for _, unit in titled):
         raise no_position(path, ["latitude", "longitude", *(title for title, _ in titled)])
     metres = {METRES.get(unit) if unit else None for _, unit in titled}

@@ -28,9 +28,9 @@ _IN_METRES = (range(32601, 32761), range(25828, 25839), range(26901, 26924), ran
 
 
 def metres_per_axis(path: AnyPath, records: Iterable[Any]) -> FloatArray:
-    """Return (3,) the length of a unit of x, y and z in metres; what is not plain is logged.
+    """Return (3,) the length of a unit of x, y and z in metres; other units than metres are logged.
 
-    Heights whose unit the file does not name are in the unit of x and y.
+    Without a named unit, x and y are in metres, and heights are in the unit of x and y.
 
     Args:
         path: the file.

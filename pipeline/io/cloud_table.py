@@ -22,7 +22,7 @@ _BYTE = 255
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """What a user says about a table whose file does not name its columns."""
+    """A user's options for the columns and the unit of a table."""
 
     columns: tuple[str, ...] | None = None
     """Field of each column (``parse_columns``); None finds them in the file."""
@@ -97,7 +97,7 @@ def table_of(path: AnyPath, body: bytes, count: int, dtype: np.dtype, ascii_text
     """Return ``count`` rows of a structured array from a file's body: lines of numbers, or binary rows.
 
     Raises:
-        InputError: there are fewer rows, or a line has another length.
+        InputError: there are fewer rows, or a line has too few numbers.
     """
     if not ascii_text:
         there = len(body) // dtype.itemsize

@@ -64,7 +64,7 @@ class _Lines:
     """Other lines above the numbers."""
     numbers: list[str]
     counted: bool
-    """Whether a line says how many points there are."""
+    """Whether a line states the number of points."""
 
 
 def parse_text(path: AnyPath, data: bytes, layout: Layout) -> np.ndarray:
@@ -72,7 +72,7 @@ def parse_text(path: AnyPath, data: bytes, layout: Layout) -> np.ndarray:
 
     Titles in the last line above the numbers, also in a comment, name the columns (``header_of``). Without
     them the columns are guessed (``guessed_columns``). Decimal commas are read where something else
-    separates the numbers. What is not plain is logged, and what is in doubt is an error.
+    separates the numbers. A reading that is not obvious is logged; a doubtful one is an error.
 
     Args:
         path: name of the file.
@@ -117,7 +117,11 @@ def parse_text(path: AnyPath, data: bytes, layout: Layout) -> np.ndarray:
 
 
 def _decoded(path: AnyPath, data: bytes) -> str:
-    """Return the text of a file in UTF-8, UTF-16 with a byte order mark, or Windows' Latin-1."""
+    """Return the text of a file in UTF-8, UTF-16 with a byte order mark, or Windows-1252.
+
+    Raises:
+        InputError: it is no text.
+    """
     wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
     for encoding in ("utf-16",) if wide else ("utf-8-sig", "cp1252"):
         try:
@@ -195,7 +199,11 @@ def _is_number(word: str) -> bool:
 
 
 def _header(path: AnyPath, lines: _Lines, dialect: Dialect, width: int) -> Header | None:
-    """Return what the titles of the columns say; None if there are none."""
+    """Return the fields and the unit that the titles of the columns name; None without titles.
+
+    Raises:
+        InputError: the titles do not name x, y and z, or do not fit the columns.
+    """
     open_end = width > 3 and not dialect.cells(lines.numbers[:1])[0][-1].strip()
     for line in reversed(lines.titles):
         titles = split_titles(line, dialect, width)

@@ -49,7 +49,7 @@ _COLUMNED = (".npy", ".xyz", ".txt", ".asc", ".csv", ".pts", ".bin")
 
 
 def takes_columns(path: AnyPath) -> bool:
-    """Return whether the columns of such a file can be named by a user."""
+    """Return whether a user can name the columns of a file with this suffix."""
     return PurePath(path).suffix.lower() in _COLUMNED
 
 

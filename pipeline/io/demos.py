@@ -12,7 +12,7 @@ from pipeline.types import AnyPath, Rig
 SCENES = Path(__file__).resolve().parents[2] / "assets" / "scenes"
 RECORDINGS = SCENES.with_name("recordings")
 TRUE_PATH = "truth.txt"
-"""True poses of a walk's frames; under TUM's own name they would be taken as given."""
+"""File of a walk's true poses; with TUM's name, groundtruth.txt, they would be read as known poses."""
 BOARDS = "board"
 """Folder with board images, in scenes whose nodes need calibration."""
 

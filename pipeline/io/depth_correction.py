@@ -23,7 +23,7 @@ DEGREE = 2
 Z95 = 1.959964
 """Half the width of a 95 % interval in standard deviations."""
 MOST_SHARE = 0.5
-"""A larger bias, as a share of the depth, is implausible: the file has another unit."""
+"""A larger term, as a share of the depth or in metres, is implausible: the file has another unit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ class DepthCorrection:
         return float(high - low) / (2.0 * Z95)
 
     def corrected_m(self, z_m: FloatArray, pixels: FloatArray | IntArray) -> FloatArray:
-        """Return (N,) true depths of (N,) measured depths at (N, 2) pixels."""
+        """Return (N,) true depths, metres, of (N,) measured depths, metres, at (N, 2) pixels."""
         rows, columns = map_basis(self.size_px, pixels)
         share = np.einsum("nr,rc,nc->n", rows, self.map_coefficients, columns)
         return self._corrected_m(np.asarray(z_m, float), share)

@@ -91,10 +91,11 @@ def step_of(known: NDArray[Any]) -> int | None:
 
 
 def check_median(path: AnyPath, values: NDArray[Any], depth_scale: float) -> None:
-    """Raise an error if the median depth is implausible at this scale.
+    """Check that the median depth, and nearly all depth, is plausible at this scale.
 
     Raises:
-        InputError: the message contains a scale to try.
+        InputError: the median is outside ``PLAUSIBLE_MEDIAN_M``, with a scale to try in the message, or more
+            than ``MOST_FAR_SHARE`` of the depth is beyond ``FARTHEST_FLOAT_M``.
     """
     known = values[known_in(values)]
     median_units = float(np.median(known))

@@ -12,7 +12,7 @@ from pipeline.types import BoolArray, CameraIntrinsics, DepthMap, FloatArray, In
 RaysAt = Callable[[FloatArray], FloatArray]
 """Returns (N, 3) directions with z = 1 for (N, 2) positions in an image."""
 REACH, OVERLAP = 0.5, 0.15
-"""Half size of a depth pixel, and its enlargement to close the cracks that noise opens between pixels."""
+"""Half size of a depth pixel, and its enlargement to close the cracks that noise opens, in depth pixels."""
 STEEPEST = 0.05
 """Largest change of depth over a pixel, as a share of the depth; a larger one is an edge (SPEC 2)."""
 STEP = 0.02

@@ -46,7 +46,7 @@ def color_in(data: bytes, name: AnyPath) -> ByteArray:
 
 
 class NoDepthError(InputError):
-    """A depth image in which all depth is unknown."""
+    """A depth image, or a recording, in which all depth is unknown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,11 +56,11 @@ class ReadDepth:
     depth: DepthMap
     units_per_metre: float
     find_notes: Callable[[], tuple[str, ...]]
-    """Returns ``notes``; most readers of a recording's frames need none."""
+    """Computes ``notes`` on request, as most readers of a recording's frames need none."""
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Doubts about it, one sentence each."""
+        """Doubts about the depth and its scale, one sentence each."""
         return self.find_notes()
 
 
@@ -95,7 +95,8 @@ def read_depth_values(path: AnyPath) -> NDArray[Any]:
     """Read (H, W) values as stored in a depth image; at least one is known (``known_in``).
 
     Raises:
-        InputError: the file is missing, truncated, too large, not one channel of 16 bits or more, or empty.
+        InputError: the file is missing, truncated, too large, or not one channel of 16 bits or more;
+            NoDepthError if no depth is known.
     """
     data = read_bytes(path, MAX_IMAGE_BYTES, "depth image")
     if data.startswith(SIGNATURES):

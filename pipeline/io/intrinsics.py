@@ -23,7 +23,7 @@ FOCAL_SD = "focal_sd"
 """Key of the focal lengths' standard error, as a share of them."""
 _YAML_ENTRY = re.compile(r"^([ \t]*)(\w+):(.*(?:\n(?![ \t]*\w+:).*)*)", re.MULTILINE)
 _MODEL = re.compile(r"^[ \t]+distortion_model:\s*[\"']?(\w+)", re.MULTILINE)
-"""Kalibr's distortion model, which is that of one of several cameras."""
+"""The indented distortion_model of Kalibr's files, which have one for each camera."""
 _LIST = re.compile(r"\[[^\]]*\]")
 _LIST_ITEM = re.compile(r"\s*-(\s|$)")
 """The first item of a block list, in contrast to a negative number."""
@@ -63,7 +63,11 @@ def read_intrinsics(path: AnyPath, size_px: tuple[int, int] | None = None) -> Ca
 def camera_of_values(
     path: AnyPath, values: dict[str, Any], text: str, size_px: tuple[int, int] | None
 ) -> CameraIntrinsics:
-    """Return the camera of a file's keys and values, or else of its text, as ``read_intrinsics`` does."""
+    """Return the camera of a file's keys and values, or else of its text, as ``read_intrinsics`` does.
+
+    Raises:
+        InputError: the format or the lens is unknown, or a value is impossible.
+    """
     model = _model_in(values, text)
     try:
         camera = camera_of_keys(path, values, size_px, model == FISHEYE) or camera_in(path, text, size_px)
@@ -143,6 +147,9 @@ def read_focal_sd(path: AnyPath) -> float | None:
 
     Returns:
         None if the file, which may be of another program, has none.
+
+    Raises:
+        InputError: the file cannot be read.
     """
     try:
         value = json.loads(read_text(path, "intrinsics file"))[FOCAL_SD]

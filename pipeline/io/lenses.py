@@ -8,7 +8,7 @@ from pipeline.kernels.lens import COEFFICIENTS, FISHEYE_COEFFICIENTS
 from pipeline.types import CameraIntrinsics, FloatArray
 
 FISHEYE = "equidistant"
-"""ROS's and Kalibr's name of the fisheye model, which is also written."""
+"""ROS's and Kalibr's name of the fisheye model, also used in the files that are written."""
 _BROWN = "brown_conrady"
 """The RealSense SDK's name of the model plumb_bob; its variants differ from it if a coefficient is not 0."""
 _FISHEYES = {FISHEYE, "fisheye", "kannala_brandt", "kannala_brandt4"}

@@ -29,14 +29,14 @@ _PLY_FACES = re.compile(rb"^element face (\d{1,18})\s*$", re.MULTILINE)
 SRGB_GAMMA = 2.2
 """Approximate gamma of sRGB; vertex colours in glTF are linear."""
 T_GLTF_WORLD = rigid(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]), np.zeros(3))
-"""Rotation between the world frame (z up) and glTF (y up); the file's root node stores it."""
+"""(4, 4) rotation from the world frame (z up) to glTF's (y up); the file's root node stores it."""
 
 
 def write_mesh(path: AnyPath, surface: Surface, texture: Texture | None = None) -> None:
     """Write the triangles of a surface, with its colours, in the format of the suffix.
 
     Where 32-bit numbers would move a vertex by more than a tenth of a millimetre, far from the origin, PLY
-    stores doubles, and GLB stores vertices relative to a translation of its root node. OBJ is text.
+    stores doubles, and GLB stores vertices relative to a translation of its root node. OBJ stores decimals.
 
     Args:
         path: name ending in .ply (binary), .glb, .obj or .stl (binary, without colours).

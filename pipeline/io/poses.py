@@ -17,8 +17,8 @@ from pipeline.types import AnyPath, FloatArray
 
 _log = logging.getLogger(__name__)
 EXACT, NOTED, LARGEST = 1e-4, 1e-3, 1e-2
-"""Departure from a rotation (``departure``) up to which a matrix is kept as it is, is replaced by the nearest
-rotation without a note, and is replaced with a note. Recordings are orthonormal to about 5e-4."""
+"""Largest ``departure`` from a rotation of a matrix that is kept as it is, of one that is replaced by the
+nearest rotation without a note, and with a note. Recordings are orthonormal to about 5e-4."""
 
 _BETWEEN = re.compile(r"[,;()\[\]]|\barray\b")
 """Marks between the numbers of a matrix."""
@@ -40,7 +40,7 @@ def read_pose_noted(path: AnyPath) -> tuple[FloatArray, tuple[str, ...]]:
     A matrix that is not quite a rotation is replaced by the nearest rotation (``nearest_rigid``).
 
     Raises:
-        InputError: the file does not contain sixteen numbers that form a rotation and a translation.
+        InputError: the file does not contain 4 x 4 or 3 x 4 numbers of a rotation and a translation.
     """
     T = _matrix_in(path)
     if not np.isfinite(T).all():
@@ -72,8 +72,8 @@ def _matrix_in(path: AnyPath) -> FloatArray:
 def matrix_in(text: str) -> FloatArray | None:
     """Return the (4, 4) matrix in a text, None if it holds none.
 
-    It has 4 x 4 numbers, or the first 3 x 4 of them and a line end, row by row: four in a line, or all in
-    one line, or each in its own; between them may be commas, semicolons and brackets, as Python prints them.
+    It has 16 numbers, or the first 12 and then a line end, row by row: four on each line, all on one line,
+    or one on each line. Commas, semicolons and brackets may be between them, as Python prints them.
     """
     rows = _rows(text)
     if len(rows) > 1 and {len(row) for row in rows} not in ({1}, {4}):

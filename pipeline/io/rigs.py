@@ -256,7 +256,7 @@ def _node_folders(directory: Path) -> list[Path]:
 
 
 def _natural(name: str) -> list[tuple[str, int]]:
-    """Return a key that sorts names by the values of the numbers in them, and the other letters as usual."""
+    """Return a key that sorts names by the values of the numbers in them, and by the other letters."""
     return [(letters, int(number or -1)) for letters, number in re.findall(r"(\D*)(\d*)", name)]
 
 

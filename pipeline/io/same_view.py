@@ -1,4 +1,4 @@
-"""Cameras of images that show the same view: of depth in another number of pixels, and with equal pixels."""
+"""Cameras that show the same view: of depth in another number of pixels, and comparison of two cameras."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def depth_camera_of(
 ) -> CameraIntrinsics | None:
     """Return the camera of a depth image: the colour camera, resized; None if both sizes are equal.
 
-    Telephones store depth so: 256 x 192 pixels of the view that the photograph has in 1920 x 1440.
+    Telephones store such depth: 256 x 192 pixels of the view that the photograph has in 1920 x 1440.
 
     Args:
         camera: the colour camera.
@@ -48,7 +48,7 @@ def same_view_note(camera: CameraIntrinsics, depth_camera: CameraIntrinsics) -> 
 
 
 def alike(one: CameraIntrinsics, other: CameraIntrinsics, within_px: float = 0.01) -> bool:
-    """Return whether two cameras have the same pixels, within so many, and the same distortion."""
+    """Return whether two cameras have the same size and distortion, and matrices within ``within_px``."""
     sizes = (one.width_px, one.height_px) == (other.width_px, other.height_px)
     same_lens = (
         one.fisheye == other.fisheye

@@ -22,7 +22,9 @@ INTRINSICS_NAME = "true_intrinsics.json"
 
 
 def read_truth(directory: Path, names: Sequence[str]) -> RigTruth | None:
-    """Read the true surface and the nodes' true poses; renders the true depth of each camera. None without.
+    """Read the true surface and the nodes' true poses, and render the true depth of each camera.
+
+    Returns None if the rig has no true surface.
 
     Raises:
         InputError: a true surface exists but cannot be read, or a node has no true pose.

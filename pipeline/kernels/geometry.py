@@ -52,7 +52,10 @@ def rotation_angle_rad(rotation: FloatArray) -> float:
 
 
 def look_at(eye_m: ArrayLike, target_m: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.0)) -> FloatArray:
-    """Return T_world_camera of a camera at ``eye_m`` that looks at ``target_m``."""
+    """Return T_world_camera of a camera at ``eye_m`` that looks at ``target_m``.
+
+    ``up`` is the world's upward direction; it must not be parallel to the view.
+    """
     eye_m = np.asarray(eye_m, float)
     forward = np.asarray(target_m, float) - eye_m
     forward /= np.linalg.norm(forward)
@@ -87,7 +90,7 @@ def scaled_to(intrinsics: CameraIntrinsics, width_px: int, height_px: int) -> Ca
 def _resized(
     intrinsics: CameraIntrinsics, shares: tuple[float, float], size_px: tuple[int, int]
 ) -> CameraIntrinsics:
-    """Return the camera of an image resized by these shares of width and height to this size."""
+    """Return the camera of an image whose width and height are multiplied by ``shares``, to ``size_px``."""
     matrix = intrinsics.matrix.copy()
     matrix[[0, 1], [0, 1]] *= shares
     matrix[:2, 2] = (matrix[:2, 2] + 0.5) * shares - 0.5
@@ -97,8 +100,8 @@ def _resized(
 def pixel_rays(intrinsics: CameraIntrinsics) -> FloatArray:
     """Return (H, W, 3) camera-frame directions of the pixel centres with z = 1, undistorted; read-only.
 
-    Pixels without such a direction are NaN, as in ``undistorted_rays``. The last four cameras are cached:
-    reconstructing one frame calls this five times.
+    Pixels without such a direction are NaN, as in ``undistorted_rays``. The rays of the last four cameras of
+    up to ``_KEPT_PX`` pixels are cached: reconstructing one frame calls this five times.
     """
     size = intrinsics.width_px, intrinsics.height_px
     find = _kept_rays if size[0] * size[1] <= _KEPT_PX else _rays

@@ -106,7 +106,7 @@ def levels_of(count: int) -> int:
 
 
 def in_parts(work: Callable[[int, int], None], count: int) -> None:
-    """Call ``work(first, last)`` for parts of ``range(count)`` in parallel; it must release the lock."""
+    """Call ``work(first, last)`` for parts of ``range(count)`` in parallel; it must release Python's lock."""
     parts = CORES if count >= SERIAL_POINTS else 1
     if parts == 1:
         work(0, count)
@@ -266,7 +266,7 @@ def search_many(
         points, axes, splits, levels: parts of the tree.
         place: (3,) query point.
         count: number of points, at most N.
-        limit: squared distance within which there are at least ``count`` points.
+        limit: squared distance below which there are at least ``count`` points.
         squared, rows: (``room_for(count)``,) receive squared distances and rows in the tree's order.
         stack, bounds: working space.
 
@@ -355,7 +355,7 @@ def _next_leaf(
     bounds: FloatArray,
     size: int,
 ) -> tuple[int, int, int]:
-    """Return start and end of the next leaf within the squared distance ``limit``, and the stack's size."""
+    """Return the next leaf's start and end (0, 0 if beyond the squared ``limit``), and the stack's size."""
     size -= 1
     apart = bounds[size, 3]
     if apart >= limit:

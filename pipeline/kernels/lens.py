@@ -25,7 +25,7 @@ _STEPS = 20
 _TABLE = 2000
 """Entries of the table of radii from which Newton's method starts."""
 _FARTHEST = math.radians(89.9)
-"""Largest angle to the optical axis in that table."""
+"""Largest angle to the optical axis in that table, rad."""
 _NO_COEFFICIENT = 1e-100
 """A polynomial's coefficient below this counts as none; the roots would overflow."""
 
@@ -75,7 +75,7 @@ def straightened(camera: CameraIntrinsics, pixels: FloatArray) -> FloatArray:
 
 
 def _right(camera: CameraIntrinsics, straight: FloatArray, bent: FloatArray, farthest: float) -> BoolArray:
-    """Return (N,) True for straight positions within reach that are those of the distorted positions."""
+    """Return (N,) True for straight positions within reach that project to the distorted positions."""
     with np.errstate(all="ignore"):
         missed = (distorted(camera, straight) - bent) * camera.matrix[[0, 1], [0, 1]]
         within: BoolArray = np.hypot(*straight.T) < farthest

@@ -46,8 +46,8 @@ def patch_normals(tree: KdTree, neighbours: int) -> FloatArray:
 def shared_normals(tree: KdTree, neighbours: int, rows: IntArray) -> FloatArray:
     """Return (N, 3) unit normals like ``patch_normals``, by the planes around some of the points only.
 
-    A point takes the normal of the nearest of these that counts it among its neighbours; the few points that
-    none does get their own plane.
+    A point takes the normal of the plane with the nearest centre among those fitted to it; the few points to
+    which no plane is fitted get their own.
 
     Args:
         tree: tree of N points.
@@ -83,7 +83,7 @@ def _planes(tree: KdTree, count: int, queries: IntArray) -> tuple[FloatArray, In
 def _give(
     axes: FloatArray, near: IntArray, apart: FloatArray, squared: FloatArray, normals: FloatArray
 ) -> None:
-    """Write each of (M, 3) normals to the neighbours that are closer to it than to those before."""
+    """Write each of (M, 3) normals to those of its neighbours that are closer to it than to earlier ones."""
     for m in range(len(near)):
         for k in range(near.shape[1]):
             i = near[m, k]
@@ -189,7 +189,7 @@ def _move(
 
 @compiled
 def _reach(before: FloatArray, place: FloatArray, farthest: float) -> float:
-    """Return a squared distance from ``place`` that holds as many points as ``farthest`` from ``before``."""
+    """Return a squared radius around ``place`` that covers the squared ``farthest`` around ``before``."""
     reach = np.sqrt(squared_distance(before, place)) + np.sqrt(farthest)
     return reach * reach * (1.0 + 1e-12) + 1e-300
 

@@ -1,8 +1,8 @@
 """Import of Open3D on a bare Linux: its shared library needs libusb, which a pip package provides.
 
 Open3D's notebook plots, unused here, import dash, which would delay the start of every process
-(``python -X importtime -m pipeline.open3d_runtime``); an empty module replaces dash during the import. Its
-viewer for notebooks, unused too, would print three lines into the first cell.
+(``python -X importtime -m pipeline.kernels.open3d_runtime``); an empty module replaces dash during the
+import. Its viewer for notebooks, unused too, is disabled: it would print three lines into the first cell.
 """
 
 import ctypes

@@ -14,6 +14,8 @@ def splat_depth(
 ) -> FloatArray:
     """Return (H, W) float32 depth of the nearest square at each pixel, metres; infinite without one.
 
+    Points up to ``side_m`` in front of the camera are left out.
+
     Args:
         points_m: (N, 3) middles of the squares, world frame.
         side_m: side of the squares, which face the camera.
@@ -31,7 +33,7 @@ def splat_depth(
 
 @compiled
 def _splat(pixels: FloatArray, z: FloatArray, reach_z: float, nearest: FloatArray) -> None:
-    """Enter each point's depth into the pixels of its square, where no nearer one is."""
+    """Write each point's depth to the pixels of its square that have no nearer depth."""
     height, width = nearest.shape
     for i in range(len(z)):
         reach = reach_z / z[i]

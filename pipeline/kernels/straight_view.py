@@ -15,12 +15,15 @@ from pipeline.kernels.geometry import pixel_rays, project
 from pipeline.types import ByteArray, CameraIntrinsics, DepthMap, FloatArray
 
 WIDEST = math.tan(math.radians(60.0))
-"""|x / z| and |y / z| up to which a straight view shows all; farther out, it is mostly stretch."""
+"""Largest |x / z| and |y / z| that a straight view shows: farther out, images would be mostly stretched."""
 _OUTSIDE_PX = -10.0
 
 
 def bends_strongly(camera: CameraIntrinsics) -> bool:
-    """Return whether a straight view stands for a camera: of a fisheye, or a lens with more than k1 to k3."""
+    """Return whether a camera's images are replaced by a straight view.
+
+    It is True for a fisheye and for a lens with coefficients beyond k1, k2, p1, p2 and k3.
+    """
     return camera.fisheye or bool(np.any(camera.distortion[5:]))
 
 

@@ -1,5 +1,5 @@
-"""Thread pools that stay: a new thread for each call would start without memory to reuse
-(``packetmesh bench --only chain``: a rig of three took a fifth more).
+"""Thread pools that are kept between calls: new threads for each call would have no memory to reuse
+(``packetmesh bench --only chain``: a rig of three nodes took a fifth longer).
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ EXTENT = (1.0, 99.0)
 LEVEL_DEG = 25.0
 """Largest angle between a supporting plane's normal and the vertical."""
 BESIDE_M = 0.6
-"""Distance in which a thing's supporting plane is looked for."""
+"""Largest distance from the marked point at which a thing's supporting plane is looked for."""
 ABOVE_M = 0.015
 """Least height of a part over its plane; lower, they cannot be told apart."""
 TRIED = 4
@@ -32,15 +32,16 @@ TRIED = 4
 GROOVE_DEG = 25.0
 """Angle between converging normals from which two things touch there."""
 LARGEST_SHARE = 0.5
-"""A part of more of the surface is no single thing."""
+"""Largest share of the surface's vertices that one thing may have."""
 
 
 def box_of_planes(surface: MeasuredSurface, planes: tuple[Plane, Plane, Plane]) -> Measure:
     """Return width, depth and height of the box of which three faces are given.
 
-    Each length is from a face to where the vertices of the other two end. These stand up to half a spacing
-    before the true edge, which is added to the length; half a spacing is also its standard deviation. The
-    covariance of the nodes' poses is left out.
+    Each length is from a face to the last vertices of the other two. These end about half a spacing before
+    the true edge, so half a spacing is added to the length, and is also its standard deviation. The
+    covariance of the nodes' poses is left out. The faces must be seen from outside the box: their normals
+    point away from it, unlike those of a room's walls.
 
     Raises:
         InputError: the planes are not square to each other.
@@ -70,9 +71,10 @@ def box_of_planes(surface: MeasuredSurface, planes: tuple[Plane, Plane, Plane]) 
 def box_of_part(surface: MeasuredSurface, point_m: FloatArray) -> Measure:
     """Return width, depth and height of a thing that stands on a plane, marked by one point on it.
 
-    The plane is the level one below the point with most vertices near it. Of a thing with a flat top that is
-    marked there, the footprint is the smallest rectangle around the top; of another, around all that is
-    connected with the point above the plane, up to grooves: things that touch it there count as one with it.
+    The plane is the level one below the point with most vertices near it. Of a thing that is marked on its
+    flat top, the footprint is the smallest rectangle around the top; of another, around the vertices above
+    the plane that are connected with the point without crossing a groove (``GROOVE_DEG``). Things that touch
+    it without a groove count as one with it.
 
     Raises:
         InputError: nothing stands there.
@@ -107,7 +109,7 @@ def _guess_half_m(range_m: float, confidence: float) -> float:
 
 
 def _support(surface: MeasuredSurface, seed: int, where: str) -> Plane:
-    """Return the level plane below a vertex on which most stands near it."""
+    """Return the level plane below a vertex that has most vertices near it; raises InputError without one."""
     away_m = surface.vertices_m - surface.vertices_m[seed]
     level = surface.normals[:, 2] > np.cos(np.radians(LEVEL_DEG))
     below = level & (np.linalg.norm(away_m, axis=1) < BESIDE_M) & (away_m[:, 2] < -ABOVE_M)

@@ -1,4 +1,4 @@
-"""Connected parts of a surface around a vertex, compiled: a click on a plane grows several."""
+"""Connected part of a surface around a vertex; compiled, because a click on a plane grows several parts."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ def class_of(confidence: float) -> int:
 
 
 def relative_errors(confidence: float, chances: FloatArray) -> FloatArray:
-    """Return (M,) log(true range / guessed range) at (M,) chances, 0 to 1; the ends are outer quantiles."""
+    """Return (M,) log(true range / guessed range) at (M,) chances, limited to those of ``CHANCES``."""
     return np.interp(chances, CHANCES, QUANTILES[class_of(confidence)])
 
 

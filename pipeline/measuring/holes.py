@@ -17,12 +17,12 @@ from pipeline.types import FloatArray
 
 
 def hole_area(surface: MeasuredSurface, point_m: FloatArray) -> Measure:
-    """Return the area of the hole whose rim is nearest to a point, or around it.
+    """Return the area of the hole around a point, or else of the one with the nearest rim.
 
-    A rim vertex stands up to half a spacing inside the surface, so that is the standard deviation of its
-    place in the surface, besides its noise along the ray, in which it and the next vertices that smoothing
-    averaged with it err together (taken at its largest). The covariance of the nodes' poses is left out. The
-    area in a guessed rim is wrong by twice its range's error, as if the hole faced its camera.
+    A rim vertex ends up to half a spacing short of the true rim: this is the standard deviation of its place
+    in the surface. To it is added the noise along the ray, which is taken as fully correlated among vertices
+    that smoothing averaged together. The covariance of the nodes' poses is left out. The relative error of
+    the area in a guessed rim is twice that of its range, as if the hole faced its camera.
 
     Raises:
         InputError: there is no hole near the point.

@@ -49,12 +49,12 @@ class Lookup:
 
     @cached_property
     def edges(self) -> IntArray:
-        """(E, 2) pairs of neighbouring vertices."""
+        """(E, 2) pairs of neighbouring vertices; of a cloud, the ``NEIGHBOURS`` nearest points."""
         return self._edges_and_faces[0]
 
     @cached_property
     def neighbours(self) -> tuple[IntArray, IntArray]:
-        """(V + 1,) first place of each vertex's neighbours in the (2 E,) list of all neighbours."""
+        """(V + 1,) first place of each vertex's neighbours in a list of all, and this (2 E,) list."""
         ends = np.concatenate([self.edges, self.edges[:, ::-1]])
         counts = np.bincount(ends[:, 0], minlength=len(self._vertices_m))
         first = np.concatenate([[0], np.cumsum(counts)])
@@ -66,7 +66,7 @@ class Lookup:
         return tuple(hole for hole in find_holes(self._vertices_m, self._triangles) if hole.open)
 
     def prepare(self) -> None:
-        """Make at once what clicks on the surface need, so that the first click does not wait for it."""
+        """Compute in advance what clicks on the surface need, so that the first click need not wait."""
         self.nearest(self._vertices_m[0])
         flooded(*self.neighbours, self.rim, 0)
         self.tree.nearest(self._vertices_m[:1], 1)

@@ -16,7 +16,7 @@ from pipeline.types import FloatArray
 
 Snap = Literal["surface", "vertex", "edge", "plane"]
 BRIDGE_COSINE = 0.5
-"""Cosine of a triangle's normal and its corners' below which it bridges two surfaces."""
+"""Cosine between the normals of a triangle and of its corners below which it bridges two surfaces."""
 RAGGED_COSINE = 0.87
 """Cosine of the corners' normals below which a triangle bridges a crease."""
 OTHER_FACE_COSINE = 0.8
@@ -26,8 +26,8 @@ EDGE_SPACINGS = 5.0
 NEAREST = 200
 """Most vertices from which its planes are grown."""
 BESIDE_LINE, GAP = 2.0, 3.0
-"""Vertices within this many spacings of a line show how far it goes; farther apart, it is interrupted, and a
-plane whose vertices all are farther from a corner ends before it."""
+"""Spacings: vertices within the first distance of a line show how far it goes. A wider gap than the second
+interrupts the line, and a plane whose nearest vertex is farther from a corner does not reach it."""
 LEAST_VOLUME = 0.2
 """Least volume that the unit normals of three planes span; flatter corners are open along a line."""
 
@@ -50,14 +50,16 @@ class Mark:
     ray: FloatArray | None = None
     """(3,) unit direction from the camera to the point."""
     range_m: float = float("nan")
+    """Distance from that camera; NaN if unknown."""
     confidence: float = float("nan")
-    """Distance of that camera, and confidence of a guess."""
+    """Confidence of a guess, 0 to 1; NaN if unknown or measured."""
 
 
 def mark(surface: MeasuredSurface, point_m: FloatArray, snap: Snap = "surface") -> Mark:
     """Return the point of a surface that is nearest to a given point.
 
-    How far the given point was from there counts as standard deviation in that direction.
+    The distance of the given point from the surface counts as standard deviation in that direction, unless
+    planes determine the mark.
 
     Args:
         surface: the surface.

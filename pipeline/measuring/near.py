@@ -1,4 +1,4 @@
-"""The place on a surface that a given point means, or a sentence that there is none."""
+"""Search for the place on a surface nearest to a given point, which must be near the surface."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pipeline.types import FloatArray
 
 NEAR_M = 0.05
 NEAR_SPACINGS = 3.0
-"""A point is on the surface if it is within this distance of it, in m or spacings of the vertices."""
+"""A point is near the surface within the larger of these distances, in m and in spacings of the vertices."""
 
 
 def spot_near(surface: MeasuredSurface, point_m: FloatArray) -> Spot:

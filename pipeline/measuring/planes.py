@@ -29,7 +29,7 @@ BORDER = 2
 """Edges from a part's border within which its vertices are not fitted: smoothing (over 20 neighbours) and the
 rolling ball round what meets it there."""
 LEAST_SPREAD = 1.0
-"""The others are fitted if they spread this many spacings across: those of a narrow part are on a line."""
+"""Least spread across, in spacings, of the vertices inside the border; in a narrower part all are fitted."""
 FLAT = 0.35
 """Largest ratio of the seed's thickness to its width; a corner or an edge is thicker."""
 MOST_PASSES = 15
@@ -61,8 +61,9 @@ class Plane:
     ray: FloatArray | None = None
     """(3,) unit direction from the camera to the centre, for a guessed plane."""
     range_m: float = float("nan")
+    """Mean distance from that camera; NaN if measured or unknown."""
     confidence: float = float("nan")
-    """Distance of that camera, and mean confidence of the guesses."""
+    """Mean confidence of the guesses, 0 to 1; NaN if measured or unknown."""
 
     def offset_variance_m2(self, point_m: FloatArray) -> float:
         """Return the variance of the plane's height at a (3,) point."""
@@ -147,7 +148,7 @@ def _around(lookup: Lookup, within: BoolArray, seed: int) -> IntArray:
 
 
 def _weights(surface: MeasuredSurface, rows: IntArray) -> FloatArray:
-    """Return (M,) weights 1 / sd^2 of vertices, at most 100 times the least, so that no few decide."""
+    """Return (M,) weights 1 / sd^2 of vertices, at most 100 times that of the median variance."""
     variance_m2 = surface.sigma_m[rows] ** 2
     return 1.0 / np.maximum(variance_m2, 1e-2 * np.median(variance_m2) + 1e-18)
 
@@ -224,7 +225,7 @@ def guess_of(surface: MeasuredSurface, rows: IntArray) -> tuple[float, float]:
 def rectangle(
     flat_m: FloatArray, percentiles: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the smallest rectangle around (M, 2) points, without those outside two percentiles.
+    """Return the rectangle between two percentiles of (M, 2) points, parallel to their smallest rectangle.
 
     Returns:
         (2, 2) unit axes of its sides as rows, and (2,) least and (2,) greatest coordinates along them.

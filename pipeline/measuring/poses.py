@@ -16,10 +16,10 @@ ASSUMED_SCALE_SD = 0.01
 """Relative standard deviation of lengths without a calibration: uncalibrated depth cameras were found 1 to
 3 % wrong (SPEC 1.5)."""
 SLACK_OF_SCALE = 0.35
-"""Ratio of what cameras of wrong scale leave in a registration, as a turn in rad and as a shift over the
-distance of what they see, to the scale's own deviation: rendered rooms of ``lab.measuring.rooms.TUNING`` on,
-two nodes each, whose focal lengths were wrong by 0.3 % (standard deviation), ended 1.1 mrad and 1.05 mm per m
-off (SPEC 11). ``python -m lab.measuring poses`` prints it."""
+"""Error of a registration by a wrong scale of the cameras, relative to the scale's standard deviation: a turn
+in rad, and a shift as a share of the distance of the points. In rendered rooms (seeds from
+``lab.measuring.rooms.TUNING``), two nodes each, with focal lengths wrong by 0.3 % (standard deviation), the
+errors were 1.1 mrad and 1.05 mm per m (SPEC 11). ``python -m lab.measuring poses`` prints it."""
 UNHELD_RAD, UNHELD_M = 0.02, 0.03
 """Standard deviations of a placed node that no registration holds: it stands where its given pose says."""
 
@@ -63,7 +63,7 @@ def of_placement(placement: Placement, seen_m: Sequence[FloatArray], scale_sd: f
 
 
 def of_walk(walk: Walk) -> FloatArray:
-    """Return (K, 6, 6) covariances of the keyframes of a recording."""
+    """Return (K, 6, 6) covariances of the keyframes of a recording, relative to the first one."""
     number = {frame: row for row, frame in enumerate(walk.keyframes)}
     edges = [
         PoseEdge(number[link.source], number[link.target], link.T_target_source, link.information)

@@ -46,8 +46,9 @@ def interval(
 ) -> tuple[float, tuple[float, float]]:
     """Return a measure and its 95 % interval.
 
-    Measured things: to first order, from the joint covariance. With a guessed one: percentiles of draws, in
-    which guesses err as guesses of the same confidence do, independently of each other.
+    The interval of measured things follows to first order from the joint covariance. With a guessed one it
+    consists of percentiles of draws, in which guesses have the errors of guesses of the same confidence,
+    independently of each other.
 
     Args:
         surface: the surface.
@@ -107,7 +108,7 @@ def _shares(node: int, count: int) -> FloatArray:
 
 
 def _choice_of_node_m2(surface: MeasuredSurface, thing: Mark) -> FloatArray:
-    """Return the (3, 3) covariance of which node's image shows the place of a mark of several nodes.
+    """Return the (3, 3) covariance of a mark of several nodes that is due to the differences of their poses.
 
     The surface is the nodes' mean, but what is seen at a place on it is where one of them saw it: the
     nodes' motions differ from their mean in the surface's plane. Along the normal, their disagreement is in

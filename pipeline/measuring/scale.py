@@ -1,4 +1,4 @@
-"""A typed true length: whether the measured one agrees, and the surface scaled by it."""
+"""Comparison of a measured length with its true length, and the surface scaled by their ratio."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def with_scale(
 ) -> tuple[MeasuredSurface, ScaleCheck]:
     """Compare a measured length with its true one, and scale the surface so that they agree.
 
-    The scaled surface's lengths are as exact together as the measure was without the scale's own deviation.
-    Marks and planes of the surface before have to be taken again on the scaled one.
+    The relative standard deviation of the measure, without that of the scale before, is the scaled surface's
+    ``scale_sd``. Marks and planes of the surface before have to be taken again on the scaled one.
 
     Args:
         surface: the surface on which the length was measured.

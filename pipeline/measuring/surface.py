@@ -27,7 +27,7 @@ from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud, PointSou
 MEASURING = "measuring.npz"
 """File of a run with what ``read_measured`` reads."""
 SAMPLED = 500
-"""Points of a node from which the middle of what it sees is taken."""
+"""About the number of a node's points whose mean is taken as the middle of what it sees."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -47,10 +47,10 @@ class MeasuredSurface:
     guessed: BoolArray
     """(V,) True for vertices from inferred depth."""
     nodes: IntArray
-    """(V,) index of the node that measured each vertex; -1 if several or unknown."""
+    """(V,) index of the node, or recording's keyframe, that measured each vertex; -1: several or unknown."""
     pose_covariances: FloatArray
     """(N, 6, 6) covariance of each node's small motion (turn in rad about the world's origin, then shift in
-    m) relative to node 0."""
+    m) relative to the node whose pose is kept, or of each keyframe's relative to the first keyframe."""
     scale_sd: float
     """Relative standard deviation of all lengths together."""
     scale_source: str
@@ -128,8 +128,8 @@ def surface_of_rig(
 def measured_cloud(cloud: PointCloud, scale_sd: float = poses.ASSUMED_SCALE_SD) -> MeasuredSurface:
     """Return a cloud, ready to be measured; missing normals and noise are estimated.
 
-    Without ``sigma_m``, and where it is NaN, the noise of a point is the distance of its neighbours from its
-    plane.
+    Without ``sigma_m``, and where it is NaN, the noise of a point is the standard deviation of its
+    neighbours' distances from its tangent plane. Estimated normals point towards the mean of the points.
 
     Args:
         cloud: (N, 3) points; with labels of their source, inferred ones count as guessed.
@@ -212,7 +212,7 @@ def _of_map(rig: Rig, surface: Surface, known: Known, guessed: BoolArray) -> Kno
 
 
 def _scatter_m(points_m: FloatArray, normals: FloatArray) -> FloatArray:
-    """Return (N,) root mean square distance of each point's neighbours from its tangent plane."""
+    """Return (N,) standard deviation of the neighbours' distances from each point's tangent plane."""
     rows = tree_of(points_m).nearest(points_m, min(9, len(points_m)))[1]
     off_m = np.einsum("nkd,nd->nk", points_m[rows] - points_m[:, None], normals)
     return np.maximum(off_m.std(axis=1), 1e-6)

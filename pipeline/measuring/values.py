@@ -31,7 +31,7 @@ class Value:
     ci95: tuple[float, float]
     """Interval computed for 95 %, in the same unit; ``HELD`` says how many held."""
     guessed: bool
-    """Whether an end was guessed, so that the interval has the odds of such guesses."""
+    """Whether an end was guessed, so that the interval follows from the known errors of such guesses."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Knowledge of the cameras about a surface's vertices: who measured them, how exactly, how surely."""
+"""Noise, node and confidence of a surface's vertices, by comparison with the cameras' depth images."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from pipeline.recording.still import step_at
 from pipeline.types import BoolArray, FloatArray, IntArray, RgbdFrame
 
 WIDTH_PX = 320
-"""Larger images are compared with the surface at every second pixel, and so on."""
+"""Least width to which images are reduced, to every k-th pixel, for the comparison with the surface."""
 WINDOW = 0.5
 """Standard deviation of the window over which the surface's misfit is averaged, in spacings."""
 MISFIT_FACTOR = 1.25
-"""Standard deviation over the root mean square of this misfit, less noise; its tails are long.
+"""Ratio of a vertex's standard deviation to the root mean square of this misfit less noise, with long tails.
 ``python -m lab.measuring misfit`` prints how often the depths in rendered rooms are inside their intervals by
 several factors."""
 LEAST_WINDOW_PX = 1.5
@@ -35,9 +35,9 @@ LEAST_MEASURED = 0.05
 ALONE = 0.8
 """Share of the measurements from which a vertex belongs to one node."""
 MOST_AVERAGED = 60.0
-"""Most measurements that averaging a depth image over its surface makes one of, about."""
+"""About the largest number of measurements that averaging over a surface combines in one pixel."""
 PATCH = 10.0
-"""Vertices over which smoothing averages (20 neighbours with Gaussian weights, ``surface.smooth``)."""
+"""Effective number of vertices that smoothing averages (20 with Gaussian weights, ``surface.smooth``)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ class Known:
 
 @dataclass(frozen=True, slots=True)
 class _Compared:
-    """A surface beside one camera's averaged depth, at every ``every`` pixels; (h, w) arrays."""
+    """A surface compared with one camera's averaged depth at every ``every``-th pixel; arrays are (h, w)."""
 
     every: int
     surface_m: FloatArray
@@ -92,7 +92,7 @@ class _Compared:
 
 @dataclass(frozen=True, slots=True)
 class _Seen:
-    """One camera's look at V vertices; all arrays (V,) but the rays."""
+    """V vertices as one camera sees them; all arrays are (V,) except ``rays``."""
 
     inside: BoolArray
     """Whether a vertex is in the image."""
@@ -254,7 +254,7 @@ def _confidence(
 
 
 def _law_m(view: View, seen: _Seen) -> FloatArray:
-    """Return (V,) standard deviation of one depth: of an average if there is one, else by the law."""
+    """Return (V,) standard deviation of one depth, m: of a recording's average, else by the sensor's law."""
     noise, averaging = view.frame.noise, view.frame.averaging
     law_m = depth_sigma_m(seen.z_m) if noise is None else noise.sd_m(seen.z_m)
     if averaging is None:

@@ -26,7 +26,7 @@ from pipeline.types import (
 UNKNOWN = "–"
 SHOWN_NODES = 4
 SPACING_POINTS = 200_000
-"""Largest cloud whose spacing is measured; of more it would take longer than a table may."""
+"""Largest number of points whose spacing is measured; more would take too long for a table."""
 _CELL = Markup('<td style="text-align: {}; padding: 1px 10px 1px 0">{}</td>')
 _FIGURE = Markup(
     '<figure style="margin: 0 12px 0 0; display: inline-block">'

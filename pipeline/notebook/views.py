@@ -1,4 +1,4 @@
-"""Viewpoints from which a cloud or a surface is looked at, where no camera is given."""
+"""Viewpoints for pictures of a cloud or a surface without a given camera."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from pipeline.types import BoolArray, CameraIntrinsics, FloatArray, PointCloud
 FOV_RAD = float(np.radians(50.0))
 """Vertical field of view."""
 SMALLEST_M = 0.01
-"""Least radius of what is looked at."""
+"""Least radius of the sphere that fills the picture."""
 OBLIQUE = (-0.6, -0.7, 0.5)
-"""Direction of the view of points without a side that was seen."""
+"""Direction towards the viewpoint, if the normals do not show from which side the points were seen."""
 ABOVE = 0.4
 """Height over distance that is added to a direction, to look down."""
 LEAST_SIDE = 0.2
 """Shorter mean normals belong to surfaces that face all sides."""
 STRAIGHT = 0.99
-"""Correlation of pixels with x/z and y/z in the frame of the camera that saw the points."""
+"""Correlation of pixels with x/z and y/z above which points are in the frame of the camera that saw them."""
 LEAST_POINTS = 10
 """Fewer points do not show whether they are in their camera's frame."""
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A place to look from."""
+    """A viewpoint, a target and the upward direction, all in the frame of the points."""
 
     position_m: FloatArray
     """(3,)."""
@@ -40,7 +40,7 @@ class View:
     """Vertical field of view."""
 
     def camera(self, width_px: int, height_px: int) -> Camera:
-        """Return a pinhole camera there."""
+        """Return a pinhole camera at the viewpoint; its pose is in the frame of the points."""
         forward = _unit(self.look_at_m - self.position_m)
         right = _unit(np.cross(forward, self.up))
         T = rigid(np.stack([right, np.cross(forward, right), forward], axis=1), self.position_m)

@@ -21,9 +21,13 @@ def read_pair(
     Args:
         source: file of the cloud that moves.
         target: file of the cloud that stays.
-        columns: columns of both files, as in ``read_cloud``, or one text for each, where ``auto`` finds them
-            in the file; one text does not concern a file that names its columns itself.
-        metres_per_unit: units of both files; None are the units that titles of columns name, or else metres.
+        columns: empty; or one text of columns, as in ``read_cloud``, for both files (a file that names its
+            columns itself ignores it); or one text for each file, where ``auto`` finds them in the file.
+        metres_per_unit: metres per unit of the source and of the target; None takes the units that the files
+            name, or else metres.
+
+    Returns:
+        Source and target, in metres.
 
     Raises:
         InputError: a file, its columns or a unit cannot be used.

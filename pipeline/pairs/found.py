@@ -1,4 +1,4 @@
-"""The answer of one of our methods on a pair: a search for its pose, draws of the points, and a verdict."""
+"""Answers of our methods for a pair: search for the pose, registration from its start, and verdict."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from pipeline.types import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a search found the source, and what is needed to judge other poses of it."""
+    """Pose that the search found for a pair, and what is needed to judge other poses."""
 
     pair: Pair
-    """The clouds with the start pose from which the search arrived."""
+    """The clouds; ``T_init`` is the start pose that led to the found pose."""
     config: RegistrationConfig
-    """Settings with the gate and the direction that led there."""
+    """Settings with the gate and the direction that led to the found pose."""
     found: Found
     judge: Judge
     T_given: FloatArray
-    """(4, 4) start pose that was given."""
+    """(4, 4) start pose T_target_source of the pair before the search."""
 
 
 def find_place(pair: Pair, config: RegistrationConfig, gate_m: float | None) -> Place:
@@ -42,7 +42,7 @@ def find_place(pair: Pair, config: RegistrationConfig, gate_m: float | None) -> 
     Args:
         pair: the clouds and their start pose.
         config: settings; with ``start="global"`` the given start pose is not tried.
-        gate_m: the only gate; None tries those that suit the clouds.
+        gate_m: the only gate to try, metres; None tries ``default_gates_m``.
 
     Raises:
         ReconstructionError: no start pose leads to a registration.
@@ -58,9 +58,10 @@ def find_place(pair: Pair, config: RegistrationConfig, gate_m: float | None) -> 
 
 
 def settled_answer(name: str, place: Place) -> Answer:
-    """Run one of our methods from the start that the search found, and judge where it ends.
+    """Run one of our methods from the search's start pose, and judge its answer.
 
-    If it ends at another place than the search, it starts again from there.
+    If the answer is not the pose that the search found, the method runs again from that pose. For an answer
+    that is not sure, a mirrored and a scaled source are tried as explanations.
     """
     pair, config, found = place.pair, place.config, place.found
     T_found = found.candidate.T_target_source
@@ -82,8 +83,8 @@ def settled_answer(name: str, place: Place) -> Answer:
 def judged(answer: Answer, place: Place) -> Answer:
     """Return an answer with the verdict on it.
 
-    The search has tried other draws of the points and other poses; another place has not been tested so, and
-    an answer there is not sure.
+    The search has tested its own pose with other draws of the points and with rival poses. An answer at
+    another pose has not been tested in this way, so it is never sure.
     """
     T, found = answer.T_target_source, place.found
     if T is None:
@@ -107,7 +108,7 @@ def _same(T_a: FloatArray, T_b: FloatArray, pair: Pair) -> bool:
 
 
 def _other_clouds(place: Place, T: FloatArray) -> tuple[str, ...]:
-    """Return a reason if a mirrored or scaled source would fit without any doubt."""
+    """Return a reason for doubt if a mirrored or scaled source surely fits, clearly better; else empty."""
     pair, config = place.pair, place.config
     starts = [place.T_given, *([] if place.found.way == "given" else [pair.T_init]), T]
     gates_m = default_gates_m(pair.target, "surfaces", config.seed)
@@ -127,7 +128,7 @@ def _answer(name: str, pair: Pair, config: RegistrationConfig) -> Answer:
 
 
 def moved_away(pair: Pair, T_given: FloatArray, T: FloatArray) -> str:
-    """Return a sentence if the answer is not near the given start pose: where to; else nothing."""
+    """Return a sentence with the answer's distance and turn from the given start pose; empty if near."""
     voxel_m = default_voxel_m(pair.target)
     away_m = point_error_m(T, T_given, compared_points_m(pair.source))
     if away_m <= 5.0 * voxel_m:

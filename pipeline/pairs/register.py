@@ -36,7 +36,7 @@ LEAST_POINTS = 6
 LARGEST_M, SMALLEST_M = 1000.0, 0.001
 """Plausible extents of a cloud in metres."""
 _MOST_EXTENTS = 1e4
-"""Points farther from the middle than so many extents of a cloud are errors of measurement."""
+"""A point farther from the median than this many extents of the cloud is an error of measurement."""
 EVALUATED_POINTS = 20_000
 """Both clouds are thinned to about this many points before their distance is measured."""
 SHAPE_POINTS = 3000
@@ -50,8 +50,10 @@ class Answer:
     T_target_source: FloatArray | None
     """(4, 4) final pose."""
     iterations: int | None
+    """Number of iterations; None if a peer does not report it."""
     stop_reason: str
     elapsed_s: float
+    """Run time; NaN if the method failed."""
     rmse_m: float = float("nan")
     """Root mean square distance of the moved source points from the target, within the gate; computed
     in the same way for every method."""
@@ -64,16 +66,16 @@ class Answer:
     step_times_s: tuple[float, ...] = ()
     """Time since the start at each step."""
     draws: int = 1
-    """Number of draws of the points that were registered from one start; this answer is of one of them."""
+    """Number of draws of the points whose registrations were compared; 1 without this comparison."""
     spread_m: float = float("nan")
-    """Largest point error between this and the registrations that checked it; infinite if one failed, NaN
-    without any."""
+    """Largest point error between the search's pose and the registrations that checked it; infinite if one
+    failed, NaN without any."""
     verdict: Verdict | None = None
-    """Whether to believe the pose; None of answers that were not judged."""
+    """Whether to believe the pose; None if the answer was not judged."""
     evidence: Evidence | None = None
-    """What the clouds say of the pose."""
+    """Evidence of the clouds for and against the pose; None if the answer was not judged."""
     way: Way | None = None
-    """Where the start pose came from."""
+    """Where the start pose came from; None if the answer was not judged."""
 
     @property
     def failed(self) -> bool:
@@ -116,9 +118,9 @@ def config_for(
 ) -> RegistrationConfig:
     """Return the settings of a comparison.
 
-    A scale needs the point metric and pairs in both directions: with one direction, source points come nearer
-    to their nearest partners by shrinking. Without ``gate_m`` the default is set, until a search finds one
-    that suits the data.
+    A scale needs the point metric and pairs in both directions: with one direction, shrinking the source
+    would bring its points nearer to their partners. Without ``metric`` it is ``plane``, or ``point`` with a
+    scale. Without ``gate_m`` the default gate is set, which ``find_place`` replaces.
 
     Raises:
         InputError: the settings contradict each other.
@@ -135,7 +137,7 @@ def config_for(
 
 
 def prepared_cloud(cloud: PointCloud, name: str, voxel_m: float | None) -> PointCloud:
-    """Remove repeated points and bad normals and, if ``voxel_m`` is given, thin the cloud.
+    """Remove repeated points, strays and bad normals, then average over voxels of edge ``voxel_m`` if given.
 
     Raises:
         InputError: there are fewer than six distinct points, or the size is implausible in metres.
@@ -163,7 +165,7 @@ def prepared_cloud(cloud: PointCloud, name: str, voxel_m: float | None) -> Point
 
 
 def _without_strays(cloud: PointCloud, name: str, farthest_m: float) -> PointCloud:
-    """Return the points that are at most so far from the median of all."""
+    """Return the points whose coordinates are all within ``farthest_m`` of the median."""
     near = np.abs(cloud.points_m - np.median(cloud.points_m, axis=0)).max(axis=1) <= farthest_m
     if near.all():
         return cloud
@@ -191,7 +193,7 @@ def prepared_pair(
         source: the cloud that moves.
         target: the cloud that stays.
         config: settings of the registration.
-        voxel_m: edge of the cubes that keep one point each; None keeps all points.
+        voxel_m: edge of the cubes over which points are averaged, metres; None keeps all points.
         T_init: (4, 4) start pose T_target_source; None is the identity.
         T_true: (4, 4) true pose, if it is known.
         units_known: whether the user has given the units of both clouds.
@@ -209,7 +211,7 @@ def prepared_pair(
 
 
 def run_methods(methods: tuple[str, ...], pair: Pair, config: RegistrationConfig) -> Iterator[Answer]:
-    """Yield every method's answer from the same start; a failed method's stop reason says why."""
+    """Yield every method's answer from the same start pose; a failed method's stop reason names the error."""
     evaluate = _Evaluation(pair, config.gate_m)
     for name in methods:
         try:

@@ -15,12 +15,12 @@ _log = logging.getLogger(__name__)
 _QUANTILES = (0.1, 0.25, 0.5, 0.75, 0.9)
 """Quantiles of the distances from the middle, which describe a cloud's shape whatever its pose."""
 _INNER = 0.95
-"""Share of the points, the nearest to the centroid, whose centroid is the middle."""
+"""The middle is the centroid of this share of the points, those nearest to the centroid of all."""
 _UNITS = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254, "feet": 0.3048, "yards": 0.9144}
 _LARGE = 20.0
-"""From this factor on a similar shape is enough: nobody registers clouds of so different sizes."""
+"""From this factor on a similar shape is enough: clouds of the same place do not differ so much in size."""
 _KILO = 300.0, 3000.0
-"""Factors that are taken for a thousand, whatever the shapes."""
+"""A factor between these is taken for a thousand, whatever the shapes."""
 _SIMILAR, _SAME = 0.35, 0.02
 """Largest relative deviation of the quantiles' ratios for similar and for the same shapes."""
 _LEAST_FACTOR = 1.05
@@ -29,7 +29,7 @@ _NOTED_FACTOR = 1.01
 _OF_DEVIATION = 3.0
 """A factor must differ from one by this many times the deviation."""
 _USUAL_M = 0.05, 50.0
-"""Usual sizes: from objects to houses."""
+"""Usual sizes, metres: from objects to houses."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,8 @@ class SizeRatio:
     factor: float
     """Median ratio of the quantiles of the distances from the middle, source over target."""
     deviation: float
-    """Largest relative deviation of a ratio from ``factor``; 0 for clouds of the same shape."""
+    """Largest relative deviation of a ratio from ``factor``: 0 for clouds of the same shape, infinite if a
+    quantile of a cloud is 0."""
 
 
 def size_ratio(source_m: FloatArray, target_m: FloatArray) -> SizeRatio:
@@ -99,7 +100,10 @@ def _distances_m(points_m: FloatArray) -> FloatArray:
 
 
 def _differs(deviation: float, factor: float, with_scale: bool) -> bool:
-    """Return whether a factor of at least one tells another unit; sizes alone tell those above a thousand."""
+    """Return whether a factor of at least one means another unit.
+
+    From 3000 on it does not: ``prepared_cloud`` refuses implausible sizes.
+    """
     if factor >= _LARGE:
         return factor < _KILO[1] and deviation <= _SIMILAR
     alike = deviation <= _SAME and factor - 1.0 > _OF_DEVIATION * deviation
@@ -107,7 +111,7 @@ def _differs(deviation: float, factor: float, with_scale: bool) -> bool:
 
 
 def _thousand(larger: str, factor: float, other: PointCloud) -> InputError:
-    """Return the error for a factor of about a thousand: millimetres, or kilometres of the smaller cloud."""
+    """Return the error for a factor of about 1000: the larger cloud in millimetres or the smaller in km."""
     size_m = 2.0 * float(_distances_m(other.points_m)[-1])
     kilometres = size_m < _USUAL_M[0] and _USUAL_M[0] <= factor * size_m <= _USUAL_M[1]
     if kilometres:

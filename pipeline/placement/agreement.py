@@ -13,7 +13,7 @@ from pipeline.types import CameraIntrinsics, DepthMap, FloatArray, PointCloud
 WITHIN = 0.02
 """Two measurements that differ by less than this share of the depth belong to the same surface."""
 ASKED_POINTS = 4000
-"""Points of a cloud that are compared with another camera's image."""
+"""Largest number of a cloud's points that are compared with another camera's image."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +50,8 @@ def agreement(
 ) -> Agreement:
     """Compare a cloud's points with another camera's measurements.
 
-    A point well behind the measured surface is hidden and does not count; one in front of it would have been
-    seen. So a pose that puts one place onto another is detected even if nearest points fit.
+    A point well behind the measured surface is hidden and does not count. A point in front of it contradicts
+    the pose, because the camera saw through its place; this detects wrong poses at which nearest points fit.
 
     Args:
         cloud: measured points in any frame, of which those of ``asked`` are compared.

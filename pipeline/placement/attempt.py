@@ -26,11 +26,12 @@ LEAST_OVERLAP = 0.05
 LEAST_AGREEMENT = 0.4
 """A node with a given pose is excluded if a smaller share of its shared measurements is within 2 %."""
 SURE_OVERLAP, SURE_AGREEMENT = 0.15, 0.88
-"""Least overlap and agreement of an answer of a wider gate; a node with less agreement gets a warning. At
-correct poses, nodes of rendered rigs reach .92 to .98 and those of a real SR300 .92 to .99; 3 degrees and
-6 cm off .09 to .54; in another room up to .72; with one corner mistaken for the opposite .86."""
+"""Least overlap and agreement for which the answer of a wider gate is taken; a node with less agreement gets
+a warning. Measured agreements: nodes of rendered rigs at correct poses .92 to .98, those of a real SR300 .92
+to .99; 3 degrees and 6 cm off .09 to .54; in another room up to .72; with a corner taken for the opposite
+one .86."""
 FOUND_AGREEMENT = 0.75
-"""A pose that was found is refuted by a smaller agreement: it is more than that of walls on other walls."""
+"""A smaller agreement refutes a pose that a search found; walls placed on other walls agree less."""
 WIDER_GATES = 2.0, 4.0
 """Multiples of the configured gate, tried if given poses lead to a contradiction with the measurements."""
 LEAST_ODDS, MOST_ODDS = 0.1, 100.0
@@ -46,14 +47,15 @@ class Attempt:
     given: bool
     """Whether it started from given poses."""
     result: RegistrationResult
-    """Its steps are without their pairs."""
+    """Result; its steps have no pairs, weights and distances."""
     agreement: Agreement
+    """Agreement of both nodes' points at the result's pose; ``NOTHING_SHARED`` if the registration failed."""
     edge: PoseEdge | None
     """Evidence for the pose graph; None if the registration failed, degenerated or is in doubt."""
     verdict: Verdict | None = None
-    """Verdict on a pose that was found; None of a given one, or if none was found."""
+    """Verdict on a pose that a search found; None for given poses and if the search found none."""
     score: float = 0.0
-    """Score of the evidence for a pose that was found, 0 to 1."""
+    """Score of the evidence for a pose that a search found, 0 to 1; else 0."""
 
     @property
     def link(self) -> tuple[int, int]:
@@ -62,12 +64,12 @@ class Attempt:
 
     @property
     def holds(self) -> bool:
-        """Whether it is evidence for a pose, and nothing contradicts it."""
+        """Whether there is an edge that the measurements do not contradict."""
         return self.edge is not None and self.edge.agrees
 
     @property
     def refuted(self) -> bool:
-        """Whether the measurements contradict the pose to which a given one led."""
+        """Whether the measurements contradict the result of a registration from given poses."""
         return less(self.agreement, LEAST_AGREEMENT)
 
 
@@ -82,7 +84,10 @@ def confirmed(found: Agreement) -> bool:
 
 
 def odds(share: float) -> float:
-    """Return the odds that a measurement agrees: a share of .96 weighs more than two of .9."""
+    """Return the odds share / (1 - share), within ``LEAST_ODDS`` and ``MOST_ODDS``.
+
+    An edge with a share of .96 weighs more than two with .9.
+    """
     return float(np.clip(share / max(1.0 - share, 1e-9), LEAST_ODDS, MOST_ODDS))
 
 
@@ -94,7 +99,7 @@ def attempt_given(
     T_init: FloatArray,
 ) -> Attempt:
     """Register a node to another from their given poses; if the measurements contradict the result, try wider
-    gates.
+    gates. An attempt that fails has no edge.
 
     Args:
         source, target: the two nodes.
@@ -135,7 +140,7 @@ def attempt_found(
     Args:
         source, target: the two nodes.
         link: their numbers.
-        config: settings of the last registration, whose gate is that of the search if that is smaller.
+        config: settings of the last registration; its gate is the search's gate where that is smaller.
         start: way to find start poses.
         views: the nodes' surfaces.
     """
@@ -173,7 +178,7 @@ def _registered(
 def _doubted(
     source: NodeSample, target: NodeSample, link: tuple[int, int], found: Found, reason: str
 ) -> Attempt:
-    """Return the attempt of a pose that is not believed."""
+    """Return the attempt of a search whose pose is in doubt, without an edge."""
     T = found.candidate.T_target_source
     agreement = both_ways(source, target, T)
     result = RegistrationResult(T, (), False, reason)
@@ -181,7 +186,7 @@ def _doubted(
 
 
 def _failed(link: tuple[int, int], given: bool, T: FloatArray, reason: str) -> Attempt:
-    """Return the attempt of a registration that led nowhere; the pose is its start."""
+    """Return the attempt of a registration without an answer; its pose is the start pose."""
     return Attempt(*link, given, RegistrationResult(T, (), False, reason), NOTHING_SHARED, None)
 
 

@@ -50,7 +50,7 @@ class NodeVerdict:
     placed: bool
     """False for a node that is excluded from the following stages."""
     agreement: Agreement
-    """Agreement with all placed nodes together, at the final poses."""
+    """Agreement with the placed nodes that overlap it enough, together, at the final poses."""
     sentence: str = ""
     """Warning for the user; empty if there is none."""
 
@@ -62,7 +62,7 @@ class Placement:
     registrations: tuple[NodeRegistration, ...]
     """All registrations; first those from given poses that place each node relative to an earlier one."""
     T_world_camera: tuple[FloatArray, ...]
-    """Corrected poses of all nodes; excluded nodes keep their given poses."""
+    """(4, 4) corrected poses of all nodes; excluded nodes keep their given poses."""
     verdicts: tuple[NodeVerdict, ...] = ()
     """Verdict on each node; empty means that all are placed."""
     agreements: tuple[NodeAgreement, ...] = ()
@@ -94,7 +94,16 @@ class Placement:
 
 
 def whole_placement(rig: Rig, present: Sequence[int], placement: Placement) -> Placement:
-    """Return all poses: those of placed nodes, others relative to the first by the truth or given poses."""
+    """Return the poses of all nodes of a rig, from the placement of the nodes that are present.
+
+    The other nodes keep their true poses, or without a truth their given poses, relative to the first placed
+    node.
+
+    Args:
+        rig: the whole rig.
+        present: indices of the nodes of ``placement``, in its order.
+        placement: placement of these nodes, at least one of them placed.
+    """
     believed = [frame.T_world_camera for frame in rig.frames]
     reference = believed if rig.truth is None else rig.truth.T_world_camera
     placed = placement.placed(list(zip(present, placement.T_world_camera, strict=True)))

@@ -15,7 +15,7 @@ GIVEN_PAIRS = 4
 COLOUR_TRIES = 40
 """Most pairs of a node that are tried by colour, to join it to others."""
 LONE_TRIES, GROUP_TRIES = 12, 2
-"""Most pairs of a node that are tried by surfaces: of one that colour joined to nothing, and of another."""
+"""Most pairs of a node that are tried by surfaces: if colour joined it to no other node, and if it did."""
 BRIDGE_TRIES = 2
 """Most further pairs that are tried where a single registration joins two groups."""
 
@@ -24,9 +24,10 @@ Pair = tuple[int, int]
 
 
 def likeliest_first(known: Sequence[bool], likeness: Callable[[int, int], float]) -> list[Pair]:
-    """Order the pairs that are not both known by their likeness; equal ones by their distance in the rig.
+    """Return the pairs of nodes with at most one known pose, the most alike first.
 
-    Images that were taken in a row overlap most.
+    Of pairs that are equally alike, those closer in the rig's order come first: images taken in a row overlap
+    most.
 
     Args:
         known: whether each node's pose is known.
@@ -67,7 +68,11 @@ def given_pairs(
 
 
 class JoiningPairs:
-    """Pairs that may join two groups of nodes, in a given order, while the smaller group's node has tries."""
+    """Pairs that may join two groups of nodes, in a given order.
+
+    A pair uses up one try of its node in the smaller group, or of equal groups that with more tries left. It
+    is skipped if this node has none.
+    """
 
     def __init__(self, candidates: Sequence[Pair], tries: Sequence[int]) -> None:
         """Begin with all candidates.
@@ -79,7 +84,7 @@ class JoiningPairs:
         self._left, self._tries = list(candidates), list(tries)
 
     def next(self, links: Sequence[Pair]) -> Pair | None:
-        """Return the next pair; None if there is none.
+        """Return the next pair whose nodes are in different groups, and use up a try; None if there is none.
 
         Args:
             links: pairs of nodes whose poses relative to each other are known.
@@ -102,7 +107,7 @@ def lone_tries(nodes: int, links: Sequence[Pair]) -> list[int]:
 
 
 def across_bridges(candidates: Sequence[Pair], links: Sequence[Pair], nodes: int) -> Iterator[Pair]:
-    """Yield pairs across each link without which its group would be two, the likeliest first.
+    """Yield up to ``BRIDGE_TRIES`` pairs for each link that alone joins two parts, the likeliest first.
 
     Args:
         candidates: pairs that were not tried, the likeliest first.

@@ -34,10 +34,11 @@ def place_nodes(
 
     Nodes with known poses are registered to those earlier ones with the largest common view; the others are
     searched for (``UnknownPoses``). Registrations that contradict the measurements or their loops are
-    rejected; the others give the poses by least squares. The first node with a known pose keeps it. A node
-    with a known pose that no good registration reaches is placed relative to the earlier node with the
-    largest common view; if the measurements refute that too, by the given poses. A node without a pose that
-    none reaches is excluded, and so is one whose measurements contradict the others' at its final pose.
+    rejected; the others give the poses by least squares. Only the largest group of connected nodes is placed,
+    where nodes with known poses count as connected; its first node with a known pose keeps it. A node of the
+    group with a known pose that no good registration reaches is placed relative to the earlier node with the
+    largest common view; if the measurements refute that too, by the given poses. A node outside the group is
+    excluded, and so is one whose measurements contradict the others' at its final pose.
 
     Args:
         frames: the nodes' images with their given poses.
@@ -124,7 +125,10 @@ def _registrations(
 
 
 def _reference(known: Sequence[bool], edges: Sequence[PoseEdge]) -> tuple[int, list[int]]:
-    """Return the node whose pose is kept, and its group: the largest set of connected nodes."""
+    """Return the node whose pose is kept, and its group: the largest set of connected nodes.
+
+    Nodes with known poses count as connected.
+    """
     links = [(edge.source, edge.target) for edge in edges if edge.agrees]
     links += pairwise(index for index, one in enumerate(known) if one)
     group = max(Groups(len(known), links).sets(), key=lambda group: (len(group), -min(group)))

@@ -26,7 +26,7 @@ from pipeline.registration.graph.loops import best_loops
 
 
 class UnknownPoses:
-    """Attempts that place nodes without poses."""
+    """Tries registrations that join nodes without known poses to other nodes."""
 
     def __init__(
         self,
@@ -50,13 +50,13 @@ class UnknownPoses:
         self._links = self._agreeing()
 
     def attempts(self) -> list[Attempt]:
-        """Return all attempts, after those that there were.
+        """Return the attempts from given poses, then those of the search.
 
-        Pairs of nodes that are not joined are tried by the features of their colour images, the likeliest
-        first; then nodes that this joined to nothing by those of their surfaces. Then nodes with a common
-        view at the poses that were found are registered, which closes loops. Where a single registration
-        joins two groups all the same, other pairs are tried without regard to these poses: where they lead
-        elsewhere, the stronger evidence stays.
+        First, pairs of nodes that are not joined yet are tried from features of their colour images, the
+        likeliest first; then from features of their surfaces. Then nodes with a common view at the poses that
+        were found are registered, which closes loops. Where still a single registration joins two groups,
+        other pairs are tried from colour features without regard to these poses; where they lead elsewhere,
+        the stronger evidence stays.
         """
         views, count = self._views, len(self._samples)
         order = likeliest_first(self._known, views.likeness)

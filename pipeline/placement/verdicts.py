@@ -23,7 +23,17 @@ def verdicts_of(
     agreements: dict[tuple[int, int], Agreement],
     tried: Sequence[Attempt],
 ) -> list[NodeVerdict]:
-    """Exclude the worst contradicting node until none contradicts; find doubtful nodes in the same way."""
+    """Return the verdict on each node.
+
+    The node that contradicts the others most is excluded, one after another, until none contradicts; doubtful
+    nodes are found in the same way.
+
+    Args:
+        names: names of all nodes.
+        group: numbers of the nodes that are placed relative to each other.
+        agreements: agreement of each pair (source, target) of the group at the final poses.
+        tried: all registrations, which give the reason for a node outside the group.
+    """
 
     shared: list[list[tuple[int, Agreement]]] = [[] for _ in names]
     for (one, other), found in agreements.items():
@@ -60,7 +70,7 @@ def verdicts_of(
 
 
 def _contradiction(name: str, found: Agreement) -> str:
-    """Return why a node with a pose is excluded."""
+    """Return the warning about a node that the measurements exclude."""
     return (
         f"{name} is left out: of what it and the others both measured, only {found.within_2pct_share:.0%} is "
         "within 2 %; check its pose and that all nodes saw the same scene, or try --set "
@@ -69,7 +79,7 @@ def _contradiction(name: str, found: Agreement) -> str:
 
 
 def _lost(names: Sequence[str], index: int, tried: Sequence[Attempt]) -> str:
-    """Return why a node is connected to no other."""
+    """Return the warning about a node outside the group, with the reason of its best attempt."""
     mine = [trial for trial in tried if index in (trial.source, trial.target)]
     best = max(mine, key=lambda trial: (trial.score, trial.agreement.shared), default=None)
     why = ""

@@ -1,4 +1,4 @@
-"""What a placement without poses asks of a node's images: its surface and its colour features."""
+"""Surfaces and colour features of nodes, for the search for their poses."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from pipeline.registration.finding.surface import Surface
 from pipeline.types import PointCloud, RgbdFrame
 
 KEPT_SURFACES = 32
-"""Surfaces that are kept for further pairs, those used last; each has 8 MB and takes 0.14 s to prepare."""
+"""Number of surfaces kept for further pairs, those used last; each takes 8 MB, and 0.14 s to prepare."""
 
 
 class Views:
     """Surfaces and colour features of the nodes, prepared at first use.
 
-    The surfaces are those of the depth as it was measured: that of averaged depth has less noise nearby than
-    error, while the verdict compares two clouds by their noise.
+    The surfaces are those of the depth as it was measured. The error of averaged depth is larger than the
+    noise between neighbouring points, which the verdict takes for the error.
     """
 
     def __init__(self, frames: Sequence[RgbdFrame], seed: int) -> None:
@@ -36,7 +36,7 @@ class Views:
         return lifted_features(self._frames[node])
 
     def judge(self, source: int, target: int) -> Judge:
-        """Return the judge of two nodes' poses."""
+        """Return the judge of relative poses of two nodes."""
         return Judge(self.surface(source), self.surface(target))
 
     def cloud(self, node: int) -> PointCloud:

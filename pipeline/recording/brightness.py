@@ -48,7 +48,10 @@ class Brightness:
 
 
 def shrunk(frame: RgbdFrame) -> RgbdFrame:
-    """Return a frame with every n-th row and column of its depth, about ``WIDTH_PX`` wide."""
+    """Return a frame about ``WIDTH_PX`` wide: colours averaged, depth of every n-th row and column.
+
+    A frame that is already so narrow, or whose images differ in size, is returned unchanged.
+    """
     step = max(1, round(frame.intrinsics.width_px / WIDTH_PX))
     if step == 1 or frame.depth.z_m.shape != frame.rgb.shape[:2]:
         return frame

@@ -22,9 +22,9 @@ from pipeline.recording.recording import Recording
 from pipeline.types import FloatArray
 
 VERSION = 2
-"""Raised when tracking changes, so that older states are not read."""
+"""Number to increase when tracking changes, so that older states are not read."""
 EVERY_S = 10.0
-"""Time from one writing to the next."""
+"""Least time between two writings of the state."""
 OLD_S = 14 * 86400.0
 """States that were not written for so long are deleted."""
 State = Mapping[str, NDArray[Any]]
@@ -60,9 +60,10 @@ class Checkpoint:
 
 
 def checkpoint_of(recording: Recording, given: Sequence[FloatArray | None] | None) -> Checkpoint | None:
-    """Return the checkpoint of a recording on disk, named by all that decides its tracking; else None.
+    """Return the checkpoint of a recording on disk, named by a hash of all that determines its tracking.
 
-    The first image with depth, in metres, stands for the depth scale and the camera.
+    None if the recording is not on disk or no frame has depth. Of the images, the hash contains only the
+    first depth, in metres, so that it depends on the depth scale.
 
     Args:
         recording: the frames.
@@ -88,7 +89,7 @@ def checkpoint_of(recording: Recording, given: Sequence[FloatArray | None] | Non
 
 
 def cache_folder() -> Path:
-    """Return the folder for files that may be deleted at any time, by the habit of the system."""
+    """Return PacketMesh's folder below the operating system's folder for caches."""
     if "XDG_CACHE_HOME" in os.environ:
         return Path(os.environ["XDG_CACHE_HOME"]) / "packetmesh"
     if sys.platform == "win32" and "LOCALAPPDATA" in os.environ:

@@ -1,4 +1,4 @@
-"""The points of a recording's keyframes, stored in half of their memory."""
+"""The points of a recording's keyframes, stored as float32 in half of the memory."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pipeline.registration.organised import OrganisedCloud
 from pipeline.types import CameraIntrinsics
 
 KEPT = 48
-"""Keyframes used last, whose points stay unpacked."""
+"""Number of keyframes, those used last, whose points stay unpacked."""
 
 
 class _Packed(NamedTuple):

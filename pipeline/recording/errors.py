@@ -13,7 +13,7 @@ from pipeline.types import FloatArray
 def path_note(
     T_world_camera: Sequence[FloatArray | None], T_reference_camera: Sequence[FloatArray | None], of: str
 ) -> tuple[str, ...]:
-    """Return a sentence on how far a path is from ``of``, another one; none where ``ate_m`` is NaN."""
+    """Return a sentence with the ``ate_m`` of a path against a reference called ``of``; none if it is NaN."""
     apart_m = ate_m(T_world_camera, T_reference_camera)
     if np.isnan(apart_m):
         return ()

@@ -28,7 +28,7 @@ from pipeline.types import FloatArray, IntArray, Link
 LOOP_GATE_M = 0.3
 """Gate of a loop's registration: larger than in tracking, because drift may have grown."""
 MOVED_M = 0.1
-"""Change of a pair's start pose after which it is tried again."""
+"""Least shift of a pair's start pose after which the pair is tried again."""
 NEAR_M, NEAR_DEG = 0.9, 45.0
 """Distance and angle of keyframes that may show the same place."""
 LEAST_PREDICTED = 0.4
@@ -36,7 +36,8 @@ LEAST_PREDICTED = 0.4
 MOST_TRIED = 8
 """Most loops tried for each keyframe, those of the largest predicted overlap."""
 MOST_LOOPS, LEAST_TRIED = 1000, 3
-"""Loops tried in a round, about: where keyframes are many, fewer for each, but three, from other times."""
+"""About the most loops tried in a round, and the fewest for each of many keyframes; the targets of such a
+keyframe are not neighbours in time."""
 MOST_COMPARED = 32
 """Most earlier keyframes with which the overlap of each is predicted."""
 ROUNDS = 2
@@ -44,7 +45,7 @@ ROUNDS = 2
 DRIFTS = (3.0, 10.0, 30.0)
 """Factors of tracking's errors that are tried where they contradict places recognised by colour."""
 OF_TRACKING = 1.5
-"""Weight of a link of tracking where links contradict each other, in loops: two loops outvote it."""
+"""Weight of a tracking link, relative to a loop's, where links contradict each other: two loops exceed it."""
 GRAPH_POINTS = 200
 """About the number of a keyframe's points at which the pose graph measures errors."""
 Pair = tuple[int, int]
@@ -163,7 +164,7 @@ class _Loops:
         self.poses, self.links = poses, best
 
     def _explanations(self) -> Iterator[tuple[Pair | None, float]]:
-        """Yield pairs whose link may be wrong, and factors of tracking's errors; those of before first."""
+        """Yield pairs whose link may be wrong, with factors of tracking's errors; the last accepted first."""
         yield self._explained
         sure = next((one for one in self.links if one.pair in self._sure), None)
         if sure is None:
@@ -175,7 +176,10 @@ class _Loops:
             yield None, drift
 
     def _wrong_link(self, sure: Link) -> Pair | None:
-        """Return the pair of tracking whose keyframes agree best if its link alone makes up for a loop."""
+        """Return the pair of tracking whose keyframes agree best if its link has all of a loop's error.
+
+        None if no pair agrees, or if the keyframes would be unconnected without the link.
+        """
         poses, best, most = self.poses, None, LEAST_AGREEMENT
         change = poses[sure.target] @ sure.T_target_source @ inverse(poses[sure.source])
         for one in self.links:
@@ -189,7 +193,10 @@ class _Loops:
         return best
 
     def _in_doubt(self, unused: Link, poses: Mapping[int, FloatArray]) -> bool:
-        """Return whether a link should be used: recognised by colour, or of tracking without better poses."""
+        """Return whether it is doubtful not to use a link.
+
+        It is if colours recognised the pair, or if tracking made the link and the poses do not agree either.
+        """
         source, target = unused.source, unused.target
         T = inverse(poses[target]) @ poses[source]
         agrees = agreement_at(self._clouds[source], self._clouds[target], T) >= LESS_AGREEMENT
@@ -258,7 +265,7 @@ def _best(candidates: Sequence[_Candidate], keyframes: Sequence[int]) -> list[_C
 
 
 def _nearest(T: FloatArray, later: int) -> IntArray:
-    """Return the places of earlier keyframes, but the last one, that are near in place and direction.
+    """Return the indices of earlier keyframes, except the previous one, near in position and direction.
 
     At most ``MOST_COMPARED``, those whose shift and turn together are least.
     """
@@ -302,7 +309,7 @@ def poses_by_tracking(track: Track) -> tuple[FloatArray | None, ...]:
 
 
 def _frame_poses(track: Track, poses: Mapping[int, FloatArray]) -> tuple[FloatArray | None, ...]:
-    """Return the pose of every frame, which hangs on its keyframe."""
+    """Return every frame's pose, by that of its keyframe; None for lost frames and other parts."""
     return tuple(
         None if one is None or one.keyframe not in poses else poses[one.keyframe] @ one.T_keyframe_frame
         for one in track.frames

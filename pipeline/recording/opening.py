@@ -38,11 +38,11 @@ SMALL_PX, TEXTURED, ALIKE = 160, 4.0, 0.7
 """Width at which photographs are compared; least standard deviation of a square with texture, grey levels;
 least correlation of a square that does not change. A slide without a turn shows in the photographs only."""
 CLIPPED_SD = 6.0
-"""A pixel counts for no larger change."""
+"""Largest change of one pixel that counts, in standard deviations."""
 MOVED_M = 0.1
-"""Given positions farther apart are those of a walk: a corridor looks the same all along."""
+"""Given positions farther apart are those of a walk: along a corridor the images may not change."""
 PHOTOGRAPHS = 3
-"""Photographs of which the median colour is taken: what stood in one of them is not painted on a wall."""
+"""Photographs of which the median colour is taken: an object that is in one of them only is left out."""
 READERS = 2
 """Threads that read depth images: decoding takes longer than what is done with them."""
 NAME = "camera"
@@ -206,7 +206,7 @@ def _photographs(recording: Recording, numbers: Sequence[int]) -> tuple[list[Rgb
 
 
 def _median_color(photographs: list[ByteArray]) -> ByteArray:
-    """Return (H, W, 3) the median of photographs; of two it is the first."""
+    """Return the (H, W, 3) median of photographs; the first one if there are fewer than ``PHOTOGRAPHS``."""
     if len(photographs) < PHOTOGRAPHS:
         return photographs[0]
     return np.median(photographs, axis=0).astype(np.uint8)

@@ -44,6 +44,6 @@ class Recording(Protocol):
 
 
 def spread(numbers: Sequence[int], most: int) -> list[int]:
-    """Return at most ``most`` of some numbers, two or more, evenly: with the first and the last."""
+    """Return at most ``most`` (two or more) evenly spaced items of a sequence, including both ends."""
     places = np.linspace(0, len(numbers) - 1, most).round().astype(int)
     return [numbers[place] for place in np.unique(places)] if numbers else []

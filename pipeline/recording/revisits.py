@@ -1,4 +1,4 @@
-"""Places that a camera comes back to with so much drift that only their colours tell (SPEC 10.2)."""
+"""Search by colour for places that a camera revisits after much drift (SPEC 10.2)."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ LEAST_SCORE = 8.0
 OF_EACH, TRIED = 2, 12
 """Most pairs of each keyframe and of all that are registered, those that look most alike."""
 ENOUGH = 5
-"""After so many pairs that count, the others are left to the geometric loops."""
+"""After so many pairs that count the search stops; the geometric loops find the others."""
 
 
 def iterate_revisits(
     places: Places, poses: Mapping[int, FloatArray], clouds: Mapping[int, OrganisedCloud]
 ) -> Generator[Progress, None, list[Link]]:
-    """Find keyframes that show one place though their poses say otherwise, by their colours.
+    """Find, by colour, pairs of keyframes that show one place although their poses are apart.
 
     A pair counts if the verdict on its pose is sure, if it holds as in tracking, and if a neighbour of one
     of the two, where the pair's pose puts it, holds too. The neighbours' registrations are links as well.
@@ -77,7 +77,7 @@ def _alike(
 def _together(
     poses: Mapping[int, FloatArray], clouds: Mapping[int, OrganisedCloud], source: int, target: int
 ) -> bool:
-    """Return whether two keyframes show one place at their poses, so that nothing is to be found."""
+    """Return whether two keyframes already show one place at their poses."""
     T = inverse(poses[target]) @ poses[source]
     return agreement_at(clouds[source], clouds[target], T) >= LEAST_AGREEMENT
 

@@ -24,7 +24,7 @@ MAD_TO_SIGMA = 1.4826
 FLICKERS_BELOW = 0.25
 """Share of the frames below which a pixel that was measured flickers."""
 LEAST_VOTES = 3
-"""Least measurements with a spread of their own; with fewer, the law's counts."""
+"""Least number of measurements of which the spread is computed; with fewer, the noise law's is taken."""
 MOST_RAISED = 5.0
 """Largest noise and step that are taken for the sensor's own, in standard deviations of the law."""
 SAMPLED = 100_000
@@ -32,7 +32,7 @@ SAMPLED = 100_000
 BINS = 12
 """Bins of depth, with equally many measurements, in which the step is estimated."""
 BANDS = 8
-"""Bands of rows, on which two threads work: where nothing was measured there is nothing to do."""
+"""Bands of rows that two threads share: several each, because rows without measurements take no time."""
 ENTRIES = 1024
 """Entries of the tables of noise and step over 1/z."""
 
@@ -48,7 +48,7 @@ class Vote:
     counts: ByteArray
     """(H, W) number of measurements that were averaged."""
     moving: BoolArray
-    """(H, W) True where the spread of three and more exceeds ``WITHIN_SD``, and next to regions of such."""
+    """(H, W) True where three or more measurements spread beyond the limit, and next to such regions."""
     flickering: BoolArray
     """(H, W) True for pixels that less than ``FLICKERS_BELOW`` of the frames measured."""
 

@@ -42,7 +42,7 @@ LEAST_OVERLAP, LEAST_AGREEMENT = 0.3, 0.9
 """Overlap and agreement of a pose that is believed: right ones agree in .99 of what both measured, wrong ones
 in .77 to .87 (rendered walks in three rooms, with jumps)."""
 LESS_AGREEMENT, STEP_M, STEP_DEG = 0.7, 0.03, 2.0
-"""Agreement that is enough this near to the predicted pose: people who walk by lower it."""
+"""Agreement that is enough within these distances of the predicted pose: people who walk by lower it."""
 PREDICTED_M, PREDICTED_RAD = 0.02, np.radians(1.5)
 """Standard error of a predicted pose."""
 GIVEN_INFORMATION = np.diag([0.05**-2.0] * 3 + [0.1**-2.0] * 3)
@@ -120,9 +120,9 @@ def iterate_tracking(
 ) -> Generator[Progress, None, Track]:
     """Find the pose of every frame relative to its keyframe.
 
-    The start is the motion from the frame before, or that of given poses. A frame that does not register to
-    its keyframe is tried against the last ones; until one fits, frames have no pose. If none fits for
-    ``PATIENCE`` frames, a new part begins. Of tracking, only given poses join it to the others.
+    The start pose follows from the last motion, or from that of given poses. A frame that does not register
+    to its keyframe is tried against the last ones; until one fits, frames have no pose. If none fits for
+    ``PATIENCE`` frames, a new part begins, which tracking joins to the part before by given poses only.
 
     Args:
         recording: the frames.
@@ -206,7 +206,7 @@ class _Tracker:
             self._frames.append(Tracked(self._keyframe, found.T_target_source))
 
     def _held(self, k: int, cloud: OrganisedCloud, found: Registered) -> Registered:
-        """Return a registration with open motions as photographs show them, unless depth denies it."""
+        """Return a registration with open motions corrected by photographs, unless depth then disagrees."""
         motions = open_motions(found.information)
         if not motions.size:
             return found
@@ -222,7 +222,7 @@ class _Tracker:
         return Track(tuple(self._frames), self._clouds, tuple(self._links))
 
     def state(self) -> State:
-        """Return all that following goes on from, without the points."""
+        """Return the arrays from which ``iterate_restoring`` continues, without the points."""
         none = Tracked(-1, np.eye(4))
         frames = [one or none for one in self._frames]
         return {
@@ -364,7 +364,7 @@ def steadied(T_target_source: FloatArray, information: FloatArray, T_predicted: 
 
 
 def agreement_at(source: OrganisedCloud, target: OrganisedCloud, T_target_source: FloatArray) -> float:
-    """Return the share of what both measured that agrees at a pose; 0 if that is too little to say."""
+    """Return the share of what both measured that agrees at a pose; 0 if they overlap too little."""
     overlap, agreeing = shared_shares(source, target, T_target_source, WITHIN)
     return agreeing if overlap >= LEAST_OVERLAP else 0.0
 

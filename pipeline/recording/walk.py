@@ -116,9 +116,9 @@ def voxel_edge_m(recording: Recording, numbers: Sequence[int]) -> float:
 def _world(
     recording: Recording, given: Sequence[FloatArray | None] | None, trajectory: Trajectory
 ) -> tuple[FloatArray, tuple[str, ...]]:
-    """Return (4, 4) T_world_first in the world of given poses or another, with z up; and a note if turned.
+    """Return (4, 4) T_world_first, and a note if the given poses' world was turned so that z is up.
 
-    The first keyframe with a given pose gets that one.
+    The first keyframe with a given pose gets that one; without any, the first keyframe looks level.
     """
     T: FloatArray = LEVEL_POSE @ recording.view(next(iter(trajectory.keyframes))).T_color_depth
     note: tuple[str, ...] = ()

@@ -61,8 +61,8 @@ class CeicpN(PairWeighting):
 class CeicpA(PairWeighting):
     """CEICP-A: scale and gate shrink by the same factor at each iteration.
 
-    With the plane metric p is the probability of a pair's distance and of its normals: where two clouds
-    overlap in part, the rim of one finds partners on the other's walls that stand across (SPEC 4.11).
+    With the plane metric p also depends on the angle between a pair's normals: where two clouds overlap only
+    in part, points at the rim of one would be paired with walls of another direction (SPEC 4.11).
     """
 
     facing: ClassVar[bool] = True
@@ -161,7 +161,7 @@ class CeicpR(PairWeighting):
 
 
 def _smallest_sigma_m(target: PointCloud, gate_m: float) -> float:
-    """Return the larger of 0.6 median spacings and the median depth noise, at least a share of the gate."""
+    """Return the largest of 0.6 median target spacings, its median depth noise, and 1e-3 of the gate."""
     noise_m = 0.0
     if target.sigma_m is not None and np.isfinite(target.sigma_m).any():
         noise_m = float(np.nanmedian(target.sigma_m))
@@ -180,7 +180,7 @@ def entropy_weights(
         more: (M,) exponents of a further factor exp(-more) of p.
 
     Returns:
-        (M,) weights summing to one, the scale, and the entropy -sum p log p in nats.
+        (M,) weights summing to one, the scale, and the entropy -sum p log p in nats; NaN without pairs.
     """
     if not len(distances_m):
         return np.empty(0), sigma_m, float("nan")

@@ -59,7 +59,11 @@ class CeicpLiteral(PairWeighting):
         return True
 
     def _refusal(self, sigma: float) -> InputError | DegenerateError:
-        """Return the error for negative weights: metres never work, millimetres only fail near the goal."""
+        """Return the error for negative weights.
+
+        In metres, where registrations fail from the start, it is an InputError; in millimetres, where they
+        fail near the goal, a DegenerateError that ends the registration.
+        """
         reason = (
             f"the distances' standard deviation is {sigma:.2g} {self.unit}, below {_LEAST_SIGMA:.3f} "
             f"{self.unit}: f is a density, which there exceeds 1/{self.unit}, so that log f changes sign and "

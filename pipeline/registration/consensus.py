@@ -17,13 +17,13 @@ from pipeline.registration.residual import DegenerateError, weighted_procrustes
 from pipeline.types import BoolArray, FloatArray
 
 WITHIN_SD = 3.0
-"""A pair fits a motion if its distance is at most this many standard deviations, or ``least_m``."""
+"""A pair fits a motion at a distance below this many standard deviations, or below ``least_m``."""
 SEEDS = 40
 """Largest number of pairs from which a motion is computed, those with most agreement first."""
 GROUP = 12
-"""Number of pairs that agree with a seed, from which the first motion is computed."""
+"""Largest number of pairs that agree with a seed, from which its first motion is computed."""
 ROUNDS = 4
-"""Times that the motion is computed again from the pairs that fit it."""
+"""Number of times that a motion is computed: first from a seed's group, then from the pairs that fit it."""
 FLAT = 0.2
 """Points are in one plane if their spread across it is below this share of the smaller one along it."""
 OTHER_RAD = np.radians(10.0)
@@ -31,12 +31,12 @@ OTHER_RAD = np.radians(10.0)
 
 @dataclass(frozen=True, slots=True)
 class PointPairs:
-    """Pairs of points that may be the same; many are not."""
+    """Pairs of points that may be the same point; many pairs are wrong."""
 
     source_m: FloatArray
-    """(M, 3)."""
+    """(M, 3) points of the source."""
     target_m: FloatArray
-    """(M, 3)."""
+    """(M, 3) points of the target."""
     sigma_m: FloatArray
     """(M,) standard deviation of the pair's distance at the right pose."""
     votes: FloatArray
@@ -57,7 +57,7 @@ class Scale:
     other_m: float = 0.3
     """Motions that differ by more, or by 10 degrees, are different answers."""
     from_origin: bool = True
-    """Whether both were seen from their origins, so that no motion may show a plane from behind."""
+    """Whether both were seen from their origins; then motions that show a plane from behind are rejected."""
 
 
 ROOM = Scale()
@@ -68,13 +68,13 @@ class Motion(NamedTuple):
 
     T_target_source: FloatArray
     inliers: BoolArray
-    """(M,)."""
+    """(M,) True for the pairs that fit."""
     votes: float
     """Votes of the pairs that fit; a pair counts less, the farther it is off."""
 
 
 def consensus(pairs: PointPairs, scale: Scale = ROOM) -> list[Motion]:
-    """Find clearly different rigid motions that most pairs fit, best first; none if no three pairs agree."""
+    """Return clearly different rigid motions, those with most votes first; empty if no three pairs agree."""
     if len(pairs) < 3:
         return []
     limit_m = np.maximum(WITHIN_SD * pairs.sigma_m, scale.least_m)
@@ -99,7 +99,7 @@ def consensus(pairs: PointPairs, scale: Scale = ROOM) -> list[Motion]:
 
 
 def _agreement(pairs: PointPairs, limit_m: FloatArray, shortest_m: float) -> FloatArray:
-    """Return (M, M) votes of the pairs that agree with two pairs that agree with each other; else 0."""
+    """Return (M, M): for two pairs that agree, the votes of the pairs that agree with both; else 0."""
     apart_source_m, apart_target_m = _distances_m(pairs.source_m), _distances_m(pairs.target_m)
     tolerance_m = np.hypot(limit_m[:, None], limit_m)
     same = np.abs(apart_source_m - apart_target_m) < tolerance_m
@@ -116,7 +116,10 @@ def _distances_m(points_m: FloatArray) -> FloatArray:
 
 
 def _refined(pairs: PointPairs, limit_m: FloatArray, rows: np.ndarray, from_origin: bool) -> Motion | None:
-    """Return the motion of some pairs, computed again from all that fit it; None if fewer than 3 do."""
+    """Return the motion of some pairs, computed again from all that fit it.
+
+    It is None if fewer than 3 pairs fit, if they are on one line, or if they show a plane from behind.
+    """
     try:
         for _ in range(ROUNDS):
             if len(rows) < 3:

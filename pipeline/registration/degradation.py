@@ -1,6 +1,6 @@
 """Artificial degradation of a cloud as in real depth data: noise, outliers, holes, bias, less overlap.
 
-It is used for the source of the race on the Fuse screen, for the capture map and for the claims.
+The race on the Fuse screen and ``lab.claims`` use it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ HOLES = 12
 BIAS_WAVES = 24
 """Number of plane waves in the bias; the sum of many random waves is a Gaussian field."""
 BIAS_SCALE_OF_VIEW = 0.3
-"""Correlation length of the bias over the larger side of the view; plain ICP then errs as in SPEC 4.8."""
+"""Correlation length of the bias over the view's larger side; with it plain ICP errs as in SPEC 4.8."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class Degradation:
     """Amount of each degradation; the default changes nothing.
 
     Raises:
-        InputError: a value outside 0 to its limit in ``LIMITS``.
+        InputError: a value is negative or above its limit in ``LIMITS``.
     """
 
     noise_m: float = 0.0
@@ -101,7 +101,7 @@ def _outside_crop(view: FloatArray, share: float, rng: np.random.Generator) -> B
 
 
 def _outside_holes(view: FloatArray, share: float, rng: np.random.Generator) -> BoolArray:
-    """Return (N,) False in round patches about random points, large enough for the share."""
+    """Return (N,) False in round patches about random points, which together hold the share."""
     centers = view[rng.integers(0, len(view), HOLES)]
     radii = rng.uniform(0.4, 1.0, HOLES)
     inside = [np.sum((view - c) ** 2, axis=1) / r**2 for c, r in zip(centers, radii, strict=True)]

@@ -28,8 +28,8 @@ SPACING_NEIGHBOURS = 6
 class FastRobustIcp(PairWeighting):
     """Weights exp(-d^2 / 2 nu^2); nu is halved whenever the poses have converged at it.
 
-    For each nu the energy is the mean of 1 - exp(-d^2 / 2 nu^2), which plain steps never raise; extrapolated
-    steps that raise it are undone. Distances are between points for both metrics.
+    For each nu the energy is the mean of 1 - exp(-d^2 / 2 nu^2), with the distances between points for both
+    metrics. Plain steps of the point metric never raise it; extrapolated steps that raise it are undone.
 
     Source: Zhang, Yao, Deng, "Fast and robust iterative closest point", TPAMI 2021; constants as in the
     authors' program.

@@ -11,7 +11,7 @@ from pipeline.registration.weighting import PairWeighting, PairWeights, closest_
 from pipeline.types import FloatArray
 
 LAMBDA = 0.95
-"""Exponent that rewards every kept pair, for 3-D points (libpointmatcher's default)."""
+"""Exponent that rewards every kept pair, for 3-D points (once libpointmatcher's default; now 2.35)."""
 SMALLEST_FRACTION = 0.05
 
 

@@ -23,7 +23,7 @@ NORMAL_REACH, FEATURE_REACH = 2.0, 5.0
 SHORTEST, OTHER = 2.0, 3.0
 """Least distance of compared pairs, and of different start poses, in voxels."""
 NEAR = 1.5
-"""A point is near the target within so many voxels."""
+"""A point is near the target if its nearest point there is at most this many voxels away."""
 START_VOXELS = 1.6
 """Voxel of a single start pose, in default voxels: with coarse features the first one is right more often."""
 POINTS_OF_VOXEL = 4.0
@@ -40,11 +40,11 @@ RANSAC_ITERATIONS, RANSAC_CONFIDENCE = 100_000, 0.999
 SMALLEST_SHARE = 0.15
 """Least share of the source points with a partner in the target after RANSAC."""
 ROWS = 1000
-"""Features that are compared with all others at once: what they take of the memory is bounded."""
+"""Number of features that are compared with all others at once, which limits the memory."""
 
 
 def default_voxel_m(target: PointCloud) -> float:
-    """Return a fiftieth of the widest side of the box around nine tenths of the points.
+    """Return a fiftieth of the widest side of the box around the middle 90 % of the points, metres.
 
     Raises:
         InputError: there are no points, or all coincide.
@@ -65,7 +65,8 @@ def global_start(source: PointCloud, target: PointCloud) -> FloatArray:
         target: the cloud that stays.
 
     Raises:
-        ReconstructionError: too few features agree on one pose.
+        InputError: the target has no points, or all coincide.
+        ReconstructionError: too few points remain after thinning, or too few features agree on one pose.
     """
     if without_viewpoint(source, target):
         return next(sampled_starts(source, target, default_voxel_m(target), (0,)))
@@ -84,14 +85,16 @@ def without_viewpoint(source: PointCloud, target: PointCloud) -> bool:
 def sampled_starts(
     source: PointCloud, target: PointCloud, voxel_m: float, seeds: Sequence[int]
 ) -> Iterator[FloatArray]:
-    """Find a (4, 4) T_target_source for each seed of Open3D's RANSAC; its answers at low overlap differ.
+    """Yield the (4, 4) T_target_source of Open3D's RANSAC for each seed; at low overlap they differ.
+
+    It sets the random seed of Open3D, which all threads share.
 
     Args:
         source, target, voxel_m: as for ``global_starts``.
         seeds: random seeds.
 
     Raises:
-        ReconstructionError: no pose matches enough points.
+        ReconstructionError: too few points remain after thinning, or no pose matches enough points.
     """
     (moving, moving_features), (fixed, fixed_features) = (
         _with_features(cloud, voxel_m) for cloud in (source, target)
@@ -115,18 +118,18 @@ def global_starts(source: PointCloud, target: PointCloud, voxel_m: float) -> lis
     """Find up to three (4, 4) T_target_source, clearly different ones, that most pairs of features fit.
 
     Pairs are each other's most similar FPFH features. ``consensus`` finds the motions without random samples,
-    so the same clouds give the same bits; they are ranked by their votes times the share of the source's
-    points that they bring near the target. Estimated normals are oriented towards the origin, so clouds
-    without normals should be in their cameras' frames.
+    so the same clouds give exactly the same poses. They are ranked by their votes times the share of the
+    source's points that they bring near the target. Estimated normals are oriented towards the origin, so
+    clouds without normals should be in their cameras' frames.
 
     Args:
         source: the cloud that moves.
         target: the cloud that stays.
-        voxel_m: voxel edge to which both clouds are first thinned; larger if it would hold less than four
-            points, which have no features but noise.
+        voxel_m: voxel edge, metres, to which both clouds are first thinned. It is enlarged if a voxel would
+            hold fewer than four points on average, whose features would be noise.
 
     Raises:
-        ReconstructionError: too few features agree on one pose.
+        ReconstructionError: too few points remain after thinning, or too few features agree on one pose.
     """
     voxel_m = max(_filled_voxel_m(cloud, voxel_m) for cloud in (source, target))
     clouds = [_with_features(cloud, voxel_m) for cloud in (source, target)]
@@ -154,14 +157,14 @@ def global_starts(source: PointCloud, target: PointCloud, voxel_m: float) -> lis
 
 
 def _filled_voxel_m(cloud: PointCloud, voxel_m: float) -> float:
-    """Return a voxel edge, at least the given one, of which each holds some points of a surface."""
+    """Return the voxel edge, at least the given one, for about ``POINTS_OF_VOXEL`` points in a voxel."""
     points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points_m))
     filled = len(points.voxel_down_sample(voxel_m).points)
     return float(voxel_m * np.sqrt(max(1.0, POINTS_OF_VOXEL * filled / max(1, len(cloud)))))
 
 
 def _mutual_nearest(moving: FloatArray, fixed: FloatArray) -> tuple[IntArray, IntArray]:
-    """Return rows of (N, 33) and (M, 33) features that are most alike for each other, the best first."""
+    """Return rows of (N, 33) and (M, 33) features that are each other's most similar, the best first."""
     nearest, least = np.empty(len(moving), np.intp), np.empty(len(moving), np.float32)
     back, back_least = np.zeros(len(fixed), np.intp), np.full(len(fixed), np.inf, np.float32)
     squares = np.sum(fixed**2, axis=1)

@@ -1,4 +1,4 @@
-"""Kernel correlation: every point is paired with all near points of the other cloud (SPEC 4.4)."""
+"""Kernel correlation: every point is paired with the ten nearest of the other cloud (SPEC 4.4)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ class KernelCorrelation(CeicpA):
 
     The fixed point of the weighted fit is where -sum_ij exp(-|p_j - T q_i|^2 / 2 sigma^2) is stationary:
     Tsin, Kanade, "A correlation-based approach to robust point set registration", ECCV 2004. CEICP-A
-    is its truncation to the nearest neighbour, with a lifted tail.
+    takes only the nearest point, and its weights fall off more slowly with the distance. Normals do not
+    change the weights here.
     """
 
     @classmethod

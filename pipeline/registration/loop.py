@@ -37,6 +37,8 @@ def iterate_registration(
 ) -> Generator[RegistrationStep, None, str]:
     """Register ``source`` to ``target``; yields each iteration's step and returns the stop reason.
 
+    It is ``converged``, ``stalled``, ``max_iterations``, or ``degenerate:`` and the reason in a few words.
+
     Args:
         source: the cloud that moves, (N, 3) points in its own frame, metres.
         target: the cloud that stays, (M, 3); the plane metric uses its ``normals`` when it has them.
@@ -46,7 +48,8 @@ def iterate_registration(
         method: replaces the config's method, for experiments.
 
     Raises:
-        InputError: fewer than three points, points that are not finite, an invalid start pose.
+        InputError: fewer than three points, points that are not finite, an invalid start pose, or a method
+            that cannot use the clouds (hicp without colours, ceicp-literal in metres).
         ReconstructionError: no pair is within the gate at the start pose, or no start pose was found.
 
     >>> import numpy as np, packetmesh as pm
@@ -150,7 +153,7 @@ def iterate_matched(
     """Register like ``iterate_registration``, with pairs that another matcher finds.
 
     Args:
-        matcher: finds the pairs, whose rows are those of the samples.
+        matcher: finds the pairs; their rows are those of the samples' points.
         source: all points that the matcher knows of the cloud that moves.
         target: the same of the cloud that stays.
         config: method, metric and their parameters.

@@ -41,7 +41,7 @@ class Matching:
     distances_m: FloatArray
     """(M,) distances of the pairs."""
     normals: FloatArray | None = None
-    """(M, 3) unit mean of both points' normals in the target frame; None if they are not asked for."""
+    """(M, 3) unit mean of both points' normals in the target frame; None from a matcher without them."""
     cosines: FloatArray | None = None
     """(M,) cosine of the angle between both points' normals, without its sign; None like ``normals``."""
 
@@ -98,7 +98,7 @@ class Matcher:
         Args:
             source: the cloud that moves.
             target: the cloud that stays.
-            direction: the cloud whose points are matched to their nearest neighbours in the other.
+            direction: q2p searches each source point's nearest target point, p2q the reverse, both does both.
             features: returns (N, k) further coordinates of a cloud's points after x, y, z, metres, or None.
             with_normals: whether matchings have the pairs' normals.
         """
@@ -121,7 +121,8 @@ class Matcher:
 
         Args:
             T_target_source: (4, 4) rigid or similarity transform.
-            neighbours: number of nearest points for each point; rows come in blocks, nearest first.
+            neighbours: number of nearest points for each point; pairs come in blocks, nearest first,
+                except with the direction ``both``.
             source_share: share of the source's points that are used, above 0 to 1.
             target_share: share of the target's points that are used.
             gate_m: points whose nearest neighbour is farther may be left out, which saves time.
@@ -182,7 +183,7 @@ class _Subset:
 
     @cached_property
     def tree(self) -> KdTree:
-        """Search tree of these points; its results refer to their order."""
+        """Search tree of these points; its rows refer to their order in this subset."""
         return tree_of(self.points_m)
 
     @cached_property
@@ -328,8 +329,8 @@ def mean_normals(
 ) -> tuple[FloatArray, FloatArray]:
     """Return pairs' (M, 3) mean normals in the target frame, and the (M,) cosines between the two.
 
-    The source's normal is flipped where the two point to opposite sides, and turned by the pose, whose scale
-    does not count.
+    The source's normal is turned by the pose's rotation, and flipped where the two point to opposite sides,
+    so the cosines are 0 or more.
     """
     normals, cosines, turned = np.empty((len(source_rows), 3)), np.empty(len(source_rows)), np.empty(3)
     scale = np.sqrt(T[0, 0] * T[0, 0] + T[1, 0] * T[1, 0] + T[2, 0] * T[2, 0])

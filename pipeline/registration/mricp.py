@@ -28,7 +28,9 @@ class CoarseToFine(PairWeighting):
     thinning: ClassVar[int]
     """Ratio of the number of points in a level to that in the next coarser one."""
     level: int
+    """Current level; 0 is the finest."""
     most_steps: int
+    """Largest number of iterations at each level above 0."""
     steps: int = 0
     """Number of iterations so far at this level."""
 

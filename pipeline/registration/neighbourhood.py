@@ -28,10 +28,11 @@ _UNIT_TOLERANCE = 1e-3
 
 
 class Normals:
-    """Unit normals of a cloud's points, oriented towards a camera at the origin; computed at first use.
+    """Unit normals of a cloud's points, computed at first use.
 
-    In large clouds neighbours share a normal: that of the plane through the 40 points nearest to one in
-    eight, drawn at random. A registration by them is as accurate as one by a plane for each point (SPEC 4.1).
+    Computed normals point towards a camera at the origin; given ones keep their direction. In large clouds
+    neighbours share a normal: that of the plane through the 40 points nearest to one in eight, drawn at
+    random. A registration by them is as accurate as one by a plane for each point (SPEC 4.1).
     """
 
     def __init__(
@@ -56,7 +57,7 @@ class Normals:
 
 
 def _completed(known: FloatArray | None, points_m: FloatArray, found: Callable[[], FloatArray]) -> FloatArray:
-    """Return (N, 3) given normals with unit length; ``found`` returns those that replace unusable ones."""
+    """Return (N, 3) given normals with unit length; those of ``found`` replace unusable or missing ones."""
     if known is None:
         return _facing(found(), points_m)
     usable, normals = _usable(known)
@@ -66,7 +67,7 @@ def _completed(known: FloatArray | None, points_m: FloatArray, found: Callable[[
 
 
 def _usable(normals: FloatArray) -> tuple[BoolArray, FloatArray]:
-    """Return (N,) which of (N, 3) normals are finite and not zero, and the normals with unit length."""
+    """Return (N,) True for (N, 3) normals that are finite and not zero, and the normals with unit length."""
     normals = np.array(normals, dtype=np.float64, order="C")
     lengths = np.linalg.norm(normals, axis=1)
     usable = np.isfinite(lengths) & (lengths > 0.0)
@@ -96,6 +97,8 @@ def pca_normals(
 ) -> FloatArray:
     """Compute (N, 3) unit normals from each point's nearest 20, oriented towards a camera at the origin.
 
+    Given normals keep their direction.
+
     Args:
         points_m: (N, 3) points.
         known: (N, 3) given normals, of any length; only those that are zero or not finite are computed.
@@ -105,7 +108,7 @@ def pca_normals(
 
 
 def median_spacing_m(points_m: FloatArray) -> float:
-    """Return the median distance of (N, 3) points, of some if they are many, to their nearest other point."""
+    """Return the median distance of (N, 3) points, at most 4096 drawn ones, to their nearest other point."""
     tree = tree_of(points_m)
     some_m = points_m[drawn_rows(points_m, SPACING_SAMPLE)]
     return float(np.median(tree.nearest(some_m, min(2, len(tree)))[0][:, 1:]))

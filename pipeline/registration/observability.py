@@ -31,7 +31,8 @@ def open_motions(points_m: FloatArray, normals: FloatArray, open_share: float = 
 def stiffness(points_m: FloatArray, normals: FloatArray) -> float:
     """Return how well (N, 3) points with (N, 3) unit normals hold the motion that they hold least.
 
-    It is the least eigenvalue of the matrix in ``open_motions`` over the largest, 0 if a motion is open.
+    It is the least eigenvalue of the matrix in ``open_motions`` over the largest, 0 to 1: about 0 if a
+    motion is open, and 0 for fewer than six points.
     """
     if len(points_m) < 6:
         return 0.0
@@ -42,7 +43,7 @@ def stiffness(points_m: FloatArray, normals: FloatArray) -> float:
 def weakest_motion(points_m: FloatArray, normals: FloatArray, length_m: float) -> FloatArray:
     """Return the (4, 4) motion that (N, 3) points with (N, 3) unit normals hold least (see ``stiffness``).
 
-    It moves the points by about ``length_m``; ``-length_m`` gives the motion to the other side.
+    It moves the points by about ``length_m`` (root mean square); ``-length_m`` gives the opposite motion.
     """
     weakest = np.linalg.eigh(_normal_matrix(points_m, normals))[1][:, 0]
     center_m, spread_m = _center_and_spread(points_m)

@@ -104,7 +104,8 @@ def register_organised(
     Args:
         source: the image that moves.
         target: the image that stays.
-        config: gate, decay and number of iterations; the smallest scale is that of the target's squares.
+        config: settings, with the method ceicp-a and the plane metric; ``sigma_min_m`` is replaced by
+            ``SIGMA_OF_SPACING`` times the spacing of the target's squares.
         T_init: (4, 4) start pose T_target_source.
 
     Raises:
@@ -122,9 +123,9 @@ def register_organised(
 def shared_shares(
     source: OrganisedCloud, target: OrganisedCloud, T_target_source: FloatArray, within: float
 ) -> tuple[float, float]:
-    """Return the share of the source's points that the target's image judges, and of these that agree.
+    """Return the share of the source's points that the target's image judges, and that of these which agree.
 
-    A point is judged if its square in the target has depth, and it is not well behind that.
+    A point is judged if its square in the target has depth and it is not well behind this depth.
 
     Args:
         source: an organised cloud.
@@ -137,7 +138,7 @@ def shared_shares(
 
 
 class OrganisedMatcher:
-    """Finds the pairs of two organised clouds at any pose; has what ``matching.Matcher`` has."""
+    """Finds the pairs of two organised clouds at any pose, as a ``matching.Matches``."""
 
     def __init__(self, source: OrganisedCloud, target: OrganisedCloud) -> None:
         self._source, self._target = source, target

@@ -27,7 +27,8 @@ from pipeline.types import FloatArray, PointCloud
 
 o3d_registration: Any = o3d.pipelines.registration
 NEIGHBOURS = 20
-"""Number of neighbours for a point's normal or covariance, as in our plane metric."""
+"""Number of neighbours for a point's normal or covariance, as in our plane metric for small clouds; Open3D's
+GICP takes its own."""
 CPD_POINTS = 1500
 """Number of points of each cloud for CPD, which compares all pairs: more would take minutes."""
 CPD_OUTLIERS = 0.2
@@ -43,7 +44,7 @@ _NO_PAIRS = "degenerate: no pairs within the gate"
 
 @dataclass(frozen=True, slots=True)
 class PeerResult:
-    """Pose and run time of a peer."""
+    """Pose and run time of a peer's registration."""
 
     T_target_source: FloatArray
     """(4, 4) final pose."""

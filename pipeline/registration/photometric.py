@@ -1,4 +1,4 @@
-"""Motions that surfaces leave open, found by what two photographs show (SPEC 10.1).
+"""Poses along motions that surfaces leave open, by the brightness of two photographs (SPEC 10.1).
 
 Before a bare wall or floor, depth images fit at many poses. Along these motions alone the brightness of the
 target's pixels is compared with the source's (Steinbrücker, Sturm and Cremers, "Real-time visual odometry
@@ -16,11 +16,11 @@ from pipeline.kernels.geometry import apply, inverse, pixel_rays, project, rigid
 from pipeline.types import BoolArray, CameraIntrinsics, FloatArray, RgbdFrame
 
 HELD = 1e3
-"""Least inverse variance of a motion that surfaces hold: a standard deviation of 3 cm or 1.8 degrees."""
+"""Least inverse variance of a motion that surfaces hold, 1/m^2 or 1/rad^2: errors of 3 cm or 1.8 degrees."""
 BLURS_PX = (6.0, 3.0, 1.5)
 """Standard deviations of the blurs, from the first steps to the last ones."""
 MOST_STEPS, STILL_PX = 12, 0.02
-"""Most steps at one blur; a median motion of the pixels below which it ends."""
+"""Largest number of steps at one blur, and the median motion of the pixels below which they stop."""
 MOST_PIXELS, LEAST_PIXELS = 3000, 150
 """Pixels that are compared: those with the steepest brightness; with fewer there is no answer."""
 LEAST_SLOPE = 2.0
@@ -57,7 +57,7 @@ class Photograph:
 
 
 def photograph(frame: RgbdFrame, T_color_depth: FloatArray) -> Photograph:
-    """Return a frame's photograph; registered depth is on its pixels."""
+    """Return a frame's photograph; the frame's depth must be on the pixels of its colour image."""
     grey = cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2GRAY).astype(np.float32)
     levels = tuple(cv2.GaussianBlur(grey, (0, 0), blur_px) for blur_px in BLURS_PX)
     return Photograph(levels, frame.depth.z_m, frame.intrinsics, T_color_depth)
@@ -73,16 +73,17 @@ def open_motions(information: FloatArray) -> FloatArray:
 def held_by_color(
     source: Photograph, target: Photograph, T_target_source: FloatArray, motions: FloatArray
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Move a pose along open motions to where two photographs show the same.
+    """Move a pose along open motions to where the brightness of two photographs agrees.
 
     Args:
         source: the photograph that moves.
         target: the one that stays.
         T_target_source: (4, 4) start pose of the depth cameras, within a few pixels of the right one.
-        motions: (6, M) small motions of the source in its own frame: turn in rad, then shift in m.
+        motions: (6, M) small motions of the source in its own frame, M >= 1: turn in rad, then shift in m.
 
     Returns:
-        The (4, 4) pose, and (6, 6) the information that it adds; None if the photographs do not decide.
+        The (4, 4) pose, and (6, 6) the information that it adds; None if the photographs do not decide or
+            differ in size.
     """
     if source.z_m.shape != target.z_m.shape:
         return None

@@ -12,7 +12,8 @@ from pipeline.registration.weighting import MAD_TO_SIGMA, PairWeighting, PairWei
 from pipeline.types import FloatArray, PointCloud
 
 SUBSETS = 60
-"""Subsets per iteration; if 40 % of the pairs are bad, one of 34 has four good ones with 99 % probability."""
+"""Number of subsets per iteration. If 40 % of the pairs are wrong, 34 subsets contain one of four right pairs
+with a probability of 99 %."""
 SUBSET_PAIRS = 4
 KEPT_SIGMAS = 2.5
 

@@ -46,7 +46,7 @@ class PairWeighting(ABC):
     accelerated: ClassVar[bool] = False
     """Whether Anderson acceleration extrapolates the poses."""
     facing: ClassVar[bool] = False
-    """Whether it weighs pairs by their normals too, which matchings then have with the plane metric."""
+    """Whether matchings with the plane metric have the pairs' normals, by which the method may weigh them."""
 
     @classmethod
     def starting(cls, config: RegistrationConfig, source: PointCloud, target: PointCloud) -> PairWeighting:

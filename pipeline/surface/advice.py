@@ -20,6 +20,7 @@ _AGREES = 0.5
 _MARGIN = 1e-6
 """Relative margin on the radius, because rounding decides for a ball of exactly the needed radius."""
 _WORTH_SAYING = 0.03
+"""Difference of the two shares from which a suggestion names its cause."""
 
 
 def suggest_radii(cloud: PointCloud) -> tuple[Suggestion, ...]:

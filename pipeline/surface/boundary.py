@@ -97,8 +97,8 @@ def _boundary_successors(triangles: IntArray) -> dict[int, list[int]]:
 
 
 def _by_edge(directed: IntArray) -> tuple[IntArray, BoolArray]:
-    """Return (N,) the sorted order of (N, 2) directed edges in which both directions of an edge are adjacent,
-    and (N,) True for the first of each edge in that order.
+    """Return (N,) an order of (N, 2) directed edges in which both directions of each edge are adjacent, and
+    (N,) True, in that order, where another edge begins.
     """
     lower, upper = np.minimum(*directed.T), np.maximum(*directed.T)
     keys = lower * (upper.max(initial=0) + 1) + upper
@@ -107,7 +107,7 @@ def _by_edge(directed: IntArray) -> tuple[IntArray, BoolArray]:
 
 
 def _walk(start: int, following: dict[int, list[int]]) -> list[IntArray]:
-    """Remove the edges of one trail from ``start``, split into simple loops.
+    """Remove the edges of one trail from ``start`` and return it, split into simple loops.
 
     A trail stops without closing only where faces disagree in their orientation; its remaining
     vertices then count as one loop.

@@ -30,10 +30,13 @@ _LINE = 1e-6
 
 
 def usable_points(cloud: PointCloud) -> PointCloud:
-    """Return the distinct points in their order, without those whose normal is unknown (unless many are).
+    """Return the distinct points in their order, without those whose normal is unknown.
+
+    If many normals are unknown, all points stay and all normals are left out; other normals become unit
+    vectors.
 
     Raises:
-        InputError: fewer than three points, or all of them coincident or collinear.
+        InputError: fewer than three points, all of them coincident or collinear, or a coordinate too large.
     """
     first = distinct_rows(cloud.points_m)
     if len(first) < len(cloud):
@@ -110,6 +113,11 @@ def _known_normals(cloud: PointCloud) -> PointCloud:
 
 
 def check_shape(points_m: FloatArray) -> None:
+    """Check that (N, 3) points, at least one, can span a surface.
+
+    Raises:
+        InputError: fewer than three points, all of them coincident or collinear, or a coordinate too large.
+    """
     reach_m, extent_m = float(np.abs(points_m).max()), float(np.ptp(points_m, axis=0).max())
     if reach_m > LARGEST_M:
         raise InputError(
@@ -131,12 +139,16 @@ def check_shape(points_m: FloatArray) -> None:
 
 
 def middle_reach_m(points_m: FloatArray) -> float:
-    """Return the largest coordinate, by magnitude, of the middle of the points."""
+    """Return the largest coordinate, by magnitude, of the points' median."""
     return float(np.abs(np.median(points_m, axis=0)).max())
 
 
 def check_resolution(points_m: FloatArray, radius_m: float) -> None:
-    """Refuse points so far from the origin that the 32-bit floats of a mesh file are too coarse."""
+    """Check that the 32-bit floats of a mesh file are fine enough for points so far from the origin.
+
+    Raises:
+        InputError: their steps are too coarse for a ball of ``radius_m``.
+    """
     step_m = float(np.spacing(np.float32(middle_reach_m(points_m))))
     if step_m > _COARSE * radius_m:
         raise InputError(
@@ -146,7 +158,7 @@ def check_resolution(points_m: FloatArray, radius_m: float) -> None:
 
 
 def warn_of_rounding(points_m: FloatArray, radius_m: float) -> None:
-    """Log that the positions of a far cloud were rounded to 32-bit numbers, if balls see their steps."""
+    """Log a warning if a far cloud was rounded to 32-bit numbers whose steps are coarse for a ball."""
     reach_m = middle_reach_m(points_m)
     step_m = float(np.spacing(np.float32(reach_m)))
     if step_m <= _COARSE * radius_m or too_coarse(points_m):

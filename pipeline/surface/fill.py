@@ -1,6 +1,7 @@
 """Filling of holes without measurements, by the triangulation of least area over each loop.
 
-Open3D's ``fill_holes`` selects loops by a radius, also closes rims and orients its triangles inwards.
+Open3D's ``fill_holes`` is not used: it selects loops by a radius, also closes rims, and orients its triangles
+inwards.
 """
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ def fill_holes(surface: SurfaceResult, longest_m: float) -> Filled:
 
 
 def without_seams(surface: AnySurface) -> AnySurface:
-    """Close the smallest holes of a surface for display; its measures are not changed.
+    """Close the smallest holes of a surface for display; its ``quality`` is not measured again.
 
     Where inferred and measured surface do not quite meet, the ball leaves a seam of holes through which the
     background is visible; loops of up to ``SEAM_M`` are closed by the triangulation of least area.
@@ -157,7 +158,7 @@ def skin_points_m(corners_m: FloatArray, count: int) -> FloatArray:
 
 
 def _circumcenters_m(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
-    """Return (K, 3) circumcentres of those triangles (F corners each in a, b, c) that contain theirs."""
+    """Return (K, 3) circumcentres of those of F triangles, with corners a, b, c, that contain their own."""
     sides_m2 = np.stack([np.sum((p - q) ** 2, axis=1) for p, q in ((b, c), (c, a), (a, b))], axis=1)
     weights = sides_m2 * (sides_m2.sum(axis=1, keepdims=True) - 2.0 * sides_m2)
     inside = np.all(weights >= 0.0, axis=1) & np.any(weights > 0.0, axis=1)

@@ -84,7 +84,7 @@ class SweepPoint:
     unused_share: float
     """Share of the points that no triangle uses."""
     hole_area_m2: float
-    """Area of the loops shorter than 1 m, without the outer loop of each component (SPEC 5)."""
+    """Area of the holes, as ``SurfaceQuality.hole_area_m2`` (SPEC 5)."""
     no_hit_ray_share: float
     """Share of the cameras' pixel rays that miss the surface; NaN without cameras."""
     accuracy_1cm: float

@@ -19,7 +19,7 @@ def gaps_of(seen: Sequence[DepthMap], cameras: Sequence[Camera]) -> Gaps:
     """Find and measure the gaps in the depth images of a mesh.
 
     The outer rim of a scene is no gap if no camera looks past it, nor is an edge of the mesh in front of
-    other surface.
+    other surface. An image in which no ray hits the mesh has no gaps.
 
     Args:
         seen: depth of the mesh in each camera, NaN where a ray misses.

@@ -22,17 +22,18 @@ _TANGENT = 0.3
 _ALONG = 0.5
 """Normals are along one axis if the cosine between them is above this, of either sign."""
 WORTHLESS_SHARE = 0.25
-"""Share of opposite neighbours from which the signs of the normals say nothing; chance makes a half."""
+"""Share of opposite neighbours from which the normals' signs are not used; random signs give a half."""
 DOUBTFUL_SHARE = 0.05
 """Share of opposite neighbours from which a surface may be torn."""
 LEAST_ALONG_SHARE = 0.7
-"""Share of neighbours with normals along one axis below which they are no normals; chance makes a half."""
+"""Least share of neighbours along one axis among usable normals; random normals have a half."""
 LEAST_PLANE_COSINE = 0.6
-"""Mean cosine between normals and planes below which they are no normals of these points; chance: a half."""
+"""Least mean cosine between usable normals and the points' planes; random normals have a half."""
 MOST_UNKNOWN_SHARE = 0.05
 """If a larger share of the normals is unknown, all are estimated."""
 _PLANE_POINTS, _PLANE_NEIGHBOURS = 5000, 20
-"""Planes are fitted to so many of about so many points: few, so that they are wider than noise."""
+"""About the number of points, spread over the cloud, among which planes are fitted, and the number of points
+of each plane: so few that a plane is wider than the noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +81,7 @@ def agreement(points_m: FloatArray, normals: FloatArray) -> Agreement:
 
 
 def _plane_cosine(points_m: FloatArray, normals: FloatArray) -> float:
-    """Return the mean cosine between normals and planes through the points around; 1 for few points."""
+    """Return the mean cosine between normals and planes through the points around; 1 for under 20 points."""
     rows = np.arange(0, len(points_m), max(1, len(points_m) // _PLANE_POINTS))
     if len(rows) < _PLANE_NEIGHBOURS:
         return 1.0

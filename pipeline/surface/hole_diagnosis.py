@@ -54,7 +54,7 @@ class _Place:
     directions: FloatArray
     """(S, 3) outward direction at each sample."""
     height_m: float
-    """Largest distance of a surface that closes the hole from the triangulation of least area."""
+    """Bound on the distance of any surface that closes the hole from the triangulation of least area."""
     spacing_m: float
     """Median distance of nearest points."""
     widest_gap_m: float
@@ -102,8 +102,8 @@ def explain_hole(
         views: known pixels of the cameras; without views, the points alone decide.
 
     Raises:
-        InputError: no ball made the surface, its vertices are not points of the cloud, or a view's mask
-            does not have its camera's image size.
+        InputError: no ball made the surface, the cloud has no normals, the hole's vertices are not points of
+            the cloud, or a view's mask does not have its camera's image size.
     """
     if not surface.radii_m or cloud.normals is None:
         raise InputError(
@@ -233,10 +233,13 @@ def _means(vectors: FloatArray, owner: IntArray, count: int) -> FloatArray:
 
 
 def _grow(place: _Place, radii_m: Sequence[float]) -> tuple[float | None, float | None, float]:
-    """Roll larger and larger balls until one closes the hole, also if it directly follows the given balls.
+    """Roll larger and larger balls until one closes the hole.
+
+    It must close it after all smaller balls that were tried, and also directly after the given balls.
 
     Returns:
-        The radius that closes it; the radius that closes nine tenths; the share that the last ball closes.
+        The radius that closes it, or None; the first radius that closes nine tenths, or None; the share that
+        the last ball closes.
     """
 
     def closes(rolled: Rolled) -> bool:

@@ -57,7 +57,7 @@ class MeshOptions:
     """Options for meshing a cloud.
 
     Raises:
-        InputError: an invalid radius or viewpoint, or counts that are too small.
+        InputError: an invalid radius, viewpoint or unit, or a count that is too small.
     """
 
     radii_m: tuple[float, ...] | None = None
@@ -65,7 +65,7 @@ class MeshOptions:
     viewpoint_m: tuple[float, float, float] | None = None
     """Point that the normals face; None keeps given normals, or estimates normals that point outwards."""
     max_points: int | None = None
-    """Thin the cloud to about this many points first."""
+    """Thin the cloud to about this many points first; None keeps all."""
     smoothing_passes: int = 0
     metres_per_unit: float | None = None
     """Unit of the cloud's coordinates in metres, 0.001 for millimetres; None is the unit that the
@@ -99,7 +99,7 @@ class MeshedCloud:
     points: int
     """Number of points that the ball rolled over."""
     normals: str
-    """Origin of the points' normals: ``GIVEN``, ``GIVEN_TURNED``, ``ESTIMATED_...``."""
+    """Origin of the points' normals: one of the texts ``GIVEN`` to ``ESTIMATED_OUTWARDS``."""
     width_m: float
     """Width of the cloud, without its outermost points."""
     doubt: str | None
@@ -114,6 +114,7 @@ def iterate_mesh_file(
     Args:
         path: file of a type that ``read_cloud`` reads.
         out: file of a type that ``write_mesh`` writes; it is written completely or not at all.
+        options: how the cloud is read and meshed.
 
     Returns:
         The quality report.
@@ -215,8 +216,9 @@ def mesh_report(meshed: MeshedCloud) -> dict[str, Any]:
 def with_normals(cloud: PointCloud, viewpoint_m: FloatArray | None) -> tuple[PointCloud, str]:
     """Return the cloud with unit normals, and the origin of the normals.
 
-    Given normals are turned to the viewpoint. Without one they stay, unless so many neighbours disagree that
-    their signs say nothing: then they are turned to agree, or estimated if even their axes disagree.
+    Given normals whose axes do not fit the surface are estimated instead. Others are turned to the viewpoint.
+    Without one they stay, unless so many neighbours point against each other that the signs cannot be used:
+    then they are turned to agree, and outwards.
     """
     if cloud.normals is not None and not (found := agreement(cloud.points_m, cloud.normals)).axes_fit:
         _log.warning("The normals of the file are not perpendicular to the surface; they are estimated")

@@ -26,7 +26,7 @@ MOST_NEIGHBOURS = 320
 LINE = 0.05
 """Neighbours are on a line if the second largest variance is below this share of the largest."""
 _CHUNK = 400_000
-"""Most neighbours in memory."""
+"""About the largest number of neighbours that are in memory together."""
 _FLAT = 0.02
 """A component whose volume is a smaller share of its largest possible one counts as flat."""
 
@@ -107,7 +107,7 @@ def _with_normals(cloud: PointCloud, neighbours: int) -> PointCloud:
 
 
 def _off_lines(points_m: FloatArray, normals: FloatArray) -> FloatArray:
-    """Return (N, 3) normals; points with collinear neighbours get theirs from 2, 4, ... times as many."""
+    """Return (N, 3) normals; a point with collinear neighbours gets its own from 2, 4, ... times as many."""
     tree, normals = cKDTree(points_m), normals.copy()
     count, left = NEIGHBOURS, np.arange(len(points_m))
     while len(left) and count <= min(MOST_NEIGHBOURS, len(points_m)):

@@ -15,7 +15,7 @@ MISSED = (255, 0, 255)
 
 
 def beside(camera: Camera, surface: Surface, angle_deg: float = 20.0) -> Camera:
-    """Return the camera rotated about the world's vertical axis through the middle of the surface."""
+    """Return the camera rotated about the vertical (the world's z) through the middle of the surface."""
     if not len(surface.vertices_m):
         return camera
     middle_m = np.median(surface.vertices_m, axis=0)
@@ -45,7 +45,7 @@ class MeshPainter:
 
         Args:
             camera: camera of the image.
-            colored: True uses the vertex colours, False a shaded grey surface.
+            colored: True uses the vertex colours if there are any, False a shaded grey surface.
             texture: photographs to show on the surface instead of its colours, unshaded.
         """
         if camera is not self._camera:

@@ -39,8 +39,8 @@ class Seen:
     depth: DepthMap
     """(H, W) depth of the mesh; NaN where a ray misses."""
     guessed: BoolArray | None
-    """(R,) pixel rays that hit a triangle most of whose corners were inferred; None if sources are
-    unknown."""
+    """(R,) True for the camera's pixel rays that hit a triangle most of whose corners were inferred; None if
+    sources are unknown."""
 
 
 def measure_quality(

@@ -52,7 +52,7 @@ class Sight:
     """Visibility of (N, 3) points near a surface in one camera."""
 
     in_image: BoolArray
-    """(N,) True where the point is projected into the image."""
+    """(N,) True where the point is in front of the camera and its projection in the image."""
     hidden: BoolArray
     """(N,) True where the surface is in front of the point."""
     past: BoolArray

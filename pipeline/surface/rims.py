@@ -13,17 +13,19 @@ from pipeline.surface.boundary import directed_edges, edges_with_one_face
 from pipeline.types import BoolArray, FloatArray, IntArray, PointSource, Surface
 
 SPIKE_RAD, SLIVER_RAD = np.deg2rad(15.0), np.deg2rad(6.0)
-"""A triangle that hangs by one edge is dropped if its free corner, or any corner, is sharper."""
+"""A triangle that hangs by one edge is dropped if its free corner is sharper than the first angle, or another
+corner sharper than the second."""
 NOTCH_RAD = np.deg2rad(110.0)
 """A notch is closed if its angle is sharper."""
 MOST_GUESSED = 1
-"""A notch with more inferred corners stays: two thirds of the triangles between guesses would be wrong."""
+"""A notch with more inferred corners stays open: two thirds of the triangles there would be wrong."""
 FACING = 0.5
 """Least cosine between a new triangle and the normals of its corners, and between one before and after."""
 LEAST_AREA = 0.3
 """Least ratio of a triangle's area after smoothing to its area before."""
 NOISE_SHARE = 0.5
-"""Largest move of a measured vertex over its noise: a vertex is an average of four or more measurements."""
+"""Largest move of a measured vertex, as a share of its standard deviation: a vertex is an average of four or
+more measurements."""
 PASSES = 3
 """Passes in which notches are closed; each may open new ones."""
 STEPS = (0.5, -0.53) * 6
@@ -47,7 +49,7 @@ class EvenRims:
 
 @dataclass(frozen=True, slots=True)
 class _Rim:
-    """Neighbours of each vertex on its rim; arrays are changed while triangles come and go."""
+    """Neighbours of each vertex on its rim; the arrays change in place as triangles come and go."""
 
     before: IntArray
     """(V,) previous vertex; -1 unless exactly one loop passes the vertex."""
@@ -74,7 +76,7 @@ def even_rims(surface: Surface, sigma_m: FloatArray | None) -> EvenRims:
 
     Args:
         surface: the surface, with normals and radii.
-        sigma_m: (V,) standard deviation of each vertex' depth. A measured vertex moves by at most half of
+        sigma_m: (V,) standard deviation of each vertex's depth. A measured vertex moves by at most half of
             it; without it, or where it is NaN, none moves. Inferred vertices stay.
     """
     points_m = np.asarray(surface.vertices_m, float)
@@ -95,7 +97,7 @@ def even_rims(surface: Surface, sigma_m: FloatArray | None) -> EvenRims:
 
 
 def _with(surface: Surface, vertices_m: FloatArray, triangles: IntArray, used: BoolArray) -> Surface:
-    """Return the surface with other places and triangles of its vertices, and without those not used."""
+    """Return the surface with new vertex positions and triangles, without unused vertices."""
     columns: dict[str, Any] = {
         name: getattr(surface, name) for name in ("colors", "normals", "source", "rows")
     }
@@ -107,7 +109,7 @@ def _with(surface: Surface, vertices_m: FloatArray, triangles: IntArray, used: B
 
 
 def _hanging(triangles: IntArray, owners: IntArray) -> BoolArray:
-    """Return (F,) True for triangles that touch others at one corner only, from the owners of rim edges."""
+    """Return (F,) True for triangles that touch others at one corner only; ``owners`` have the rim edges."""
     alone = np.bincount(owners, minlength=len(triangles)) == 3
     free = np.bincount(triangles.reshape(-1))[triangles] == 1
     hanging = alone & (free.sum(axis=1) == 2)
@@ -211,7 +213,7 @@ def _bounds_m(surface: Surface, sigma_m: FloatArray | None, rim: _Rim) -> FloatA
     if sigma_m is None:
         return bounds_m
     own = np.flatnonzero((rim.before >= 0) & ~_guessed(surface))
-    own = own[rim.before[rim.before[own]] != rim.after[own]]  # a triangle by itself would shrink
+    own = own[rim.before[rim.before[own]] != rim.after[own]]  # a lone triangle would shrink
     for there in (rim.before[own], rim.after[own]):
         bounds_m[own] += 0.25 * np.linalg.norm(points_m[there] - points_m[own], axis=1)
     return np.minimum(bounds_m, NOISE_SHARE * np.nan_to_num(sigma_m))

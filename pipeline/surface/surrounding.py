@@ -18,7 +18,7 @@ SAMPLE = 2000
 COUNTS = (3, 4, 5, 6, 7, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80, 96, 128, 160, 192)
 """Numbers of nearest neighbours that are tried in turn."""
 LARGEST_GAP = np.radians(130.0)
-"""Largest angle between consecutive neighbours around the normal of a surrounded point."""
+"""Largest angle, rad, between consecutive neighbours around the normal of a surrounded point."""
 SHARES = (0.1, 0.5, 0.75, 0.9)
 """Shares of the points that are surrounded within each radius."""
 LEAST_SURROUNDED = 0.5
@@ -26,7 +26,7 @@ LEAST_SURROUNDED = 0.5
 
 
 def surrounding_radii(points_m: FloatArray, normals: FloatArray, seed: int = 0) -> tuple[float, ...]:
-    """Choose ball radii, ascending, within which 10 %, 50 %, 75 % and 90 % of the points are surrounded.
+    """Return ball radii, m, ascending, within which 10 %, 50 %, 75 % and 90 % of the points are surrounded.
 
     Args:
         points_m: (N, 3) distinct points.

@@ -41,7 +41,7 @@ def iterate_sweep(
     Args:
         cloud: points with normals towards the outside.
         radii_m: ball radii, in the order of the results.
-        cameras: cameras whose rays are traced; with a truth, one for each of the truth's.
+        cameras: cameras whose rays are traced; with a truth, one for each of its cameras, in their order.
         truth: true surface for comparison.
 
     Raises:

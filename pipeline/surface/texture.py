@@ -32,6 +32,7 @@ LEAST_COSINE = 0.08
 SMOOTHING_ROUNDS = 12
 """Number of times that scores are averaged with those of the neighbours, for large patches per camera."""
 MOST_GAIN = 1.5
+"""Largest factor by which a photograph is made brighter or darker."""
 DARK = 8.0
 """Added to colours before their ratios are taken."""
 FAR_OUTSIDE_PX = -1e5
@@ -121,7 +122,8 @@ def _score(
         around_m: (h, w) the smallest depth around each pixel.
         shrink: factor from the size of the photograph to that of the depth.
         T_world_camera: (4, 4) pose of the camera.
-        scores: (F,) written: the camera's pixels per area of each triangle, up to a factor; 0 if not seen.
+        scores: (F,) written: cosine over squared distance of each triangle, to which the camera's pixels per
+            area are proportional (``AT_RIM`` times that near a rim); 0 if not seen.
         middles: (F,) written: index of the photograph's pixel at the middle of each triangle.
     """
     eye_m = T_world_camera[:3, 3]
@@ -156,7 +158,7 @@ def _score(
 
 @compiled
 def _nearest(place_px: float, size_px: int) -> int:
-    """Return the nearest pixel of an axis that has so many."""
+    """Return the index of the pixel nearest to a position on an image axis of ``size_px`` pixels."""
     return int(np.rint(min(max(place_px, 0.0), size_px - 1.0)))
 
 

@@ -71,11 +71,11 @@ def compare_with_truth(
         yardstick: yardstick of this truth, to compare many meshes faster; None creates one.
 
     Returns:
-        For each of 1, 3 and 5 cm: ``coverage_1cm``, share of the true surface that a camera sees and
-        that has the mesh within 1 cm; ``accuracy_1cm``, share of the mesh within 1 cm of the true
-        surface; ``f_score_1cm``, their harmonic mean; all by area and by exact distances. Along the
-        rays of the true cameras: ``no_hit_ray_share``, ``within_5pct_depth_share`` of all rays that
-        meet the true surface, and ``median_depth_error_m`` of those that meet both (NaN if none).
+        For each of 1, 3 and 5 cm: ``coverage_1cm``, the share, of the true surface that cameras see, within
+        1 cm of the mesh; ``accuracy_1cm``, the share of the mesh within 1 cm of the true surface;
+        ``f_score_1cm``, their harmonic mean; all by area and by exact distances. Along the rays of the true
+        cameras: ``no_hit_ray_share`` and ``within_5pct_depth_share`` of all rays that meet the true surface,
+        and ``median_depth_error_m`` of those that meet both (NaN if none).
 
     Raises:
         InputError: the mesh has no triangle.

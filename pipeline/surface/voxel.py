@@ -50,8 +50,8 @@ def in_cubes_of(points_m: FloatArray, others_m: FloatArray, voxel_m: float) -> B
 def voxel_for_count(points_m: FloatArray, count: int, least_m: float = 0.0) -> float:
     """Find the voxel edge, metres, that thins (N, 3) points to about ``count``, but at least ``least_m``.
 
-    The edge is tiny if there are no more than ``count`` points. It is found by bisection with guesses from
-    count ~ 1 / voxel^2, the law for surfaces.
+    For no more than ``count`` points it is ``least_m``, or 1e-6 of their extent if larger. Else it is found
+    by bisection with guesses from count ~ 1 / voxel^2, the law for surfaces.
 
     Raises:
         InputError: no point, or all coincident.

@@ -65,7 +65,8 @@ class Walk:
     glued_by: IntArray
     """(3 F,) int32 triangle that closed each half-edge; F for none."""
     left_front: IntArray
-    """(R, 3 F) int32 first step after which a half-edge is not on each ball's front; 0 if it never was."""
+    """(R, 3 F) int32 index of the first step after which each half-edge is not on the front of each of the R
+    balls; 0 if it never was."""
 
 
 def iterate_walk(
@@ -128,7 +129,7 @@ def nearest_rows(points_m: FloatArray, center_m: FloatArray, count: int) -> IntA
 def hole_on_flat_ground(
     points_m: FloatArray, normals: FloatArray, triangles: IntArray, count: int
 ) -> FloatArray:
-    """Find a point (3,) at the boundary of a hole where the surrounding points are as flat as possible.
+    """Find a point (3,) at a hole, or on a surface without holes, around which the points are flattest.
 
     Args:
         points_m: (N, 3) points.

@@ -1,4 +1,4 @@
-"""Requests for the shown camera's verdict and then for the depth of the shown view."""
+"""Requests for the shown camera's verdict and, after it, for pictures of the shown view's depth error."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Answers:
 
         Args:
             session: runs the jobs.
-            on_trust: called with a new verdict, or None if there is none.
+            on_trust: called with a new verdict, or None if its job failed or was stopped.
             on_depth: called when the depth job has ended.
         """
         self._session, self._on_trust, self._on_depth = session, on_trust, on_depth
@@ -36,11 +36,14 @@ class Answers:
         self._judging = False
 
     def trust_in(self, camera: CameraView) -> TrustView | None:
-        """Return the newest verdict if it is about this camera."""
+        """Return the newest verdict if it is about a camera of this name, else None.
+
+        The camera's views or lens may have changed since.
+        """
         return self._trust if self._trust is not None and self._trust.request.camera == camera.name else None
 
     def pictures_of(self, camera: CameraView, view: str) -> dict[str, Picture]:
-        """Return the pictures of a view that have been computed."""
+        """Return the computed maps of a camera and depth errors of a view, by ``labels.PictureName``."""
         trust, off = self.trust_in(camera), self._off
         pictures = {} if trust is None else dict(trust.pictures)
         if off is not None and (off.camera, off.view) == (camera.name, view):
@@ -49,6 +52,8 @@ class Answers:
 
     def ask(self, request: TrustRequest, view: str, depth: bool) -> None:
         """Request the verdict, and after it the depth pictures, unless requested before.
+
+        While a verdict is computed, nothing is requested: ``on_trust`` has to ask again.
 
         Args:
             request: the verdict to compute.

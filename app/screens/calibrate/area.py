@@ -44,14 +44,14 @@ class PictureArea:
         return self._pair.value
 
     def load(self, pictures: Mapping[str, Picture]) -> None:
-        """Show the available pictures; without the photograph nothing."""
+        """Show pictures of one size by ``labels.PictureName``, one of them "photo"; none hides the area."""
         self._pictures, self._drawn = pictures, ()
         for handle in (self._pair, self._split, self._image, self._captions):
             handle.visible = bool(pictures)
         self._draw()
 
     def set(self, pair: str = STRAIGHTENED, split_share: float = 0.5) -> None:
-        """Choose a pair and the line."""
+        """Choose one of ``PAIRS``, and the line by its share of the width, 0 to 1."""
         self._pair.value, self._split.value = pair, round(100.0 * split_share)
         self._draw()
 
@@ -62,7 +62,7 @@ class PictureArea:
         return "" if now == START else place_text(*now)
 
     def take(self, place: str) -> None:
-        """Show the pair in an address.
+        """Show the pair and the line that an address names.
 
         Raises:
             InputError: there is no such pair.

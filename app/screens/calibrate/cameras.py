@@ -65,7 +65,9 @@ class CamerasFound:
 def cameras_of(
     store: Store, views: BoardViews, share: float = 1.0
 ) -> Generator[Progress | CalibrationView, None, CamerasFound]:
-    """Calibrate all cameras without their depth; yield partial results in the first ``share`` of progress.
+    """Calibrate all cameras without their depth; yield partial results.
+
+    The reported progress stays below ``share``.
 
     Raises:
         InputError: there are no photographs.
@@ -93,7 +95,7 @@ def cameras_of(
 def finished(
     steps: Generator[Progress | CalibrationView, None, CamerasFound],
 ) -> Generator[Progress, None, CamerasFound]:
-    """Yield only the progress, and return the cameras."""
+    """Yield only the progress of ``cameras_of``, and return its cameras."""
     while True:
         try:
             step = next(steps)
@@ -104,12 +106,14 @@ def finished(
 
 
 def own_views(views: BoardViews, *cameras: str) -> BoardViews:
-    """Return all that these cameras depend on while calibrated alone, without others' dropped views."""
+    """Return the photographs without other cameras' dropped views: all that these cameras, each calibrated
+    alone, depend on.
+    """
     return replace(views, dropped=tuple(one for one in views.dropped if one[0] in cameras))
 
 
 def stage_name(kind: str, camera: str) -> str:
-    """Return the store's name of a result about a camera, which may be one of a node's two."""
+    """Return the store's name of a result about a camera; the slash of node_00/infrared becomes a hyphen."""
     return f"{kind}-{camera.replace('/', '-')}"
 
 
@@ -166,7 +170,10 @@ def _photograph(moment: str, image: ByteArray, found: Detection) -> Photograph:
 
 
 def _with_lens(camera: CameraView, report: CameraReport, moments: Mapping[Path, str]) -> CameraView:
-    """Return the camera with its lens, which also places dropped views; views are named by moments."""
+    """Return the camera with the report's lens, and the poses that this lens gives to dropped views.
+
+    Views are named by their moments.
+    """
     names = {path.name: moment for path, moment in moments.items()}
     lens = replace(report.calibration, views=_named(report.calibration.views, names))
     placed = [*_named(report.held_out, names)]
@@ -226,7 +233,7 @@ UNITS = {
     "scale": ("Scale", 100.0, "%"),
     "curvature_per_m": ("Curvature", 1000.0, "mm at 1 m"),
 }
-"""Names of the terms, shown units per unit of the field, and units."""
+"""By field of ``DepthCorrection``: the term's name, the factor to the shown unit, and that unit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,11 +250,11 @@ def bias_of(
     """Return the depth bias of a camera's node, or a sentence why it is unknown.
 
     Args:
-        store: keeps the bias of a camera that is calibrated alone while only others change.
+        store: keeps the bias; that of a camera calibrated alone does not depend on others' dropped views.
         views: the photographs.
         cameras: the calibrated cameras.
         camera: one of them.
-        done: share of the progress before this.
+        done: share of the progress to report, 0 to 1.
     """
     name = camera.removesuffix(INFRARED)
 

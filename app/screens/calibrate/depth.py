@@ -32,7 +32,7 @@ class DepthFolder:
             self._note = gui.add_markdown(Markdown(""))
 
     def load(self, bias: BiasView | str | None) -> None:
-        """Show a camera's bias; None is not computed yet, a text is the reason why there is none."""
+        """Show a camera's bias. None: it is not computed yet; a text: the reason why there is none."""
         found = bias if isinstance(bias, BiasView) else None
         self._plot.visible = found is not None
         self._table.content = Markup("") if found is None else bias_table(found)

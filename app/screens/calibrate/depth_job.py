@@ -22,10 +22,11 @@ from pipeline.kernels.geometry import apply
 from pipeline.types import FloatArray
 
 LEAST_SCALE_M = 0.01
+"""Least error at which the colour scale ends, metres."""
 
 
 def depth_job(store: Store, spec: Spec, name: str, view: str) -> Generator[Progress, None, DepthErrorView]:
-    """Return pictures of a view's depth error on the board; none without depth or board."""
+    """Return pictures of a view's depth error on the board; none without a depth image, a board or a lens."""
     views = spec.views
     assert views is not None
     known = yield from finished(cameras_of(store, views))
@@ -52,7 +53,7 @@ def depth_job(store: Store, spec: Spec, name: str, view: str) -> Generator[Progr
 
 
 def board_depth_m(lens: Calibration, T_camera_board: FloatArray, board: Board) -> FloatArray:
-    """Return (H, W) depth of the board's plane between its outermost points; NaN elsewhere."""
+    """Return (H, W) depth of the board's plane between its outermost points, metres; NaN elsewhere."""
     width_px, height_px = lens.size_px
     low_m, high_m = board.points_m[:, :2].min(axis=0), board.points_m[:, :2].max(axis=0)
     along = np.linspace(0.0, 1.0, 16, endpoint=False)[:, None]

@@ -1,4 +1,4 @@
-"""Drawing of boards and cameras: relative to a camera, to the board, or all cameras of a rig."""
+"""Drawings of the boards around a camera, of the cameras around a board, and of the cameras of a rig."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from pipeline.types import FloatArray
 BELOW = "/calibrate"
 FACES = np.array([[0, 1, 2], [0, 2, 3]])
 RIM = 0.9
-"""Width of the board beyond its outer points, in its spacing."""
+"""Width of the board beyond its outer points, in multiples of its spacing."""
 ASPECT = 1.2
-"""Aspect below which the viewpoint is farther away."""
+"""Width over height of a window; in narrower windows the viewpoint is farther away."""
 FAR = 0.95
 """Distance of the viewpoint over the size of the drawing."""
 
@@ -40,7 +40,7 @@ class BoardsDrawing:
         self._dropped: frozenset[str] = frozenset()
 
     def draw_scene(self, scene: SceneView | None) -> None:
-        """Draw what the cameras see, if there are no views of a board."""
+        """Draw a scene's cameras and sensor clouds, if there are no views of a board; None draws nothing."""
         clear(self._scene, BELOW)
         self._handles = {}
         for node in () if scene is None else scene.nodes:
@@ -48,7 +48,7 @@ class BoardsDrawing:
             add_camera(self._scene, f"{BELOW}/{node.name}/camera", node, node.T_world_camera)
 
     def draw_camera(self, camera: CameraView, board: Board, around: Around, chosen: str) -> None:
-        """Draw the views of a camera."""
+        """Draw the boards around the camera or, unless ``around`` is "camera", cameras around the board."""
         clear(self._scene, BELOW)
         self._handles, self._dropped = {}, frozenset(camera.dropped)
         poses = poses_of(camera)
@@ -102,7 +102,7 @@ class BoardsDrawing:
         self.choose(chosen)
 
     def choose(self, chosen: str) -> None:
-        """Highlight one of the views."""
+        """Highlight the view of this name."""
         for name, handle in self._handles.items():
             color = SOURCE if name == chosen else NEUTRAL if name in self._dropped else TARGET
             if tuple(handle.color) != color:
@@ -172,7 +172,7 @@ class BoardsDrawing:
 
 
 def poses_of(camera: CameraView) -> dict[str, FloatArray]:
-    """Return (4, 4) T_camera_board by view."""
+    """Return (4, 4) T_camera_board by name of the views that have a pose."""
     fitted = (camera.fitted(photograph.name) for photograph in camera.photographs)
     return {view.name: view.T_camera_board for view in fitted if view is not None}
 
@@ -191,6 +191,6 @@ def place_of(camera: CameraView, around: Around) -> Stage:
 
 
 def stand_before(client: viser.ClientHandle, stage: Stage) -> None:
-    """Turn a browser's view there, far enough that all is visible in a narrow picture, too."""
+    """Turn a browser's view to the stage, from farther away in a narrow window, so that all is visible."""
     away = max(1.0, ASPECT / max(client.camera.aspect, 0.1))
     turn(client, stage.middle_m, stage.middle_m + away * (stage.viewpoint_m - stage.middle_m))

@@ -16,8 +16,8 @@ CAMERAS_SHARE = 0.6
 
 
 def calibrate_job(store: Store, spec: Spec) -> Generator[Progress | CalibrationView, None, CalibrationView]:
-    """Find the board in all photographs and estimate every camera, all together, and the bias of their depth;
-    yield partial results.
+    """Find the board in all photographs; estimate every camera alone, all cameras together, and the bias of
+    their depth; yield partial results.
     """
     views = spec.views
     assert views is not None

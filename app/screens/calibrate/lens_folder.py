@@ -68,7 +68,7 @@ class LensFolder:
         return changed
 
     def load(self, camera: CameraView | None) -> None:
-        """Show the board's shape in a camera's views."""
+        """Show the board's shape that was estimated with a camera; hide it if there is none."""
         warp = None if camera is None else camera.warp
         self._image.visible = self._caption.visible = warp is not None
         if warp is not None:

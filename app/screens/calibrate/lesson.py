@@ -20,7 +20,8 @@ SHIPPED = LESSONS / "how-good-is-my-calibration.md"
 Keep = Literal["all", "three alike"]
 """The views used for a calibration."""
 LEAST_DEG = 8.0
-"""Least angle between the normals of the three boards: equal ones determine no lens."""
+"""Least value of the largest angle between two of the three boards' normals: parallel boards determine no
+lens."""
 _ON_OFF = {"on": True, "off": False}
 _KEEP: dict[str, Keep] = {"all": "all", "three alike": "three alike"}
 _LENSES: dict[str, Lens] = {"thesis": "thesis", "brown": "brown", "rational": "rational"}
@@ -83,7 +84,7 @@ def left_out(camera: CameraView, keep: Keep) -> Iterator[tuple[str, str]]:
 
 
 def _spread_deg(normals: list[np.ndarray]) -> float:
-    """Return the largest angle between two of them."""
+    """Return the largest angle between two of the (3,) unit normals, degrees."""
     cosines = np.clip(np.array(normals) @ np.array(normals).T, -1.0, 1.0)
     return float(np.degrees(np.arccos(cosines.min())))
 

@@ -19,16 +19,16 @@ from pipeline.types import ByteArray, FloatArray
 PAPER = 245
 NO_POINTS = (228, 228, 228)
 WARP_WIDTH_PX, LEAST_WARP_M = 400, 5e-4
-"""Width of the picture of a bent board, and deviation at which its colours are full."""
+"""Width of the picture of a bent board, and least deviation at which its colour scale ends, metres."""
 SHIFT = 4
-"""Fraction bits of drawing coordinates."""
+"""Number of fraction bits of OpenCV's drawing coordinates."""
 
 
 def map_picture(error_m: FloatArray, most_m: float, size_px: tuple[int, int], what: str) -> Picture:
     """Draw errors in mm over the image, dark for zero; grey where the lens has no ray.
 
     Args:
-        error_m: (R, C) errors of the cells.
+        error_m: (R, C) errors of the cells; NaN where the lens has no ray.
         most_m: error at which the colour scale ends.
         size_px: width and height of the picture.
         what: start of the caption.
@@ -48,7 +48,7 @@ def map_picture(error_m: FloatArray, most_m: float, size_px: tuple[int, int], wh
 def coverage_picture(
     coverage: Coverage, views: Sequence[FittedView], zoom: float, size_px: tuple[int, int]
 ) -> Picture:
-    """Draw the number of points seen per cell; light grey for none."""
+    """Draw the number of points per cell of the image, light grey for none, and the points of the views."""
     most = max(int(coverage.counts.max()), 1)
     cells = ramp(coverage.counts.astype(float), float(most), DISTANCE_STOPS)
     cells[coverage.counts == 0] = NO_POINTS
@@ -81,7 +81,7 @@ def next_picture(following: NextView, lens: Calibration, zoom: float, size_px: t
 
 
 def off_picture(off_m: FloatArray, most_m: float, zoom: float, what: str) -> Picture:
-    """Draw (H, W) depth errors: blue too near, white correct, orange too far, grey unknown."""
+    """Draw (H, W) depth errors, metres: blue too near, white correct, orange too far, grey unknown."""
     rgb = ramp(
         np.clip(np.nan_to_num(off_m), -most_m, most_m) + most_m, 2.0 * most_m, (NEARER, EQUAL, FARTHER)
     )
@@ -96,7 +96,7 @@ def off_picture(off_m: FloatArray, most_m: float, zoom: float, what: str) -> Pic
 
 
 def warp_picture(warp: WarpView) -> Picture:
-    """Draw the shape of the board as the camera sees it: blue towards it, orange away from it."""
+    """Draw the shape of the board as the camera sees it: blue nearer to the camera, orange farther away."""
     most_m = max(float(np.abs(warp.off_plane_m).max()), LEAST_WARP_M)
     rows, columns = warp.off_plane_m.shape
     size_px = (WARP_WIDTH_PX, round(WARP_WIDTH_PX * rows / columns))

@@ -99,7 +99,7 @@ class NoiseFolder:
         self._status.content = noise_line(view)
 
     def ended(self, view: NoiseView | None, request: NoiseRequest) -> None:
-        """Handle the end of a replay; None if it was stopped or failed."""
+        """Handle the end of a replay; ``view`` is None if it was stopped or failed."""
         if setting_of(request) != self._running:
             return
         if view is not None:

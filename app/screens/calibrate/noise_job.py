@@ -24,7 +24,7 @@ SHOW_S = 0.25
 HALVED = 8
 """In every eighth trial two halves of the views are compared, which takes three more calibrations."""
 AT_M = 2.0
-"""Range of that comparison."""
+"""Range of that comparison, metres."""
 OTHER = np.array([0.0, 0.0, 0.003, -0.002, 0.3])
 """Extra k1, k2, p1, p2 and k3 of another lens, as of a cheap lens that is mounted askew."""
 
@@ -55,7 +55,7 @@ class _Trials:
 def noise_job(
     store: Store, spec: Spec, request: NoiseRequest
 ) -> Generator[Progress | NoiseView, None, NoiseView]:
-    """Take the found calibration as the truth, and recalibrate from its points with noise.
+    """Take the calibration as the truth, and repeatedly calibrate from its projected points with new noise.
 
     Yields:
         Partial results; the job can be stopped at each of them.
@@ -83,7 +83,7 @@ def noise_job(
 
 
 def _seen(true: Calibration, other_lens: bool) -> list[View]:
-    """Return the views without noise, through the lens itself or one with more distortion terms."""
+    """Return the views without noise, through the lens or, unless it is a fisheye, with more distortion."""
     optics = true.optics
     if other_lens and true.lens != "fisheye":
         more = np.zeros(max(len(OTHER), true.distortion.size))

@@ -21,9 +21,10 @@ class NoiseRequest:
 
     camera: str
     sigma_px: float
-    """Standard deviation of each coordinate."""
+    """Standard deviation of the noise of each coordinate."""
     other_lens: bool = False
-    """Whether the views are taken through a lens of another model than the estimated one."""
+    """Whether the points are projected through a lens with more distortion (p1, p2, k3) than the estimated
+    one; a fisheye stays as it is."""
     trials: int = TRIALS
 
 
@@ -41,7 +42,7 @@ class NoiseView:
     covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     """(P, P) mean of the covariances that the trials predict."""
     rms_px: float = 0.0
-    """Mean RMS of the trials' points."""
+    """Mean over the trials of the RMS reprojection error."""
     halved: int = 0
     """Number of trials in which two halves of the views were compared."""
     beyond_noise: int = 0
@@ -53,7 +54,7 @@ class NoiseView:
         return len(self.found)
 
     def column(self, name: str) -> FloatArray:
-        """Return (T,) a parameter's estimates."""
+        """Return a parameter's (T,) estimates."""
         return self.found[:, self.names.index(name)]
 
     def true(self, name: str) -> float:
@@ -61,11 +62,11 @@ class NoiseView:
         return float(self.truth[self.names.index(name)])
 
     def rmse(self, name: str) -> float:
-        """Return the root mean square error of the trials."""
+        """Return the root mean square error of a parameter over the trials."""
         return float(np.sqrt(np.mean((self.column(name) - self.true(name)) ** 2)))
 
     def predicted(self, name: str) -> float:
-        """Return the standard error that the trials predict."""
+        """Return a parameter's standard error: the root of the mean variance that the trials predict."""
         at = self.names.index(name)
         return float(np.sqrt(self.covariance[at, at]))
 

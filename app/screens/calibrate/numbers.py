@@ -42,7 +42,7 @@ MEANING = {
 
 
 def unseen_rms_px(camera: CameraView) -> float | None:
-    """Return the RMS over all points of the views that were held out in turn; None without any."""
+    """Return the RMS over all points of the views that were held out in turn, px; None without any."""
     apart = [view.residuals_px for view in camera.unseen if view.name not in camera.dropped]
     return rms_px(np.concatenate(apart)) if apart else None
 
@@ -80,7 +80,7 @@ def bend(camera: CameraView) -> str:
 
 
 def within(found: Calibration | None, name: str) -> str:
-    """Return a parameter with half its 95 % interval as text."""
+    """Return a parameter with half its 95 % interval as text; a dash without a calibration."""
     if found is None:
         return "–"
     value, (low, high) = found.parameters[name], found.intervals[name]
@@ -131,7 +131,7 @@ class ParameterFolder:
             self.relate(None)
 
     def relate(self, together: Correlations | None) -> None:
-        """Show the correlations of its parameters, once they are known."""
+        """Show the correlations of the camera's parameters; None while they are not known."""
         self._together.content = Markup("") if together is None else correlation_html(together)
 
 
@@ -179,7 +179,7 @@ def signed(value: float) -> str:
 
 
 def short(name: str) -> str:
-    """Return the head of a row."""
+    """Return a parameter's name in the matrix."""
     return SHORT if name == DISTANCE else name
 
 

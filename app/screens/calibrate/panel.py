@@ -99,14 +99,14 @@ class CalibratePanel(Panel):
             self._lens = LensFolder(ui, self._picked_lens)
 
     def _group(self) -> Any:
-        """Return a container that is shown where there are photographs."""
+        """Add and return a container that is hidden while there are no photographs."""
         self._groups.append(self.gui.add_folder(None, visible=False))
         return self._groups[-1]
 
     # The photographs.
 
     def on_show(self) -> None:
-        """Look for the board at the first visit."""
+        """Use the scene's photographs if none are in use, and draw results that came meanwhile."""
         self._here = True
         self._noise.show(True)
         if self.session.spec.views is None:
@@ -120,7 +120,7 @@ class CalibratePanel(Panel):
         self._noise.show(False)
 
     def _use_own(self, views: BoardViews | None) -> None:
-        """Use the uploaded photographs, or those of the scene once the screen is shown."""
+        """Use uploaded photographs; None: those of the scene, once the screen is shown."""
         if views is None and self._here and isinstance(self._source, Demo):
             folder = board_views_of(self._source.name)
             views = None if folder is None else views_in(folder)
@@ -157,7 +157,7 @@ class CalibratePanel(Panel):
             self._take(view, all_there=False)
 
     def on_view(self, step: Step, view: Any) -> None:
-        """Show all cameras, or the new surface's numbers."""
+        """Show all cameras or the new surface's numbers, or take the scene's nodes and their ranges."""
         if step == "scene":
             self._uploads.cameras([node.name for node in view.nodes])
             self._judge.at_range([0.5 * (node.nearest_m + node.farthest_m) for node in view.nodes])
@@ -265,7 +265,7 @@ class CalibratePanel(Panel):
     # Requests besides the chain.
 
     def _request_answers(self) -> None:
-        """Request the verdict, and the depth of the chosen view if it is shown."""
+        """Request the verdict, and the chosen view's depth errors if the chosen pair shows them."""
         camera = self._shown()
         if camera is not None and camera.calibration is not None:
             request = self._judge.request(camera.name)
@@ -345,7 +345,7 @@ class CalibratePanel(Panel):
             self._show_look()
 
     def _show_look(self) -> None:
-        """Apply the stop's settings that needed all cameras."""
+        """Apply the stop's settings that need all cameras, once these are computed."""
         look, views = self._look, self.session.spec.views
         if look is None or views is None or not self.session.results.fresh("calibrate", self.session.spec):
             return
@@ -386,7 +386,7 @@ class CalibratePanel(Panel):
         self.session.frame_view()
 
     def look(self) -> bool:
-        """Turn the view to new boards; the cameras of a rig are seen with the scene."""
+        """Turn the view to new boards. False for the cameras of a rig: the session shows the whole scene."""
         camera, around = self._shown(), AROUND[self._around.value]
         if camera is None or camera.calibration is None or around == "rig":
             self._framed = ()

@@ -40,7 +40,7 @@ class Photographs:
 
         Args:
             ui: panel to add them to.
-            answers: results about the pixels of a view.
+            answers: the camera's verdict, and pictures of its views.
             on_pick: called with the name of the view to show.
             on_pair: called when other pictures of it are chosen.
             on_drop: leaves the chosen view out, or uses it again.
@@ -107,7 +107,9 @@ FIRST = (250, 220, 0)
 
 
 def found_picture(photograph: Photograph, fitted: FittedView | None) -> Picture:
-    """Draw rings around the board's points, or around the blobs if no board was found."""
+    """Draw rings around the board's points, with lines towards their reprojections in a fitted view; or rings
+    around the blobs if no board was found.
+    """
     rgb = decoded(photograph)
     name = f"View {photograph.name}"
     if not photograph.found:
@@ -130,7 +132,7 @@ def found_picture(photograph: Photograph, fitted: FittedView | None) -> Picture:
 
 
 def decoded(photograph: Photograph) -> ByteArray:
-    """Return (H, W, 3) RGB."""
+    """Return the thinned photograph, (H, W, 3) RGB."""
     bgr = cv2.imdecode(np.frombuffer(photograph.jpeg, np.uint8), cv2.IMREAD_COLOR)
     assert bgr is not None
     return np.ascontiguousarray(bgr[..., ::-1])
@@ -153,7 +155,7 @@ def scaled_matrix(matrix: FloatArray, zoom: float) -> FloatArray:
 
 
 def round_down(times: float) -> float:
-    """Round down to 1, 2 or 5 times a power of ten."""
+    """Round down to 1, 2 or 5 times a power of ten, at least to 1."""
     power = 10.0 ** np.floor(np.log10(max(times, 1.0)))
     return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= max(times, 1.0)))
 
@@ -171,7 +173,7 @@ def _rings(
 
 
 def _ring_px(points_px: FloatArray, zoom: float) -> float:
-    """Return a radius of rings that do not touch each other."""
+    """Return a radius, px of the picture, at which rings do not touch each other."""
     if len(points_px) < 2:
         return 6.0
     apart_px = np.linalg.norm(points_px[1:] - points_px[:-1], axis=1)

@@ -18,10 +18,10 @@ FOLDS = 4
 
 
 def views_in(folder: Path) -> BoardViews:
-    """Return the photographs in a folder, with the board in its board.json or else the thesis's.
+    """Return the photographs in a folder, with the board of its board.json, or else the thesis's board.
 
     Raises:
-        InputError: the file has other content.
+        InputError: board.json describes no board.
     """
     path = folder / BOARD_FILE
     board = read_board(path) if path.exists() else Board()
@@ -36,10 +36,10 @@ def board_of(views: BoardViews) -> Board:
 
 
 def shots_of(views: BoardViews) -> tuple[NodeShots, ...]:
-    """Return the images of every camera.
+    """Return the images of every node.
 
     Raises:
-        InputError: there are none.
+        InputError: there are none, too many nodes, or two images of one moment.
     """
     return node_shots([views.folder])
 
@@ -62,7 +62,9 @@ def true_parameters(views: BoardViews, camera: str) -> dict[str, float]:
 
 
 def calibrate_command(views: BoardViews, source: Source) -> str:
-    """Return the command line that finds the same cameras, several of them in the rig's world frame."""
+    """Return the command line that calibrates the same cameras; several get poses in the world frame of the
+    scene's rig, if it is a folder with poses.
+    """
     board, nodes = board_of(views), shots_of(views)
     folder = views.folder if len(nodes) > 1 else str(nodes[0].folder)
     words = ["packetmesh", "calibrate", folder, "--pattern", board.pattern]

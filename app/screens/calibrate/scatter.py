@@ -157,7 +157,7 @@ def _add_dots(
 
 
 def ellipse_points(center: FloatArray, covariance: FloatArray, count: int = 73) -> FloatArray:
-    """Return (count, 2) a closed line around 95 % of a normal distribution."""
+    """Return (count, 2) points of the closed ellipse that holds 95 % of a 2-D normal distribution."""
     values, vectors = np.linalg.eigh(covariance)
     angle = np.linspace(0.0, 2.0 * np.pi, count)
     circle = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -184,11 +184,11 @@ class Cell:
 
 
 def nearest_cell(sigma_px: float, parameters: Sequence[str]) -> Cell | None:
-    """Return the thesis's result at the nearest noise; None without noise, where it finds the truth.
+    """Return the thesis's result at the nearest noise; None below half of the table's least noise.
 
     Args:
         sigma_px: the noise.
-        parameters: names of the lens's parameters; with a k4, k1 and k2 differ from the thesis's.
+        parameters: names of the lens's parameters; with a k4, k1 and k2 mean something else and are omitted.
     """
     sigma = min(TABLE_4_1, key=lambda one: abs(one - sigma_px))
     if sigma_px < 0.5 * min(TABLE_4_1):

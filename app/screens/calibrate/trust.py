@@ -16,7 +16,7 @@ from app.window.ui import Ui
 
 REST_S = 0.3
 OWN_M = 2.0
-"""Range until a scene sets another."""
+"""Range until a scene sets another, metres."""
 CURVES = {"distortion": "Distortion of a point", "left": "Residuals along the radius"}
 
 
@@ -66,7 +66,7 @@ class TrustFolder:
         return TrustRequest(camera, float(self._range.value), self._accuracy.value / 1000.0)
 
     def at_range(self, ranges_m: Sequence[float]) -> None:
-        """Set the range to the mean of these distances."""
+        """Make the mean of these distances, rounded to 0.1 m, the scene's own range, and set it."""
         self._own_m = round(sum(ranges_m) / len(ranges_m), 1)
         self.set(None)
 

@@ -44,7 +44,7 @@ def trust_job(store: Store, spec: Spec, request: TrustRequest) -> Generator[Prog
 
 
 def _trust_view(camera: CameraView, request: TrustRequest, board: Board, may_bend: bool) -> TrustView:
-    """Return the verdict; ``may_bend``: a bent board has not been tried yet."""
+    """Return the verdict; ``may_bend``: whether the advice may be to allow a bent board."""
     lens = camera.calibration
     assert lens is not None
     views = [View(one.name, one.points_px, one.board_m) for one in lens.views]

@@ -130,13 +130,13 @@ class UploadFolder:
 
 
 def keep_photographs(file: viser.UploadedFile, folder: Path, node: str) -> list[str]:
-    """Keep a photograph, or all of a ZIP, below ``folder`` as ``NODE/NAME``.
+    """Keep a photograph, or all of a ZIP, below ``folder`` as ``NODE/NAME``, and a ZIP's board.json.
 
     Returns:
-        Names of the kept files.
+        Paths of the kept files below ``folder``.
 
     Raises:
-        InputError: the upload is too large, an unreadable ZIP, or holds no photograph.
+        InputError: the upload is too large, an unreadable ZIP, holds no photograph, or makes too many files.
     """
     if len(file.content) > UPLOAD_LIMIT_BYTES:
         raise InputError(
@@ -174,7 +174,7 @@ def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
 
 
 def _place(name: str, node: str) -> str:
-    """Return ``NODE/NAME`` of a file, in the node's folder in its own path or else in ``node``."""
+    """Return ``NODE/NAME`` for a file: NODE is a folder such as node_00 in its path, or else ``node``."""
     path = _path(name)
     if path.name == BOARD_FILE:
         return BOARD_FILE
@@ -183,5 +183,5 @@ def _place(name: str, node: str) -> str:
 
 
 def _path(name: str) -> PurePosixPath:
-    """Return a file's path as any system writes it."""
+    """Return a file's path, written with slashes or backslashes."""
     return PurePosixPath(name.replace("\\", "/"))

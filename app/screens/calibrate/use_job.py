@@ -48,7 +48,9 @@ def use_job(store: Store, spec: Spec, folder: str) -> Generator[Progress, None, 
 
 
 def _nodes(known: CamerasFound, rig: Rig) -> dict[str, CalibratedNode]:
-    """Return the nodes by name; poses only if all were placed, since others have another world frame."""
+    """Return the nodes by name. They have poses only if every camera of the rig was placed: a camera without
+    one would keep its pose in another world frame.
+    """
     if known.rig is None:
         return {
             name: CalibratedNode(report.intrinsics, focal_sd=report.calibration.focal_sd)
@@ -63,7 +65,7 @@ def _nodes(known: CamerasFound, rig: Rig) -> dict[str, CalibratedNode]:
 
 
 def _check(name: str, camera: CameraIntrinsics, rig: Rig) -> None:
-    """Raise InputError if the scene cannot take a camera."""
+    """Raise InputError if the scene has no camera of this name and image size."""
     sizes_px = {frame.name: (frame.intrinsics.width_px, frame.intrinsics.height_px) for frame in rig.frames}
     if name not in sizes_px:
         raise InputError(

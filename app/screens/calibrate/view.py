@@ -63,6 +63,7 @@ class CameraView:
 
     name: str
     size_px: tuple[int, int]
+    """Width and height."""
     photographs: tuple[Photograph, ...]
     calibration: Calibration | None = None
     """None if the views do not determine it."""
@@ -85,7 +86,7 @@ class CameraView:
         return next((view for view in placed if view.name == name), None)
 
     def unseen_rms_px(self, name: str) -> float | None:
-        """Return the error of a view by a lens estimated without it."""
+        """Return the RMS error of a view by a lens estimated without it, px; None if there is none."""
         return next((view.rms_px for view in self.unseen if view.name == name), None)
 
 
@@ -98,6 +99,7 @@ class BiasView:
     rows: tuple[tuple[str, float, float, float, str], ...]
     """For each of their numbers: name, value, ends of its 95 % interval and unit."""
     rms_before_m: float
+    """Root mean square of measured depth minus the board's plane; ``rms_after_m``: of corrected depth."""
     rms_after_m: float
     curve: BiasCurve
     note: str
@@ -114,9 +116,11 @@ class PlacedCamera:
     moments: int
     """Moments at which it and the first camera see the board; for the first, all of its own."""
     rotation_sd_deg: float = 0.0
+    """Standard error of the rotation; ``position_sd_m``: of the position. Both are 0 for the first."""
     position_sd_m: float = 0.0
     held_out_rotation_deg: float | None = None
-    """Largest change of its pose when a part of the moments is left out; None without such a part."""
+    """Largest change of its rotation when a part of the moments is left out, below of its position; None if
+    no part can be left out."""
     held_out_position_m: float | None = None
 
 
@@ -191,4 +195,4 @@ class DepthErrorView:
     camera: str
     view: str
     pictures: dict[str, Picture]
-    """Depth errors as measured and corrected."""
+    """Depth errors by "off-before" (measured) and "off-after" (corrected, if the bias is known)."""

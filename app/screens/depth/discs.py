@@ -14,20 +14,20 @@ AROUND = 2.5
 
 
 def disc_px(disc: Disc, width_px: int, height_px: int) -> tuple[float, float, float]:
-    """Return column and row of the centre, and the radius."""
+    """Return column and row of the centre, and the radius, px."""
     x, y = disc.x_share * (width_px - 1), disc.y_share * (height_px - 1)
     return x, y, 0.5 * disc.size_share * width_px
 
 
 def disc_at(u: float, v: float, width_px: int, height_px: int, size_share: float) -> Disc:
-    """Return the disc around a pixel."""
+    """Return the disc around column ``u`` and row ``v``; ``size_share`` is its diameter over the width."""
     return Disc(u / max(width_px - 1, 1), v / max(height_px - 1, 1), size_share)
 
 
 def covered(
     discs: Sequence[Disc], u: IntArray | FloatArray, v: IntArray | FloatArray, width_px: int, height_px: int
 ) -> BoolArray:
-    """Whether any disc covers the pixels of columns ``u`` and rows ``v``, which broadcast."""
+    """Return whether any disc covers each pixel; columns ``u`` and rows ``v`` broadcast."""
     inside = np.zeros(np.broadcast_shapes(np.shape(u), np.shape(v)), dtype=bool)
     for disc in discs:
         x, y, radius = disc_px(disc, width_px, height_px)

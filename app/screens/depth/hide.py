@@ -101,7 +101,7 @@ class HideFolder:
             self._paint((*self.discs, disc))
 
     def set(self, request: HideRequest) -> None:
-        """Paint the discs and press the button."""
+        """Paint these discs, set the sliders to the last one, and request the filling."""
         last = request.discs[-1]
         self._x.value, self._y.value = round(100.0 * last.x_share), round(100.0 * last.y_share)
         self._size.value = round(100.0 * last.size_share)

@@ -27,13 +27,14 @@ LEAST_HIDDEN_PX = 50
 WITHIN = 0.05
 """Relative error up to which a filled pixel counts as correct."""
 SHOWN_PX = 480
+"""Length up to which the longer side of a picture is enlarged."""
 
 
 def hide_job(store: Store, spec: Spec, request: HideRequest) -> Generator[Progress, None, HiddenView]:
     """Hide discs of one node's sensor depth, align without them, fill them, and measure the errors.
 
     Raises:
-        InputError: the node does not exist, or hardly anything is measured in the discs.
+        InputError: the node does not exist, or fewer than 50 pixels in the discs are measured.
     """
     rig, nodes = yield from store.stages(spec, "rig", "nodes")
     if not 0 <= request.node < len(rig.frames):
@@ -92,14 +93,23 @@ def accepted_depth(
     disparity: bool = False,
     hidden: BoolArray | None = None,
 ) -> DepthMap:
-    """Return the depth accepted with these settings, without the measurements in (H, W) ``hidden``."""
+    """Return the inferred depth that these settings accept.
+
+    Args:
+        inferred: (H, W) output of the depth network.
+        rest: (H, W) sensor depth without the hidden part.
+        rgb: (H, W, 3) colours.
+        config: the settings.
+        disparity: whether the network infers 1/depth.
+        hidden: (H, W) True where measured depth was hidden; None: nowhere.
+    """
     alignment = align_depth(inferred, rest, config.alignment, disparity)
     completed = completed_by(config, rest, rgb) if config.completes else None
     return judge(alignment, rest, rgb, config.reach, config.least_confidence, completed, hidden).depth
 
 
 def fill_row(name: str, filled_m: FloatArray, measured_m: FloatArray, elapsed_s: float) -> FillRow:
-    """Return the errors of (N,) filled depths, NaN where nothing was filled."""
+    """Return the errors of (N,) filled depths, NaN where nothing was filled, against (N,) measured ones."""
     relative = np.abs(filled_m.astype(float) - measured_m) / measured_m
     known = np.isfinite(relative)
     return FillRow(

@@ -140,7 +140,9 @@ def _inferred_rows(cloud: PointCloud) -> BoolArray:
 
 
 def residual_view(aligned: DepthMap, sensor: DepthMap) -> ResidualView:
-    """Return the histogram of aligned minus sensor depth; its bins cover 98 % of the pixels."""
+    """Return the histogram of aligned minus sensor depth. Its range covers 98 % of the pixels; the outer bins
+    also count the others.
+    """
     residual_m = (aligned.z_m - sensor.z_m).astype(float)
     residual_m = residual_m[np.isfinite(residual_m)]
     if not len(residual_m):
@@ -166,7 +168,9 @@ def judged_view(judged: JudgedDepth, blind: BoolArray) -> JudgedView:
 
 
 def _filled_error_m(rig: Rig, index: int, judged: JudgedDepth) -> float | None:
-    """Return the median absolute error of accepted inferred depth where the sensor has none."""
+    """Return the median absolute error of accepted inferred depth where the sensor has none, metres; None
+    without truth or such pixels.
+    """
     if rig.truth is None:
         return None
     error_m = np.abs(judged.depth.z_m - rig.truth.depth[index].z_m)

@@ -1,4 +1,4 @@
-"""The job that loads a depth network, tells by its inputs what it is for, and tries it before it is used."""
+"""The job that loads a depth network, finds from its inputs whether it takes depth, and runs it once."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def model_job(store: Store, spec: Spec, choice: ModelChoice) -> Generator[Progre
 
 
 def told_apart(choice: ModelChoice) -> ModelChoice:
-    """Return the choice with a network that takes image and depth as the completion.
+    """Return the choice; a network that takes image and depth is moved from ``model`` to ``completion``.
 
     Raises:
         InputError: such a network comes with settings of networks that take an image alone.

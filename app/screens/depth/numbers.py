@@ -104,7 +104,7 @@ def residual_table(node: DepthNode) -> Markup:
 
 
 def confidence_table(node: DepthNode) -> Markup:
-    """Return a table in HTML of the inferred depth that is accepted where the sensor is blind."""
+    """Return a table in HTML of how many inferred pixels in holes are accepted, flying or out of reach."""
     judged = node.judged
     return table(
         [

@@ -19,7 +19,7 @@ class SeenSample(Sample):
     pixels: IntArray
     """(N, 2) column and row."""
     width_px: int
-    """Width of the image; its height is below."""
+    """Width of the image; ``height_px`` is its height."""
     height_px: int
 
 
@@ -28,9 +28,9 @@ class Disc:
     """A disc in an image."""
 
     x_share: float = 0.5
-    """Column of the centre over the image's width."""
+    """Column of the centre over the last column, 0 to 1."""
     y_share: float = 0.5
-    """Row of the centre over the image's height."""
+    """Row of the centre over the last row, 0 to 1."""
     size_share: float = 0.2
     """Diameter over the image's width."""
 
@@ -57,7 +57,7 @@ class FillRow:
     filled_share: float
     """Share of hidden pixels that got a depth."""
     elapsed_s: float
-    """Time of the filling, seconds, without the network, whose output is stored."""
+    """Time of the filling, without the inference of the colour network, whose output is stored."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ class ModelView:
     """A depth network that was loaded and gave an answer."""
 
     choice: ModelChoice
-    """The choice, with a network that completes depth in its own field."""
+    """The choice; a network that takes image and depth is in ``completion``, not in ``model``."""
     kind: ModelKind
     """Kind of the network's output."""
     provider: str

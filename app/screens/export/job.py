@@ -38,8 +38,8 @@ def export_job(store: Store, spec: Spec, name: str, shown: Shown = "after") -> G
     Args:
         store: store of the results.
         spec: settings and source.
-        name: a file of the run folder, ``run.zip`` for all files, or ``surface.`` with the suffix of any mesh
-            format.
+        name: ``config.json``, ``metrics.json``, one of ``CLOUD_FILES``, ``surface.`` with the suffix of any
+            mesh format, or ``run.zip`` for the whole run folder.
         shown: the surface that ``surface.*`` holds; a baseline is added to ``run.zip``.
     """
     if name == "config.json":

@@ -146,7 +146,7 @@ class ExportPanel(Panel):
         session.side_job(offer.job, *offer.arguments, *seen, on_end=send)
 
     def _photograph(self, client: viser.ClientHandle) -> ByteArray | None:
-        """Return (H, W, 4) the view as the browser draws it; None if no picture came."""
+        """Return (H, W, 4) the view as the browser draws it; None, and a notification, if no picture came."""
         camera = client.camera
         height = min(max(camera.image_height, 240), 2160)
         width = min(max(camera.image_width, 320), 3840)

@@ -1,1 +1,1 @@
-"""The Fuse screen: registration of the nodes, and a race of up to four methods from the same start."""
+"""The Fuse screen: registration of the nodes, a race of up to four methods, and the walk of a recording."""

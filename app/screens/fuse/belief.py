@@ -19,8 +19,8 @@ class Belief:
     """Judges the poses of two clouds, which are prepared once.
 
     Quarter turns and a mirrored source are tried where the clouds have no colours that would refute them, and
-    poses nearby where a little of the answer lies in free space. They take a second; the evidence of a pose
-    takes 10 ms.
+    poses nearby where a little of the source is in free space or the surfaces hold the pose only a little.
+    These trials take about a second; the evidence of a pose takes 10 ms.
     """
 
     def __init__(self, source: PointCloud, target: PointCloud, config: RegistrationConfig) -> None:
@@ -28,7 +28,7 @@ class Belief:
         self._source, self._target, self._config = source, target, config
         self._judge = Judge(Surface(source, config.seed), Surface(target, config.seed))
         self._known: list[tuple[FloatArray, tuple[str, ...]]] = []
-        """Poses, and reasons to doubt them from what was tried."""
+        """Judged poses, each with the reasons for doubt that the trials gave."""
 
     def verdict(self, T_target_source: FloatArray) -> Verdict:
         """Return the verdict on a (4, 4) pose."""
@@ -48,7 +48,7 @@ class Belief:
         return verdict_on(evidence, reasons)
 
     def _nearby(self, T: FloatArray, evidence: Evidence) -> tuple[str, ...]:
-        """Return a reason if the source fits better nearby."""
+        """Return a reason for doubt if the source fits better at a pose nearby, or none."""
         clouds = self._source, self._target
         better = better_slide(*clouds, T, evidence, self._judge, self._config)
         if better is None or same(better.T_target_source, T, *clouds):
@@ -57,7 +57,7 @@ class Belief:
         return (f"{length(away_m)} away, the source fits better",)
 
     def _other_pose(self, T: FloatArray, evidence: Evidence) -> tuple[str, ...]:
-        """Return a reason if the source fits as well when it is turned by quarters."""
+        """Return a reason for doubt if the source fits as well or better after quarter turns, or none."""
         turns = quarter_turns(self._source, self._target, T, self._config.gate_m, self._judge, self._config)
         rivals = [
             turn
@@ -75,7 +75,7 @@ class Belief:
         return (f"turned by {turned_deg:.0f} degrees, the source fits {'as well' if as_well else 'better'}",)
 
     def _mirrored(self, T: FloatArray, evidence: Evidence) -> tuple[str, ...]:
-        """Return a reason if a mirrored source fits without doubt."""
+        """Return a reason for doubt if the mirrored source fits, or none."""
         gates_m = default_gates_m(self._target, "surfaces", self._config.seed)
         axis = mirrored_axis(self._source, self._target, [T], gates_m, self._judge, evidence, self._config)
         return (f"one cloud is mirrored, since with {axis} negated the source fits",) if axis else ()

@@ -1,7 +1,7 @@
 """The board over the lanes of a race: each lane's method and present error, and the colour scale.
 
 The page's part is ``board.js``, its style is ``board.css``. The server sends two hidden pieces of HTML, each
-with the whole of its part.
+complete: the setup of a race, and its present state.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from pipeline.types import ByteArray
 
 
 class Board:
-    """Shown over the picture during a race."""
+    """The board, which is over the picture while a race is shown."""
 
     def __init__(self, ui: Ui) -> None:
         """Add the board, empty and hidden."""
@@ -36,7 +36,7 @@ class Board:
             self._setup, self._state = ui.gui.add_html(Markup("")), ui.gui.add_html(Markup(""))
 
     def load(self, view: RaceView | None) -> None:
-        """Show another race, at its start; None is no race."""
+        """Show another race, at its start; None removes the race."""
         self._view = view
         self._send_setup()
         if view is not None:
@@ -73,7 +73,7 @@ class Board:
 
 
 def _head(mark: str, lane: RaceLane) -> dict[str, str]:
-    """Return the constant heading of a lane."""
+    """Return the heading of a lane, which stays the same at all its steps."""
     method, metric = lane.rival
     about = METHODS[method]
     return {
@@ -85,7 +85,7 @@ def _head(mark: str, lane: RaceLane) -> dict[str, str]:
 
 
 def _lens(lens: LensView) -> dict[str, Any]:
-    """Return the magnified corner without the moving points."""
+    """Return the magnified corner's width in centimetres and its target points, without the moving points."""
     return {"window": 100.0 * lens.window_m, "target": _bytes(lens.target)}
 
 
@@ -105,7 +105,7 @@ def scale(reference: Reference) -> dict[str, Any]:
 
 
 def score(lane: RaceLane, row: int) -> dict[str, str]:
-    """Return the error of a lane at one of its steps, and whether it has arrived."""
+    """Return a lane's error, state and, at its end, verdict at one of its steps, as texts."""
     step, ended = lane.steps[row], row == len(lane.steps) - 1
     distance, unit = distance_text(step)
     state, note = "running", f"iteration {row} of {lane.iterations}"

@@ -1,4 +1,4 @@
-"""The folder with the capture-range map: green starts from which a method arrives, red others."""
+"""The folder with the capture-range map: a start is green if a method arrives from it, otherwise red."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class CaptureFolder:
         self._status.content = COMPUTING
 
     def load(self, view: CaptureView | None) -> None:
-        """Show a map; None if the computation was stopped."""
+        """Show a map; None if it was stopped, has failed or belongs to another race."""
         self.forget()
         if view is None:
             self._status.content = Markdown("Stopped.")

@@ -22,7 +22,11 @@ MAP_POINTS = 2_000
 
 
 def capture_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, CaptureView]:
-    """Register with each of the race's methods from every start of the map; the race's start is ignored."""
+    """Register with each of the race's methods from every start of the map; the race's start is ignored.
+
+    Raises:
+        InputError: no reference pose is known, or as ``contest_of`` raises.
+    """
     rig, nodes = yield from store.stages(spec, "rig", "nodes")
     race = replace(race, start=Start())
 
@@ -48,7 +52,7 @@ def capture_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, Non
 
 
 def _end_error_m(contest: Contest, config: RegistrationConfig, T_start: FloatArray) -> float:
-    """Return the final distance from the reference position; that of the start if no pair is found."""
+    """Return the final RMS distance from the reference position; that of the start if registration fails."""
     try:
         T = register(contest.source, contest.target, config, T_start).T_target_source
     except ReconstructionError:

@@ -26,7 +26,7 @@ class RaceClock:
 
     @staticmethod
     def of(lanes: Sequence[RaceLane], in_ms: bool) -> RaceClock:
-        """Return the clock of these lanes."""
+        """Return the clock of these lanes: by run time if ``in_ms``, otherwise by iteration."""
         if in_ms:
             times = tuple(np.array([round(1e9 * step.time_s) for step in lane.steps]) for lane in lanes)
         else:
@@ -35,7 +35,7 @@ class RaceClock:
 
     @property
     def end_ns(self) -> int:
-        """Time at which the last lane ends."""
+        """Time at which the last lane reaches its last step."""
         return max(int(steps_ns[-1]) for steps_ns in self.steps_ns)
 
     @property
@@ -44,7 +44,7 @@ class RaceClock:
         return np.unique(np.concatenate(self.steps_ns))
 
     def rows(self, now_ns: int) -> tuple[int, ...]:
-        """Return the step of each lane."""
+        """Return the index of each lane's step at a time."""
         return tuple(int(np.searchsorted(steps_ns, now_ns, side="right")) - 1 for steps_ns in self.steps_ns)
 
     @property

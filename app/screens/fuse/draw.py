@@ -1,6 +1,7 @@
-"""Drawings of registrations side by side: the clouds are sent once, then only poses and pairs change.
+"""Drawings of registrations side by side: the clouds are sent once, then poses, colours and pairs change.
 
-The lanes of a race have one place in the scene; the page draws each in its window (``lanes.js``).
+All lanes of a race are at the same place in the scene; the page draws each in its own window
+(``lanes.js``).
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from pipeline.types import ByteArray, FloatArray
 
 FAINT, STRONG = np.array([235.0, 235.0, 235.0]), np.array([20.0, 20.0, 20.0])
 POINT_M, ROOM_POINT_M = 0.011, 0.022
-"""Size of a drawn point, in a scene and in a made room, which is larger and has fewer points."""
+"""Size of a drawn point, in a scene and in a synthetic room, which is larger and has fewer points."""
 PALETTE = ramp(np.arange(256.0), 255.0, DISTANCE_STOPS)
 """RGB of every shade of a distance."""
 FOV_RAD = np.radians(25.0)
@@ -40,9 +41,9 @@ MARGIN = 0.04
 ROOM_STAGE = Stage(
     np.array([0.0, -2.0, 3.6]), np.zeros(3), np.array([1.0, 0.0, 0.0]), 8.0, np.array([0.0, 0.0, 2.0])
 )
-"""Viewpoint for a made room: from above and from the side along which x runs to the right."""
+"""Viewpoint for a synthetic room: from above and from the side along which x runs to the right."""
 FITTED = 2_000
-"""Number of cloud points that must fit into the picture."""
+"""Most cloud points that are fitted into the picture."""
 
 
 class RaceDrawing:
@@ -225,7 +226,7 @@ class RaceFraming:
         self._narrowed = False
 
     def anew(self) -> None:
-        """Frame again at the next call, because another drawing is shown."""
+        """Let the next call of ``frame`` frame again, because another drawing is shown."""
         self._shapes = ()
 
     def frame(self, drawing: RaceDrawing, clients: Iterable[viser.ClientHandle]) -> None:
@@ -256,7 +257,7 @@ class NodesDrawing:
         self._clouds: list[viser.PointCloudHandle] = []
 
     def draw(self, depth: DepthView, view: FuseView) -> None:
-        """Draw the nodes of the chain."""
+        """Draw the fused clouds of the chain's nodes at their registered poses."""
         clear(self._scene, self._below)
         self._view = view
         self._clouds = [

@@ -52,7 +52,7 @@ def _title(rig: Rig, race: Race) -> str:
 
 
 def race_show(view: RaceView, title: str) -> RaceShow:
-    """Return what an exported race shows."""
+    """Return the data of a race's exported page and GIF."""
     T = view.T_world_target
     target_m = apply(T, view.target.points_m.astype(float))
     start_m = apply(T @ view.lanes[0].steps[0].T_target_source, view.source.points_m.astype(float))

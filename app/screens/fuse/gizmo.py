@@ -13,7 +13,7 @@ from app.window.ui import Ui
 
 
 class StartGizmo:
-    """A checkbox, and the gizmo that it shows at the start of the race that is drawn."""
+    """A checkbox, and the gizmo that it shows at the start pose of the drawn race."""
 
     def __init__(self, ui: Ui, on_drag: Callable[[Start, bool], None]) -> None:
         """Add the checkbox; ``on_drag`` gets the start and whether the drag has ended."""
@@ -33,11 +33,11 @@ class StartGizmo:
         self._place()
 
     def forget(self) -> None:
-        """Remove the gizmo with the drawing of its race."""
+        """Forget the gizmo, which is removed with the drawing of its race."""
         self._race = self._handle = None
 
     def hide(self) -> None:
-        """Clear the checkbox."""
+        """Clear the checkbox and hide the gizmo."""
         self._checkbox.value = False
         self._place()
 

@@ -68,7 +68,7 @@ window.packetmeshLanes = (() => {
 
   window.packetmeshFrames.before(hookAll);
 
-  // What is pointed at in a window is where that window's lane has it in the scene.
+  // Shift a pointer event from the place in its lane's window to the same place of the lane in the scene.
   function shiftPointer(event) {
     const {offsetX: x, offsetY: y, target: {clientWidth: width, clientHeight: height}} = event;
     const under = Math.max(0, Math.min(count - 1, Math.floor(count * x / width)));
@@ -91,8 +91,8 @@ window.packetmeshLanes = (() => {
   }
   for (const kind of POINTED) window.addEventListener(kind, point, true);
 
-  // Draw so many lanes from now on, between the upper and lower edge of a band: the upper edge as a share of the
-  // picture's height and the least in px, the lower edge as a share.
+  // Draw this number of lanes from now on, between the edges of a band: the upper edge as a share of the picture's
+  // height and its least distance in px, the lower edge as a share.
   return {show(lanes, edges) {
     [count, band] = [lanes, edges];
     held = null;

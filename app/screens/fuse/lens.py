@@ -39,7 +39,7 @@ class Lens:
     axes: FloatArray
     """(3, 3) rows: to the right, up and towards the viewer, target frame."""
     distances: Distances
-    """Distances of the source's points that belong to the corner or near it."""
+    """Distances of the source's points that are in the corner, or near it, at the aligned pose."""
 
     def at(self, T_target_source: FloatArray) -> ByteArray:
         """Return (M, 3) column, row and shade of the visible points at a pose."""
@@ -123,7 +123,7 @@ def _some(rows: FloatArray) -> FloatArray:
 
 
 REACH_M = 0.5
-"""Limit of the distance to a partner: a point without a nearer one gets this distance."""
+"""Largest distance to the nearest target point; a point that is farther away gets this distance."""
 
 
 @dataclass(frozen=True, slots=True)

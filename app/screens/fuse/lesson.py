@@ -21,16 +21,16 @@ START = (3.0, 6.0)
 
 @dataclass(frozen=True, slots=True)
 class RaceLook:
-    """The race that a stop shows, and how."""
+    """The race that a stop shows, and the state of its player and charts."""
 
     race: Race = field(default_factory=lambda: Race(start=Start.towards(*START, seed=0)))
-    """The race without its nodes, which stay as chosen."""
+    """The race; its nodes are not used, because those that the user has chosen stay."""
     in_ms: bool = False
     """Whether the curves run over time instead of iterations."""
     place: int | None = 0
     """Iteration, or milliseconds, to show; None is the end."""
     lane: int = 0
-    """Lane whose pairs the histogram shows."""
+    """Index of the lane whose pairs the histogram shows."""
 
 
 def _races(key: str, read: Callable[[str], Any]) -> Setting[RaceLook]:
@@ -101,7 +101,7 @@ ALIKE_M = 0.005
 
 
 WORDS = {"more": ("weights", "alike", "plane"), "others": ("far", "close", "nearer")}
-"""Words that decide a question: which of two errors is less; the middle one if they are alike."""
+"""Words that decide a question by two errors: for the first being less, for both alike, for the second."""
 
 
 def numbers(scene: str, race: Race, view: RaceView) -> Numbers:
@@ -127,7 +127,8 @@ def numbers(scene: str, race: Race, view: RaceView) -> Numbers:
 
 
 def _verdicts(ends_m: Mapping[Rival, float]) -> dict[str, str]:
-    """Return words: whether plane or weights help more, and how the methods without entropy compare."""
+    """Return the word of each question whose two errors are known: CEICP-A's weights or the plane metric;
+    CEICP or the trimmed methods without entropy."""
     words = {}
     plane_m, weights_m = ends_m.get(("icp", "plane")), ends_m.get(("ceicp-a", "point"))
     if plane_m is not None and weights_m is not None:

@@ -37,11 +37,11 @@ from app.window.panel import Offers, Panel
 from pipeline.sources import Recorded
 
 _RaceRequest: TypeAlias = tuple[tuple[Hashable, ...], Race]
-"""The key of the clouds and the race of them."""
+"""The key of the clouds, and the race between them."""
 
 
 class FusePanel(Panel):
-    """Registration, played step by step."""
+    """Panel of the races, the nodes' registration and the walk; races are played step by step."""
 
     title = "Fuse"
     step: ClassVar[Step | None] = "fuse"
@@ -60,7 +60,7 @@ class FusePanel(Panel):
         self._view: RaceView | None = None
         self._drawing: RaceDrawing | None = None
         self._seek_at: float | None = 0.0
-        """Place to which the player goes in the next race; None is its end."""
+        """Iteration or millisecond to which the player goes in the next race; None is its end."""
         self._framing = RaceFraming()
         self._here = False
         self._seen: tuple[int, ...] = ()
@@ -253,7 +253,7 @@ class FusePanel(Panel):
     # The race.
 
     def _start(self) -> bool:
-        """Race if anything has changed, or request the walk. Returns whether the race has yet to come."""
+        """Race if anything has changed, or request the walk. Returns False if this race is already shown."""
         session = self.session
         if self._shown.walking:
             self._walk.begin()
@@ -362,7 +362,7 @@ class FusePanel(Panel):
         return stage_of(self.session.results.view("scene").nodes)
 
     def look(self) -> bool:
-        """Fit all lanes into the picture, once per window shape. False leaves the view to the session."""
+        """Fit all lanes into the picture, once per window shape. Returns False if nothing is drawn yet."""
         if self._drawing is None or not self._racing:
             self._framing.widen(self.session.clients())
             return self._shown.walking and self._walk.look(self.session.clients())

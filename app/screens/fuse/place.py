@@ -31,7 +31,7 @@ def race_of(text: str) -> Race:
     """Return the race in a text.
 
     Raises:
-        InputError: a setting is unknown or does not take its value.
+        InputError: a setting is unknown, or its value is invalid or outside the sliders' range.
     """
     changes = dict(change.partition("=")[::2] for change in text.split())
     rivals = changes.pop(_RIVALS, None)

@@ -63,7 +63,7 @@ class RacePlayer:
         return f"{float(self.clock.shown(np.array(rest_ns))):.6g}"
 
     def load(self, lanes: Sequence[RaceLane], reference: Reference) -> None:
-        """Load another race, at its start; nothing without lanes."""
+        """Load another race, at its start; without lanes, do nothing."""
         self._lanes, self._reference = lanes, reference
         if not lanes:
             return

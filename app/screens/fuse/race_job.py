@@ -72,12 +72,16 @@ class Contest:
         return geometry.rigid(rotation, shift_m) @ self.T_aligned
 
     def error_m(self, T: FloatArray) -> float | None:
-        """Return the RMS distance of the points from their reference positions; None if these are unknown."""
+        """Return the RMS distance, metres, of the points from their reference positions; None if unknown."""
         return None if self.T_home is None else point_error_m(T, self.T_home, self.error_points_m)
 
 
 def race_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, RaceView]:
-    """Run every rival from the same start."""
+    """Register with every method of a race from the same start; returns the race for display.
+
+    Raises:
+        InputError: the nodes or the degradation are not possible.
+    """
     rig, nodes = yield from store.stages(spec, "rig", "nodes")
 
     def run() -> Generator[Progress, None, RaceView]:
@@ -108,7 +112,7 @@ def race_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, 
 
 
 def race_key(spec: Spec) -> tuple[object, ...]:
-    """Return what a race's result depends on besides the race."""
+    """Return the key of what a race's result depends on besides the race: clouds and settings."""
     return (key(spec, "nodes"), spec.config.node_registration)
 
 
@@ -116,7 +120,8 @@ def contest_of(rig: Rig, nodes: Sequence[NodeClouds], race: Race) -> Contest:
     """Return the clouds of a race and their reference pose.
 
     Raises:
-        InputError: the scene has no such node, or source and target are the same node.
+        InputError: the scene has no such node, source and target are the same node, or the source has points
+            behind its camera and cannot be degraded.
     """
     if race.mode in ROOMS:
         return _contest_in_room(race)
@@ -188,13 +193,13 @@ def config_of(race: Race, rival: Rival, config: RegistrationConfig) -> Registrat
 
 
 def _every(points_m: FloatArray, most: int) -> FloatArray:
-    """Return about ``most`` of the points, evenly spaced in their order."""
+    """Return evenly spaced points in their order: fewer than twice ``most``, or all if they are fewer."""
     return points_m[:: max(1, len(points_m) // most)]
 
 
 @dataclass(frozen=True, slots=True)
 class Watch:
-    """What is recorded in every step."""
+    """Data from which every step records its histogram, colours and magnified corner."""
 
     edges_m: FloatArray
     """(B + 1,) edges of the histogram's bins."""
@@ -230,7 +235,7 @@ def _run(contest: Contest, race: Race, rival: Rival, config: RegistrationConfig)
 
 
 def _edges_m(runs: Sequence[Sequence[RegistrationStep]]) -> FloatArray:
-    """Return bins that hold nearly all first pairs of every method, up to a metre."""
+    """Return (B + 1,) edges of bins for 97 % of the first pairs of every method, from 0 to at most 1 m."""
     reaches_m = [float(np.percentile(records[0].distances_m, 97)) for records in runs if records]
     return np.linspace(0.0, min(max([0.1, *reaches_m]), MOST_BINNED_M), BINS + 1)
 

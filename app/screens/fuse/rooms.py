@@ -1,4 +1,4 @@
-"""Three made rooms in which a wrong registration fits: a corridor, a square room and a mirrored room.
+"""Three synthetic rooms in which a wrong registration fits: a corridor, a square room and a mirrored room.
 
 Each is scanned from two places. A scan's frame is a camera's: x to the right along a wall, y down, z forward
 along another wall. The scans are cut off at some height, so that one sees into the rooms.
@@ -23,7 +23,7 @@ NOISE_M = 0.004
 HEIGHT_M, SCANNER_M = 1.4, 1.1
 """Height at which the scans are cut off, and height of the scanners."""
 RANGE_M = 4.0
-"""A scanner sees so far along the corridor, which is longer."""
+"""Distance that a scanner sees to each side along the corridor, which is longer."""
 PLACES_M = ((0.5, -0.1), (-0.4, 0.5))
 """x and y of the two scanners in a room: the source's and the target's."""
 AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -60,7 +60,7 @@ class Box:
         return np.array([self.x_m - 0.5 * self.size_m[0], self.y_m - 0.5 * self.size_m[1], 0.0])
 
     def sides(self, axes: Sequence[int] = (0, 1)) -> list[tuple[FloatArray, FloatArray]]:
-        """Return the lowest corner and the (3,) extent of both sides across each of the axes."""
+        """Return the (3,) lowest corner and (3,) extent of both sides perpendicular to each of the axes."""
         found = []
         for axis in axes:
             flat_m = np.where(np.arange(3) == axis, 0.0, self.size_m)
@@ -68,7 +68,7 @@ class Box:
         return found
 
     def floor(self) -> tuple[FloatArray, FloatArray]:
-        """Return the lowest corner and the (3,) extent of its floor."""
+        """Return the (3,) lowest corner and the (3,) extent of the bottom."""
         return self.sides((2,))[0]
 
     def hides(self, eye_m: FloatArray, points_m: FloatArray) -> BoolArray:

@@ -158,7 +158,7 @@ class RaceSetup:
                 handle.value = names[index]
 
     def choose_mode(self, mode: RaceMode) -> None:
-        """Race two nodes, one node's inferred cloud, or the scans of a made room, which has no nodes."""
+        """Race two nodes, one node's inferred cloud, or the scans of a synthetic room, which has no nodes."""
         self._race = replace(self._race, mode=mode)
         self._source.disabled = mode not in ("nodes", "inferred")
         self._target.disabled = mode != "nodes"

@@ -20,7 +20,7 @@ NAMES = {"walk": WALK, "result": RESULT, "before": BEFORE}
 
 
 class ShownChoice:
-    """A drop-down, and the groups of controls that belong to the walk, or to everything else.
+    """A drop-down, and the groups of controls that are visible with the walk only, or without it only.
 
     Its first entry is the start value, which depends on the scene.
     """
@@ -30,7 +30,7 @@ class ShownChoice:
         self._ui, self._on_change = ui, on_change
         self._groups: list[tuple[viser.GuiFolderHandle, bool]] = []
         self._known, self._requested = False, ""
-        """Whether the scene is known, and the name that an address asks for until then."""
+        """Whether the scene is known, and the name from the address that is kept until then."""
 
     def add(self) -> None:
         """Add the drop-down."""
@@ -57,16 +57,16 @@ class ShownChoice:
 
     @property
     def mode(self) -> RaceMode | None:
-        """The race that is chosen; None for none."""
+        """The mode of the chosen race; None if no race is chosen."""
         return RACES.get(self._handle.value)
 
     @property
     def races(self) -> tuple[RaceMode, ...]:
-        """The races that are offered."""
+        """The modes of the races that are offered."""
         return tuple(RACES[name] for name in self._handle.options if name in RACES)
 
     def expect(self, walk: bool) -> None:
-        """Offer what a scene that is being loaded probably has; ``offer`` follows once it is known."""
+        """Offer the entries that a scene probably has while it is loaded; ``offer`` follows afterwards."""
         self._known = False
         if walk != (WALK in self._handle.options):
             self._offer(single=False, walk=walk)

@@ -13,11 +13,11 @@ from pipeline.types import ByteArray, FloatArray, IntArray
 
 RaceMode = Literal["nodes", "inferred", "corridor", "square", "mirrored"]
 """nodes: one node's sensor cloud onto another's; inferred: a node's inferred cloud onto its sensor cloud;
-otherwise two scans of a made room (``rooms.py``)."""
+otherwise two scans of a synthetic room (``rooms.py``)."""
 
 Reference: TypeAlias = Literal["truth", "pixels", "walk", "cloud"]
-"""Reference of a race's errors: the points' true positions; the pixels at which they were inferred, which
-needs no ground truth; the poses that a recording's whole walk gives; or, if all are unknown, the nearest
+"""Reference of a race's errors: the points' true positions; the measured points of their own pixels, which
+need no ground truth; the poses that a recording's whole walk gives; or, if all are unknown, the nearest
 points of the other cloud."""
 
 Rival: TypeAlias = tuple[Method, Metric]
@@ -37,10 +37,11 @@ class RegistrationRow:
     rmse_m: float
     """RMSE of the last matching; NaN if there was none."""
     error_before_m: float | None
-    """RMS distance of the source's points from their true positions, at the believed pose."""
+    """RMS distance of the source's points from their true positions, at the believed pose; None without
+    ground truth."""
     error_after_m: float | None
     loop_error_m: float
-    """Difference from the other registrations' answer for these two nodes; NaN if there is none."""
+    """RMS distance of the points from where the other registrations put them; NaN if these imply no pose."""
     used: bool
     """False if it degenerated or contradicts the other registrations or the common measurements."""
 
@@ -55,7 +56,7 @@ class FuseView:
     """T_world_camera after registration."""
     rows: tuple[RegistrationRow, ...]
     agreement_share: float
-    """Share, within 2 %, of the depths that two placed cameras both measured; NaN if there are none."""
+    """Share of the depths measured by two placed cameras that agree within 2 %; NaN if there are none."""
     sentences: tuple[str, ...]
     """Sentences on nodes that found no pose or have an uncertain one."""
 
@@ -109,7 +110,7 @@ class PairHistogram:
     weights: FloatArray
     """(B,) mean weight of a pair in each bin over the largest of them; NaN in empty bins."""
     sigma_m: float
-    """Scale of the kernel f; NaN for methods without one."""
+    """Scale of the weight function, for f its standard deviation; NaN for methods without one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +124,7 @@ class RaceStep:
     target_points_m: FloatArray
     """(M, 3) float32, target frame."""
     weights: FloatArray
-    """(M,) weights over the largest."""
+    """(M,) weights of the pairs, divided by the largest of all weights."""
     time_s: float
     """Run time of the method, its preparation included, until it reached this pose."""
     rmse_m: float
@@ -137,7 +138,7 @@ class RaceStep:
     """(N,) each drawn point's distance from its reference position or, if unknown, the target's nearest
     point: 0 to 255 for zero to ``MOST_DISTANCE_M`` and beyond."""
     lens: ByteArray
-    """(M, 3) column, row and shade of the points in the magnified corner, placed as in ``LensView``."""
+    """(M, 3) column, row and shade of the points in the magnified corner (``LensView``); M = 0 if none."""
     histogram: PairHistogram
 
     @property
@@ -153,7 +154,7 @@ class RaceLane:
     rival: Rival
     label: str
     kernel: bool
-    """Whether its weights come from the Gaussian kernel f of the pair distance."""
+    """Whether a pair weighs -p log p, with p from the Gaussian kernel f of its distance."""
     steps: tuple[RaceStep, ...]
     """The steps; the last is the end pose, without pairs and with the numbers of the last matching."""
     stop_reason: str

@@ -1,4 +1,4 @@
-"""Drawing of a walk: the map is sent once, in pieces; then its visible part, poses and one picture change."""
+"""Drawing of a walk: the map is sent once, in pieces; then only visibility, poses and one picture change."""
 
 from __future__ import annotations
 
@@ -32,12 +32,13 @@ WIDTHS_PX = {"solid": 4.0, "faint": 3.0, "dashed": 3.5, "gaps": 3.5}
 POINT = 0.75
 """Size of a point over the distance between neighbours."""
 FRUSTUM = 0.35
-"""Size of a frustum over the distance from the path to what it sees, at most ``MOST_FRUSTUM_M``."""
+"""Size of a frustum over the distance from the middle of the path to the nearest tenth of the map."""
 MOST_FRUSTUM_M = 0.3
+"""Largest size of a frustum."""
 FITTED, MARGIN = 3000, 0.9
-"""Number of map points that must fit into the picture, and the share of the picture that they may fill."""
+"""Most map points that are fitted into the picture, and the share of the picture that they may fill."""
 MOST_SEGMENTS = 1000
-"""Most segments in which a path is drawn."""
+"""A path is drawn in fewer than twice this number of segments."""
 DASHES = 30
 """Number of dashes of the path by tracking alone."""
 NAME = 2.2
@@ -45,7 +46,7 @@ NAME = 2.2
 ENLARGED = (1, 2, 5, 10, 20, 50)
 """Factors by which the drift may be enlarged."""
 SEEN_DRIFT = 0.2
-"""Largest drift over the path's extent, as it is drawn."""
+"""Largest drift in the drawing over the path's extent."""
 
 
 def enlarging(view: WalkView) -> int:
@@ -66,7 +67,7 @@ def shifted(view: WalkView, times: int) -> FloatArray:
 
 
 class WalkDrawing:
-    """A walk below a scene node, at any of its moments."""
+    """Drawing of a walk below a scene node; it can show any moment."""
 
     def __init__(self, scene: viser.SceneApi, below: str, view: WalkView) -> None:
         """Draw the paths and, hidden, the pieces of the map and the cameras."""
@@ -129,7 +130,7 @@ class WalkDrawing:
         )
 
     def enlarge(self, times: int) -> None:
-        """Draw the path by tracking alone this many times as far from the final one as it is."""
+        """Draw the path by tracking alone with its distance from the final path multiplied by ``times``."""
         self._times = times
         dashes, gaps = _dashes(self._shifted())
         self._show_line(self._dashed, dashes)
@@ -179,13 +180,13 @@ class WalkDrawing:
             camera.image = _rgb(picture)
 
     def look(self, clients: Iterable[viser.ClientHandle]) -> None:
-        """Turn the view to the path and what it sees, from behind and above."""
+        """Turn the browsers' views to the map and the paths, from behind and above."""
         for client in clients:
             turn(client, *viewpoint(self._view, client.camera.fov, client.camera.aspect))
 
 
 def pieces(until: IntArray) -> IntArray:
-    """Return (P,) ascending end indices of the pieces of the map: each holds all points of a few frames.
+    """Return (P,) ascending end indices of the map's pieces: each has the new points of a few frames.
 
     Args:
         until: (F,) number of points after each frame.
@@ -199,7 +200,7 @@ def pieces(until: IntArray) -> IntArray:
 
 
 def frustum_m(view: WalkView) -> float:
-    """Return the size of a frustum, so that it hides little of what the camera sees."""
+    """Return the size of a frustum, metres, at which it hides little of what the camera sees."""
     nearest_m = np.nanpercentile(np.linalg.norm(view.points_m - np.nanmean(view.at_m, axis=0), axis=1), 10)
     return min(FRUSTUM * float(nearest_m), MOST_FRUSTUM_M)
 
@@ -223,7 +224,7 @@ def viewpoint(view: WalkView, fov_rad: float, aspect: float) -> tuple[FloatArray
 
 
 def _segments(at_m: FloatArray) -> FloatArray:
-    """Return (S, 2, 3) segments between (F, 3) positions in a row; none across gaps (NaN)."""
+    """Return (S, 2, 3) segments between successive (F, 3) positions, thinned if many; none at NaN."""
     every = max(1, len(at_m) // MOST_SEGMENTS)
     at_m = at_m[::every]
     segments = np.stack([at_m[:-1], at_m[1:]], axis=1).astype(np.float32)

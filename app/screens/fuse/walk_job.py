@@ -22,11 +22,11 @@ from pipeline.spec import key
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray, IntArray, Link, Walk
 
 MOST_PICTURES = 240
-"""About the largest number of pictures, so that they take 1 MB."""
+"""Most pictures besides those of the keyframes; this number takes about 1 MB."""
 PICTURE_PX, QUALITY = 160, 75
 """Width of a picture, and its JPEG quality."""
 REPORTED = 10
-"""Number of pictures from report to report."""
+"""Number of pictures between two reports of progress."""
 
 
 def walk_job(store: Store, spec: Spec) -> Generator[Progress, None, WalkView]:
@@ -97,7 +97,7 @@ def _colors(walk: Walk) -> ByteArray:
 
 
 def _thinned(first_frames: IntArray) -> IntArray:
-    """Return indices of at most ``SCREEN_POINTS`` points, by the frame that measured each first."""
+    """Return indices of at most ``SCREEN_POINTS`` points, ordered by the frame that measured each first."""
     rows = np.argsort(first_frames, kind="stable")
     if len(rows) > SCREEN_POINTS:
         kept = np.random.default_rng(0).choice(len(rows), SCREEN_POINTS, replace=False)
@@ -106,7 +106,7 @@ def _thinned(first_frames: IntArray) -> IntArray:
 
 
 def _loop(link: Link, poses: FloatArray, tracked: FloatArray, T_color_depth: FloatArray) -> LoopView:
-    """Return a loop, with how far it is from tracking and from the final poses, of the colour camera."""
+    """Return a loop of the colour camera with its differences from tracking alone and the final poses."""
     T = T_color_depth @ link.T_target_source @ inverse(T_color_depth)
     moved_m, turned_rad = _apart(T, inverse(tracked[link.target]) @ tracked[link.source])
     left_m, left_rad = _apart(T, inverse(poses[link.target]) @ poses[link.source])
@@ -125,13 +125,14 @@ def _loop(link: Link, poses: FloatArray, tracked: FloatArray, T_color_depth: Flo
 
 
 def _apart(one: FloatArray, other: FloatArray) -> tuple[float, float]:
-    """Return the distance between two (4, 4) poses and the angle between them."""
+    """Return the distance between two (4, 4) poses, metres, and the angle between them, radians."""
     away_m = float(np.linalg.norm(one[:3, 3] - other[:3, 3]))
     return away_m, float(rotation_angle_rad(other[:3, :3].T @ one[:3, :3]))
 
 
 def pictures_of(recording: Recording, keyframes: Sequence[int]) -> Generator[Progress, None, Pictures]:
-    """Return small pictures of the keyframes and of every frame, or every n-th.
+    """Return small pictures of the keyframes, and of every n-th frame so that these are at most
+    ``MOST_PICTURES``.
 
     Frames whose images cannot be read have none.
     """

@@ -32,7 +32,7 @@ TRACKED, KEYFRAME = (158, 199, 226), (20, 52, 82)
 USED, CONTRADICTED = (112, 190, 160), LOSS
 """Colours of frames and loops; a chosen loop is drawn in ``DELIVERED``."""
 ARC_PARTS, DASH_PARTS = 96, 4
-"""Number of straight parts of a loop, and of a dash of it."""
+"""Number of straight parts of a loop's arc, and of one of its dashes."""
 NEAR_PX = 6.0
 """Largest distance of a click from a loop that it picks."""
 
@@ -98,7 +98,7 @@ class WalkLane:
         return t_ns, ARCS_PX - high_px * np.sin(angles)
 
     def labels(self, now_ns: int) -> Sequence[Label]:
-        """Return the numbers of loops and of the frame at the clock's time."""
+        """Return two labels: the number of loops; the number and state of the frame at the clock's time."""
         view, frame = self._view, self._view.frame_at(now_ns)
         lost = bool(np.isnan(view.T_world_camera[frame, 0, 0]))
         state = "lost" if lost else "keyframe" if frame in view.keyframes else "tracked"
@@ -118,7 +118,7 @@ class WalkLane:
         return [Word(*span, y_px, "lost") for span in spans if span[1] - span[0] >= least_ns]
 
     def pick(self, t_ns: int, y_px: int, tolerance_ns: int) -> int:
-        """Return the index of the loop nearest to a place above the frames, or -1."""
+        """Return the index of the loop nearest to a place; -1 in the band or beyond ``NEAR_PX``."""
         if y_px >= ARCS_PX or not self._view.loops:
             return -1
         arcs = [self._arc(loop) for loop in self._view.loops]
@@ -135,13 +135,13 @@ class WalkLane:
         return "" if index < 0 else loop_line(self._view.loops[index])
 
     def place(self, item: int) -> tuple[int, int, int, int]:
-        """Return the times of a loop's two keyframes, and the edges of the band."""
+        """Return the times of a loop's two keyframes, ns, and the upper and lower edge of the band, px."""
         first, last = self._view.loops[item].frames
         return int(self._times_ns[first]), int(self._times_ns[last]), ARCS_PX, self.height_px
 
 
 def drift_lane(view: WalkView) -> CurvesLane:
-    """Return a lane with the distance between the path by tracking alone and the final path."""
+    """Return a lane with the distance between the path by tracking alone and the final path, centimetres."""
     drift_cm = 100.0 * view.drift_m
     high_cm = round_up(max(float(np.nanmax(drift_cm)), 0.1))
     curve = Curve("drift", "cm", NEUTRAL, view.times_ns, drift_cm, 0.0, high_cm, 1)

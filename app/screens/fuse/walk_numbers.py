@@ -18,7 +18,7 @@ LINES: tuple[tuple[str, str], ...] = (
     ("frustum", "camera at the moment, with its picture"),
     ("loop", "cameras of the chosen loop; red if it contradicts the others"),
 )
-"""Looks and names of what is drawn besides the map."""
+"""Line style and description of each thing that is drawn besides the map."""
 MAP_LINE = Markup(
     "<div><b style='margin: 0 13px 0 6px'>⁘</b>map of the frames up to the moment; grey: colour unknown</div>"
 )
@@ -87,7 +87,7 @@ def loop_name(loop: LoopView) -> str:
 
 
 def loop_line(loop: LoopView) -> str:
-    """Return a line about a loop: its keyframes, how far it is from tracking, and whether it counts."""
+    """Return a line about a loop: its keyframes, how far it is from tracking, and whether it is used."""
     counts = "used" if loop.used else "not used, it contradicts the others"
     return (
         f"Loop of {loop_name(loop)}: {_cm(loop.moved_m)} and {_deg(loop.turned_rad)} from tracking; {counts}"
@@ -137,7 +137,7 @@ def loop_html(view: WalkView, loop: LoopView, pictures: Pictures) -> Markup:
 
 
 def moment_html(view: WalkView, frame: int, pictures: Pictures) -> Markup:
-    """Return the picture of a frame, and beside it a line about the frame and the map up to it."""
+    """Return the picture of a frame and, to its right, lines about the frame and the map up to it."""
     share = view.until[frame] / max(len(view.points_m), 1)
     return Markup(
         "<div style='display: flex; gap: 0.8em; padding: 0 0.8em 0.6em; font-size: 13px'>"

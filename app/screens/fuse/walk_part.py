@@ -54,7 +54,7 @@ class WalkPart:
         self._drawn, self._frame, self._drawn_s = 0, -1, 0.0
         self._framed: tuple[tuple[int, float, int], ...] = ()
         self._requested_frame: int | None = None
-        """Frame that an address asks for, until the walk is there; so is ``_requested_loop``."""
+        """Frame from the address, kept until the walk is computed; ``_requested_loop`` likewise."""
         self._requested_loop = ""
         self._look: WalkLook | None = None
         self._rest = self._ui.debounce(DRAW_S, self._draw)
@@ -107,7 +107,7 @@ class WalkPart:
             self._read_pictures(self._view)
 
     def forget(self) -> None:
-        """Remove the walk of another scene."""
+        """Remove the walk, because another scene was loaded."""
         self._asked = self._view = self._drawing = None
         self._reading, self._pictures = False, NO_PICTURES
         with self._ui.atomic():
@@ -119,12 +119,12 @@ class WalkPart:
             self._loop.options = (NO_LOOP,)
 
     def show(self, visible: bool) -> None:
-        """Show or hide the dock, at once or as soon as the walk is there."""
+        """Show or hide the dock, at once or as soon as the walk is computed."""
         self._visible = visible
         self._dock.show(visible and self._view is not None)
 
     def look(self, clients: Iterable[viser.ClientHandle]) -> bool:
-        """Turn the view to the walk, once per window shape. False while there is none."""
+        """Turn the view to the walk, once per window shape. Returns False while no walk is drawn."""
         if self._drawing is None:
             return False
         clients = list(clients)
@@ -193,7 +193,7 @@ class WalkPart:
             self._rest.restart()
 
     def _draw(self) -> None:
-        """Draw the clock's moment."""
+        """Draw the frame at the clock's time."""
         if self._view is None or self._drawing is None:
             return
         frame = self._view.frame_at(self._dock.now_ns)
@@ -204,7 +204,7 @@ class WalkPart:
                 self._picture.content = moment_html(self._view, frame, self._pictures)
 
     def _time_of(self, frame: int) -> int:
-        """Return the time of a frame, or of the last one."""
+        """Return the time of a frame, ns; of the last frame if there are fewer."""
         assert self._view is not None
         return int(self._view.times_ns[min(frame, self._view.frames - 1)])
 
@@ -295,7 +295,7 @@ class WalkPart:
                 self._draw()
 
     def _take_look(self, look: WalkLook) -> None:
-        """Show a stop of the lesson, at once or when the walk is there."""
+        """Show a stop of the lesson, at once or as soon as the walk is computed."""
         self._choose_walk()
         self._look = look
         self._take_waiting_look()
@@ -312,7 +312,7 @@ class WalkPart:
         self._picked_loop()
 
     def _numbers(self) -> Numbers:
-        """Return the numbers of the walk; empty until it is there."""
+        """Return the numbers of the lesson's texts; empty until the walk is computed."""
         session = self._session
         scene = session.results.view("scene")
         if scene is None or self._view is None:

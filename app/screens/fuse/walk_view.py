@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 MOTIONS = 6
-"""Number of a camera's turns and shifts."""
+"""Number of independent motions of a camera: three turns and three shifts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,14 +22,15 @@ class LoopView:
     """Frame number of a keyframe; it is not always the later one."""
     target: int
     moved_m: float
-    """Distance between the source's position in the target by this registration and by tracking alone."""
+    """Distance of the source's position in the target by this registration from that by tracking alone."""
     turned_rad: float
+    """Angle between these two poses."""
     left_m: float
-    """The same distance from the final poses, and its angle."""
+    """The same distance between this registration and the final poses; ``left_rad`` is their angle."""
     left_rad: float
     overlap_share: float
     agreeing_share: float
-    """Share of the points that both measured and at about the same depth."""
+    """Share of the points that both images show which both measured at about the same depth."""
     held: int
     """Number of the six motions of the camera that the registration fixes."""
     used: bool
@@ -51,7 +52,7 @@ class Pictures:
     """(P,) JPEG files."""
 
     def of(self, frame: int) -> bytes | None:
-        """Return the JPEG file of a frame, or of the last one before it that has a picture."""
+        """Return the JPEG file of a frame, or of the last frame before it that has one; None if none has."""
         at = int(np.searchsorted(self.frames, frame, side="right")) - 1
         return self.files[at] if at >= 0 else None
 
@@ -76,7 +77,7 @@ class WalkView:
     """First and last frame of each span without poses."""
     path_m: float
     points_m: FloatArray
-    """(N, 3) float32 points of the map, by the frame that measured each first."""
+    """(N, 3) float32 points of the map, ordered by the frame that measured each first."""
     colors: ByteArray
     """(N, 3) RGB."""
     until: IntArray
@@ -128,7 +129,7 @@ class WalkView:
 
     @property
     def last(self) -> int:
-        """The last frame with a pose."""
+        """Number of the last frame with a pose."""
         return int(np.flatnonzero(np.isfinite(self.drift_m))[-1])
 
     def frame_at(self, t_ns: int) -> int:

@@ -35,6 +35,7 @@ LIT = (255, 230, 0)
 BUSY, DOWN = BRAND, LOSS
 FULL, EMPTY = DELIVERED, SOURCE
 Number = tuple[int, int, int]
+"""An RGB colour."""
 
 
 class DeliveryDrawing:
@@ -125,7 +126,7 @@ class DeliveryDrawing:
             self._stand(row, self._pose(row, self._shown))
 
     def place_m(self, name: str) -> FloatArray:
-        """Return the (3,) drawn place of a node's radio, or of the sink."""
+        """Return the (3,) drawn place of the sink or of a node's radio; of a failed node, its camera's."""
         run = self._view.run
         if name == "sink":
             return self._places_m[run.roles.index(name)]

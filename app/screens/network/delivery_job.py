@@ -53,9 +53,9 @@ from pipeline.types import (
 )
 
 NODE_POINTS = 6000
-"""Points of the cloud of one node."""
+"""Most points of the cloud of one node."""
 CURVE_POINTS = 400
-"""Points of the curve of bytes."""
+"""Most points of the curve of bytes."""
 NOTHING_YET = (48, 52, 58)
 """Colour of pixels that have not arrived."""
 Steps = Generator[Progress | DeliveryView | MomentView, None, DeliveryView]

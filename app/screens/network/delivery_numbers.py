@@ -35,7 +35,9 @@ MOST_CHANGES = 4
 
 
 def moment_table(view: DeliveryView, now: MomentView | None, now_ns: int) -> Markup:
-    """Return a table of the main numbers in HTML: at ``now_ns``, at the end, and without losses."""
+    """Return a table of the main numbers in HTML: of the moment ``now``, which the clock at ``now_ns`` shows,
+    of the last moment, and without losses.
+    """
     end = view.moment_at(view.times_ns[-1])
     done = end is not None and end.t_ns == view.times_ns[-1]
     end_ns = max(view.run.end_ns, view.times_ns[-1])
@@ -92,7 +94,7 @@ def moment_table(view: DeliveryView, now: MomentView | None, now_ns: int) -> Mar
 
 
 def _head(view: DeliveryView, now: MomentView | None, now_ns: int) -> Head:
-    """Return the head of the clock's column; after the last moment nothing changes."""
+    """Return the head of the clock's column; after the last moment no more bytes arrive."""
     if now is None:
         return "nothing yet"
     if now.t_ns == view.times_ns[-1]:
@@ -119,7 +121,7 @@ def _by_cause(view: DeliveryView, now: MomentView | None, last: MomentView | Non
 
 
 def more_rows(view: DeliveryView, now: MomentView | None) -> Markup:
-    """Return a table in HTML of what the sink has of each camera."""
+    """Return a table in HTML: shares of each camera's data at the sink, sent bytes, energy of the radios."""
     if now is None:
         return Markup("")
     rows = [
@@ -242,7 +244,7 @@ def legend(view: DeliveryView) -> Sequence[tuple[str, Number]]:
 
 
 def most_j(view: DeliveryView) -> float:
-    """Return a node's battery capacity; without one, the most energy that any node uses."""
+    """Return a node's battery capacity, joules; without one, the most energy that any node uses."""
     battery_j = view.sent.network.energy.battery_j
     used_j = [node.energy_j for moment in view.moments for node in moment.nodes]
     return max(used_j, default=0.0) if battery_j is None else battery_j

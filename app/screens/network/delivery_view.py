@@ -53,7 +53,7 @@ class NodeMoment:
     T_world_camera: FloatArray
     """(4, 4) registered pose, or the believed one."""
     energy_j: float
-    """Energy that its radio and computer have used; 0 if it is down."""
+    """Energy that its radio, computer and camera have used; 0 if it is down."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,15 +62,20 @@ class MomentView:
 
     t_ns: int
     sent_bytes: int
+    """Bytes sent on the air, with headers and retransmissions."""
     delivered_bytes: int
+    """Bytes of the images at the sink, each counted once."""
     packets_lost: int
+    """Number of failed attempts to send a packet."""
     radio_j: float
     energy_j: float
+    """Energy of all nodes' radios, computers and cameras; ``radio_j`` is that of the radios alone."""
     nodes: tuple[NodeMoment, ...]
     glb: bytes
     """The surface; empty if there is none yet."""
     triangles: int
     no_hit_share: float | None
+    """Share of the rays of all cameras that meet no triangle, 0 to 1; None without a surface."""
     f_score: float | None
     """F-score at 5 cm, 0 to 1; None without a surface or without ground truth."""
 
@@ -120,8 +125,9 @@ class PacketView:
     row: int
     """Index of the node in the rig."""
     depth: BoolArray
-    """(H, W) pixels whose depth the packet gives without others."""
+    """(H, W) pixels whose depth the packet gives without other packets."""
     color: BoolArray
+    """(H, W) pixels whose colour it gives without other packets."""
     picture: ByteArray
     """(h, w, 3) the node's own picture with these pixels highlighted."""
     points_m: FloatArray

@@ -65,7 +65,7 @@ class Ground:
     networks: int
 
     def offset(self, index: int) -> float:
-        """Return how far east of the middle a network is drawn."""
+        """Return how far east of the middle a network is drawn, scene units."""
         return (index - 0.5 * (self.networks - 1)) * GAP * self.width
 
     def place(self, points_m: FloatArray, index: int, height: float = 0.0) -> FloatArray:
@@ -260,7 +260,7 @@ class Roads:
     """The roads in the colours of their coverage up to a time; grey without a vehicle so far."""
 
     def __init__(self, lines: viser.LineSegmentsHandle, sights: RoadCoverage, cells: np.ndarray) -> None:
-        """``lines`` has one line for each of ``cells`` (C,), the cells that were ever seen."""
+        """Take lines, one for each of ``cells`` (C,): the cells that were ever seen."""
         self._lines, self._sights, self._cells = lines, sights, cells
         self._shown = np.zeros(0, np.uint8)
 
@@ -302,7 +302,7 @@ class Flights:
 
     @classmethod
     def of(cls, pieces: Pieces) -> Flights:
-        """Return the frames that have a receiver, and failures that no frame shows."""
+        """Return the frames that have a receiver, and all failed attempts and given-up packets."""
         flying = np.isin(pieces.what, (What.AIR, What.ACK)) & (pieces.peer >= 0)
         frames = pieces.where(flying)
         colors = np.full((len(frames), 3), ANSWER, np.uint8)
@@ -339,7 +339,7 @@ class Flights:
 
 
 def _since(pieces: Pieces, from_ns: int, now_ns: int) -> np.ndarray:
-    """Return the indices of the pieces that start in between."""
+    """Return the indices of the pieces that start after ``from_ns`` and not after ``now_ns``."""
     first, last = np.searchsorted(pieces.start_ns, (from_ns, now_ns), side="right")
     return np.arange(first, last)
 

@@ -32,7 +32,12 @@ that have arrived by the time on the Network screen's clock ({at})."""
 
 
 def network_offers(labels: tuple[str, ...], commands: str) -> Offers:
-    """Return offers of the timeline of runs with these labels and commands; no labels: of a delivery."""
+    """Return offers of the timeline and the trace of street runs; of a delivery without labels and commands.
+
+    Args:
+        labels: labels of the runs.
+        commands: command lines of the runs, one in each line.
+    """
     files = (
         Offer("Timeline, PNG", "timeline.png", f"{JOB}:timeline_job", (labels,)),
         Offer("Trace, ZIP", "trace.zip", f"{JOB}:trace_job", (labels,)),

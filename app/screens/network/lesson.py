@@ -49,7 +49,7 @@ class NetworkLook:
     again: bool = True
     """Whether lost packets are sent again."""
     off: str = ""
-    """Name of the failed camera."""
+    """Name of the failed camera; empty if none failed."""
     settings: tuple[str, ...] = ()
     """Settings without a control, ``key=value``."""
     at: Place = Place()
@@ -147,7 +147,8 @@ NUMBERS = (
 )
 """Fields of the texts and choices of both lessons."""
 LEFT_SHARE, SEEN_SHARE = 0.05, 0.005
-"""Depth share below which a camera counts as lost, and increase of missing rays that counts."""
+"""Share of arrived depth below which a camera counts as lost, and least increase of the share of rays without
+a surface that counts."""
 
 
 def numbers(scene: str, view: DeliveryView, frames: Frames) -> Numbers:
@@ -220,7 +221,7 @@ def _worst(view: DeliveryView, end: MomentView) -> dict[str, str]:
 
 
 def _cost(view: DeliveryView, end: MomentView) -> str:
-    """Return a word for what is missing of the surface."""
+    """Return the loss: "camera" (one camera's depth), "spread" (more holes), "nothing", or unknown."""
     if min(node.depth_share for node in end.nodes) < LEFT_SHARE:
         return "camera"
     if view.lossless is None or end.no_hit_share is None:

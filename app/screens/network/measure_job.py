@@ -22,13 +22,13 @@ from pipeline.stages import run
 def measure_job(
     store: Store, spec: Spec, request: MeasureRequest, index: int
 ) -> Generator[Progress, None, MeasureAnswer]:
-    """Return points of clicks and numbers of measures on the surface of a moment."""
+    """Turn clicks into points of the surface of the moment with this index, and compute measures on it."""
     surface = yield from _surface(store, spec, index)
     return answer([surface], request)
 
 
 def prepare_job(store: Store, spec: Spec, index: int) -> Generator[Progress, None, bool]:
-    """Make the surface of a moment ready to be measured."""
+    """Compute and store the surface of a moment for later measuring. Returns True."""
     yield from _surface(store, spec, index)
     return True
 

@@ -17,14 +17,14 @@ class MomentMeasures(MeasureFolder):
         """Add the folder to the current container."""
         self._moment: MomentView | None = None
         self._index = 0
-        """Index of that moment in its delivery."""
+        """Index of ``_moment`` in its delivery."""
         self._ready = False
         """Whether its surface can be measured."""
         self._resting = session.ui.debounce(REST_S, self._prepare)
         super().__init__(session, "/network/runs/measures", "network.measure_job:measure_job")
 
     def follow(self, view: DeliveryView | None, moment: MomentView | None) -> None:
-        """Measure the surface of another moment, as soon as the clock rests there; None of none."""
+        """Measure the surface of another moment once the clock is still; None: measure nothing."""
         if moment is self._moment:
             return
         self._moment, self._ready = moment, False
@@ -38,7 +38,7 @@ class MomentMeasures(MeasureFolder):
         self._prepare()
 
     def _prepare(self) -> None:
-        """Have the surface made that is measured, which takes seconds, if it is needed."""
+        """Request the surface to measure, which takes seconds, if clicks measure or there are measures."""
         moment, index = self._moment, self._index
         if moment is None or not moment.glb or self._ready or not (self._on.value or self._tape.taken):
             return

@@ -30,7 +30,7 @@ class Frames:
         self._cameras = dict(zip(taken.image.tolist(), taken.node.tolist(), strict=True))
 
     def line(self, item: int) -> str:
-        """Return one line about a frame, for the pointer."""
+        """Return one line about a frame, which the timeline shows at the pointer."""
         one, names = self.pieces, self._view.names
         return f"{names[one.node[item]]} → {names[one.peer[item]]}: {self._content(item)}; {self._fate(item)}"
 
@@ -66,7 +66,7 @@ class Frames:
         return int(self.pieces.first_byte[item]), int(self.pieces.size_bytes[item]) - self._view.header_bytes
 
     def camera_of(self, item: int) -> int:
-        """Return the node that took the image of which the frame carries a piece."""
+        """Return the node that took the image of which the frame carries a piece; -1 if it is unknown."""
         return int(self._cameras.get(int(self.pieces.image[item]), -1))
 
     def _content(self, item: int) -> str:

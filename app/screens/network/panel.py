@@ -50,7 +50,7 @@ HAND_S = 0.15
 MESH_S = 0.5
 """During playback a moment is drawn at once if the last drawing is this old."""
 SHOWN = 10
-"""Number of player pictures for which a packet moves at least, and a loss stays visible."""
+"""Number of playback pictures for which a packet moves at least, and a loss stays visible."""
 
 
 class NetworkPanel(Panel):
@@ -297,7 +297,7 @@ class NetworkPanel(Panel):
             self._requested_ns = None
 
     def _take_look(self, look: NetworkLook) -> None:
-        """Send as a stop of a lesson sets; its place is shown when the frames are there."""
+        """Run the network that a stop of a lesson sets; go to the stop's place when the frames are there."""
         with self.ui.atomic():
             self._setup.take(look)
         self._look = look

@@ -82,7 +82,7 @@ def _levels(trace: NetworkTrace, pieces: Pieces) -> tuple[tuple[int, ...], Level
 
 
 def pieces_of(trace: NetworkTrace, start_ns: int) -> Pieces:
-    """Return the pieces that end after ``start_ns``, by their start."""
+    """Return the pieces that end at ``start_ns`` or later, by their start."""
     events, nodes = trace.events, len(trace.names)
     losses = events.of(EventKind.LOSS)
     frames = events.of(EventKind.AIR)

@@ -121,7 +121,7 @@ class NetworkView:
     """The screen's label for it if two are compared."""
 
     def positions_m(self, t_ns: int) -> FloatArray:
-        """Return (N, 2) positions at ``t_ns``."""
+        """Return (N, 2) positions at ``t_ns``, metres east and north."""
         if len(self.track_s) == 1:
             return self.tracks_m[0].astype(float)
         at = float(np.interp(t_ns / 1e9, self.track_s, np.arange(len(self.track_s))))

@@ -31,7 +31,8 @@ WALL_AWAY, WALL_HALF = 0.2, 0.25
 """Distance of the wall from its node, and half its length, over the path from the node to the sink."""
 MOST_AWAY_M, MOST_HALF_M = 1.0, 1.0
 APART = 0.4
-"""Most of half the wall's length over the distance to the nearest other node: it affects one node."""
+"""Largest half length of the wall over its node's distance to the nearest other node, so that it affects
+few other nodes."""
 MOVED_TEXT = Markdown(
     "Drag the arrows: the radio moves and frames are sent from there; its camera stays. Choose *none* to "
     "put all radios back."
@@ -138,7 +139,7 @@ class WhatIf:
         self.put_back()
 
     def put_back(self) -> None:
-        """Put all radios back to their cameras; remove arrows and walls."""
+        """Put all radios back to their cameras; remove the drawn arrows and wall, not the wall's setting."""
         self._mover.value = NOBODY
         self._moved_m.clear()
         self._text.content = Markdown("")
@@ -255,7 +256,7 @@ class WhatIf:
 
 
 def places_of(view: DeliveryView) -> dict[str, FloatArray]:
-    """Return (2,) places of a delivery's nodes and, last, its sink; for a failed node, its camera's."""
+    """Return (2,) places of a delivery's nodes and, last, its sink, m; of a failed node, its camera's."""
     positions_m = view.run.positions_m(view.run.start_ns)
     places_m = {
         node.name: positions_m[node.row] if node.row >= 0 else node.T_world_camera[:2, 3]
@@ -271,7 +272,9 @@ def _apart(view: DeliveryView) -> bool:
 
 
 def wall_m(places_m: dict[str, FloatArray], name: str) -> FloatArray:
-    """Return (4,) both ends of a wall across a node's path to the sink that leaves other paths free."""
+    """Return (4,) both ends of a wall across a node's path to the sink, metres east and north. It is short,
+    but it also crosses the path of a node that stands straight behind this one.
+    """
     way_m = places_m[SINK] - places_m[name]
     length_m = max(float(np.linalg.norm(way_m)), 1e-6)
     others_m = [place_m for other, place_m in places_m.items() if other not in (name, SINK)]

@@ -19,16 +19,15 @@ from pipeline.surface.normals import estimate_normals
 from pipeline.types import Rig
 
 FEWEST = 4
-"""Points of a cloud that can be measured."""
+"""Least number of points of a cloud that can be measured."""
 
 
 def measure_job(
     store: Store, spec: Spec, request: MeasureRequest
 ) -> Generator[Progress, None, MeasureAnswer]:
-    """Return points of clicks and numbers of measures on the points of one node each.
+    """Turn clicks into points of the nodes' clouds, and compute measures.
 
-    The poses of the nodes are only believed before they are registered, so that a measure has all its points
-    on one node.
+    All points of a measure are on one node, because the poses between the nodes are not registered yet.
     """
 
     def make() -> Generator[Progress, None, list[MeasuredSurface]]:
@@ -39,7 +38,7 @@ def measure_job(
 
 
 def _clouds(rig: Rig) -> list[MeasuredSurface]:
-    """Return some of the points of every node in the world frame."""
+    """Return some points of every node with normals, world frame; nodes with too few points are left out."""
     clouds = []
     for frame in rig.frames:
         cloud = back_project(frame)

@@ -32,7 +32,7 @@ def recording_job(
     Args:
         store: not used.
         spec: not used.
-        path: a bag or a ZIP, in a folder of its own.
+        path: a recording's file or a ZIP, in a folder of its own.
         name: name of the rig or recording, which is put next to that folder.
         depth_scale: depth units per metre; None takes the one of the images or the kind of recording.
         frames: number of frames of a recording that become nodes; None keeps the recording with all frames.
@@ -101,7 +101,9 @@ def unpack(path: Path, folder: Path) -> None:
 def _used(
     path: Path, place: Path, frames: int | None, depth_scale: float | None
 ) -> Generator[Progress, None, ReadRecording]:
-    """Import some frames of a recording to ``place`` as a rig, or move it there; a file moves next to it."""
+    """Import ``frames`` frames of a recording as a rig to ``place``; None: move the recording to ``place``,
+    or next to it if it is a file, which keeps its name.
+    """
     if frames is not None:
         report = yield from iterate_import(path, place, frames, depth_scale)
         found = f"{report.kind}: {len(report.frames)} of {report.candidates} frames became nodes"

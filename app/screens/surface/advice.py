@@ -71,7 +71,7 @@ class AdviceFolder:
         self._table.content = suggestions_html(rows)
 
     def load(self, view: SweepView | None) -> None:
-        """Show a sweep, complete or partial; None if it was stopped."""
+        """Show a sweep, complete or partial; None if it was stopped or failed."""
         if view is None:
             self._status.content = Markdown("Stopped.") if self._view is None else STOPPED
             return

@@ -23,20 +23,20 @@ class Baselines:
         line: Piece[Markup],
         on_made: Callable[[BaselineName, bool], None],
     ) -> None:
-        """Start without any.
+        """Start without baselines.
 
         Args:
             session: the session that computes them.
             stage: the stage that draws them.
             line: HTML line about the baseline that is shown.
-            on_made: called when one has been computed or has failed.
+            on_made: called with the name, and True if it has been computed or False if that failed.
         """
         self._session, self._stage, self._line, self._on_made = session, stage, line, on_made
         self.views: dict[BaselineName, BaselineView] = {}
         """The computed baselines by name."""
 
     def forget(self) -> None:
-        """Drop all baselines: the surface is another one."""
+        """Drop all baselines, because the surface has changed."""
         self.views = {}
 
     def show(self, name: BaselineName) -> None:

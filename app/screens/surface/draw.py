@@ -13,7 +13,7 @@ from pipeline.types import FloatArray
 
 
 class SurfaceDrawing:
-    """One mesh and its boundary loops below a scene node."""
+    """One mesh, its boundary loops and its left-out points below a scene node."""
 
     def __init__(self, scene: viser.SceneApi, below: str, label: str) -> None:
         self._scene, self._below, self._label = scene, below, label
@@ -26,11 +26,11 @@ class SurfaceDrawing:
         self._frame = scene.add_frame(below, show_axes=False)
 
     def draw(self, view: MeshView | PaintedMesh, unseen: bool = False) -> None:
-        """Draw a mesh; ``drop_old`` then removes the one before.
+        """Draw a mesh; ``drop_old`` removes the previous one afterwards.
 
-        A browser needs some frames to read a mesh. The one before stays until then, so that the surface does
-        not blink. If the browser draws nothing in between (``unseen``), it is only hidden, so that its
-        material stays and the browser need not compile the shader again.
+        A browser needs some frames to read a mesh. The previous one stays until then, so that the surface
+        does not blink. If the browser draws nothing in between (``unseen``), the previous one is hidden at
+        once and not removed, so that its material stays and the shader need not be compiled again.
         """
         self._made += 1
         if unseen:
@@ -61,7 +61,7 @@ class SurfaceDrawing:
             handle.visible = self._points_shown
 
     def show_unused(self, shown: bool) -> None:
-        """Show or hide those points."""
+        """Show or hide the points that the ball left out."""
         self._points_shown = shown
         for handle in self._points.values():
             handle.visible = shown
@@ -77,7 +77,7 @@ class SurfaceDrawing:
             shorten(handles, 0)
 
     def show(self, visible: bool, rims: bool, offset_m: FloatArray, top_m: FloatArray | None) -> None:
-        """Show or hide it at an offset; a label at ``top_m`` distinguishes two surfaces."""
+        """Show or hide the surface at an offset, with its name at ``top_m``; None shows no name."""
         self._frame.visible = visible
         self._frame.position = offset_m
         self._rims_shown = rims

@@ -1,4 +1,4 @@
-"""Drawing of the rolling ball: the mesh is sent once, in pieces; steps send the newest part, front, ball."""
+"""Drawing of the rolling ball: the mesh is sent once; each step sends newest triangles, front and ball."""
 
 from __future__ import annotations
 

@@ -35,7 +35,8 @@ from pipeline.types import ByteArray, PointSource, Rig, Surface, SurfaceResult
 
 PICTURE_WIDTH_PX = 480
 MOST_PICTURES, LEG_PICTURES = 32, 16
-"""Most pictures of the whole flight, and of one leg between cameras; the way back repeats them."""
+"""Most pictures of the way there, unless its legs have only two each, and of one leg between cameras; the way
+back repeats them."""
 PICTURE_MS, REST_MS = 120, 800
 """Display time of a picture, and of one at an end of the flight."""
 SWING_DEG = 15.0
@@ -43,7 +44,7 @@ SWING_DEG = 15.0
 
 
 def page_job(store: Store, spec: Spec, coloring: Coloring) -> Generator[Progress, None, bytes]:
-    """Return a page with the surfaces before and after fusion or, for a baseline, the ball's and it.
+    """Return a page with the surfaces before and after fusion or, for a baseline, the ball's and that one.
 
     Raises:
         InputError: neither surface has a triangle.
@@ -139,7 +140,7 @@ def _painter(
 
 
 def _way(cameras: Sequence[Camera], surface: Surface) -> Iterator[Camera]:
-    """Yield cameras from the first to the last through all others, slower near each; one alone swings."""
+    """Yield cameras from the first to the last through all others, slower near each; a single one swings."""
     first = cameras[0]
     K = first.intrinsics
     K = scaled(K, PICTURE_WIDTH_PX / K.width_px)

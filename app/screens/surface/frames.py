@@ -1,4 +1,4 @@
-"""Slider of the frames that are averaged, for a recording whose camera stands: holes close with time."""
+"""Slider for the number of frames that are averaged, for a recording whose camera stands."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class FramesSlider:
         ui.when_changed(self._slider, self._rest.restart)
 
     def show(self, view: AveragedView | None) -> None:
-        """Show what a number of frames gives; None hides the slider."""
+        """Show the result of averaging a number of frames; None hides the slider."""
         self._slider.visible = self._text.visible = view is not None
         if view is None:
             return
@@ -50,7 +50,7 @@ class FramesSlider:
         self._text.content = frames_html(view, self._tried)
 
     def write(self, config: PipelineConfig) -> None:
-        """Show the setting."""
+        """Show the setting, unless the slider has just been dragged."""
         if not self._rest.pending:
             self._slider.value = min(config.recording.frames, int(self._slider.max))
 

@@ -87,7 +87,7 @@ class HolesFolder:
         self._filled = ui.gui.add_markdown(FILL_OFF)
 
     def load(self, holes: Mapping[Which, tuple[HoleView, ...]], shown: Which | None) -> None:
-        """Take the holes of the surfaces, and list those of the one that is shown alone.
+        """Take the holes of the surfaces, and list those of the surface that is shown alone (``shown``).
 
         A hole stays chosen if its surface and ``shown`` are unchanged. A new surface after fusion is not
         filled, so the slider returns to off.
@@ -150,7 +150,7 @@ class HolesFolder:
             self._shares.content = shares_table(answer.found)
 
     def filled(self, view: FilledView | None) -> None:
-        """Show the filled surface's numbers; None if the job was stopped or failed."""
+        """Show the filled surface's numbers; None if filling is off, or the job was stopped or failed."""
         if not self.filling:
             self._filled.content = FILL_OFF
         else:
@@ -167,7 +167,7 @@ class HolesFolder:
         self.filled(None)
 
     def forget(self) -> None:
-        """Remove all holes: the surfaces are gone."""
+        """Remove all holes, because the surfaces will be computed again."""
         self._holes, self._which, self._alone = {}, None, None
         self._choose(None)
         self.parts(None)

@@ -1,4 +1,4 @@
-"""Jobs on the holes of a surface: their places, their causes, and the cost of filling them."""
+"""Jobs on the holes of a surface: their places, their causes, and the result of filling them."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def hole_views(surface: SurfaceResult) -> tuple[HoleView, ...]:
 
 
 def views_of(store: Store, spec: Spec) -> Generator[Progress, None, list[View]]:
-    """Return every registered camera with its pixels' sensor and inferred validity."""
+    """Return every registered camera with the pixels that have sensor depth and those with inferred depth."""
     rig, nodes, placement = yield from store.stages(spec, "rig", "nodes", "placement")
     return [
         View(camera, frame.depth.valid, node.alignment.depth.valid)
@@ -50,13 +50,17 @@ def views_of(store: Store, spec: Spec) -> Generator[Progress, None, list[View]]:
 
 
 def parts_of(store: Store, spec: Spec, surface: SurfaceResult) -> Generator[Progress, None, RayParts]:
-    """Return where the pixel rays of all cameras end on a surface of the spec."""
+    """Return the shares of the cameras' pixel rays by where they end on a surface of the spec."""
     views = yield from views_of(store, spec)
     return ray_parts(surface, views)
 
 
 def explain_job(store: Store, spec: Spec, which: Which, index: int) -> Generator[Progress, None, ExplainView]:
-    """Return the cause of one hole of the surface after or before fusion."""
+    """Return the cause of one hole of the surface after or before fusion.
+
+    Raises:
+        InputError: the surface has no hole with this index.
+    """
 
     def explain() -> Generator[Progress, None, ExplainView]:
         views = yield from views_of(store, spec)

@@ -28,7 +28,7 @@ HISTOGRAM_BINS = 60
 
 
 def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, None, SurfaceView]:
-    """Return the surfaces with holes and numbers; yield partial results."""
+    """Return the surfaces before and after fusion with holes and numbers; yields partial results."""
     clouds = yield from store.stage(spec, "fused")
     rolled = yield from compute(spec, "after", store)
     after = rolled.value
@@ -64,7 +64,7 @@ def surface_job(store: Store, spec: Spec) -> Generator[Progress | SurfaceView, N
 
 
 def _textured_view(surface: SurfaceResult, in_photographs: Callable[[Surface], Texture]) -> MeshView:
-    """Return a surface in photographs without its seams, with the triangle count of the ball's mesh."""
+    """Return a surface in photographs; its seams are closed, but their triangles are not counted."""
     closed = without_seams(surface)
     view = mesh_view(closed, None, in_photographs(closed))
     return replace(view, triangles=len(surface.triangles))

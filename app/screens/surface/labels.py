@@ -87,7 +87,7 @@ def legend_of(coloring: Coloring, has_truth: bool) -> Legend:
 
 
 def legend_html(coloring: Coloring, has_truth: bool, baseline: bool = False) -> Markup:
-    """Return HTML of the legend of surface, baseline or left-out points."""
+    """Return HTML of the legends of the surface and the left-out points, or of a baseline."""
     left_out = Legend("Points that the ball left out:", (("measured", TARGET), _INFERRED))
     surface = Legend() if coloring in _OWN else legend_of(coloring, has_truth)
     closed = Legend(CLOSED if coloring in ("photo", "violet") else "")

@@ -25,13 +25,13 @@ _MOST_R_F = 20.0
 
 @dataclass(frozen=True, slots=True)
 class SurfaceLook:
-    """The surface that a stop shows, and how; the default is the screen's first state."""
+    """The surface that a stop shows, and its settings; the default is the screen's first state."""
 
     shown: str = AFTER
     """One of ``app.screens.surface.labels.SHOWN``."""
     rule: RadiusRule = _DEFAULT.radius_rule
     radius_in_r_F: float | None = None
-    """Ball radius over r_F of the fused cloud, so that it suits every scene; only with rule manual."""
+    """Ball radius over r_F of the fused cloud, so that it suits every scene; None if a rule sets it."""
     coloring: Coloring = "photo"
     rims: bool = True
     """Whether the rims of the holes are drawn."""
@@ -43,7 +43,7 @@ class SurfaceLook:
 
 
 def surface_of(look: SurfaceLook, config: SurfaceConfig) -> SurfaceConfig:
-    """Return a stop's settings; a ball in units of r_F is set when the cloud's spacing is known."""
+    """Return a stop's settings; a ball in units of r_F is set later, when the cloud's spacing is known."""
     config = replace(config, max_points=look.max_points, smoothing_passes=look.smoothing_passes)
     return config if look.rule == "manual" else replace(config, radius_rule=look.rule, radii_m=())
 
@@ -85,7 +85,7 @@ SETTINGS: dict[str, Setting[SurfaceLook]] = {
 
 
 SURFACES = ("", "_before", "_poisson")
-"""Suffixes of the fields after fusion, before it, and of Poisson's surface."""
+"""Suffixes of the fields of the surface after fusion, of that before it, and of Poisson's surface."""
 MEASURES = ("missed", "unused", "f_score", "guessed")
 NUMBERS = (
     *(f"{measure}{which}" for which in SURFACES for measure in MEASURES),
@@ -127,7 +127,7 @@ KIND = Kind("surface", SETTINGS, SurfaceLook(), NUMBERS, statement, WORDS)
 
 
 def _better(ball: MeshView, poisson: MeshView) -> str:
-    """Return a word for the surface with the higher F-score."""
+    """Return the word for the surface with the higher F-score; ``untold`` without ground truth."""
     if not ball.truth or not poisson.truth:
         return "untold"
     return "poisson" if poisson.truth["f_score_5cm"] > ball.truth["f_score_5cm"] else "ball"

@@ -1,4 +1,4 @@
-"""The surfaces that people will ask for who see a demo scene's: those of every step of the slider."""
+"""Jobs computed in advance for a demo scene: every step of the radius slider, and the other presets."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def likely(store: Store, spec: Spec, view: SurfaceView) -> Iterator[LikelyJob]:
 
 
 def likely_radii_mm(view: SurfaceView) -> list[float]:
-    """Return the slider's radii up to the largest ball of the settings; those most like r_F first."""
+    """Return the slider's radii up to the largest ball of the settings; by ratio to r_F, nearest first."""
     least_mm, _ = slider_range_mm(view.spacing, view.radii_m)
     steps = range(round(least_mm / STEP_MM), round(on_slider_mm(view.radii_m[-1]) / STEP_MM) + 1)
     r_F_mm = 1000.0 * view.spacing.r_F_m
@@ -41,5 +41,5 @@ def likely_radii_mm(view: SurfaceView) -> list[float]:
 
 
 def is_likely(spec: Spec) -> bool:
-    """Return whether many people ask for the surfaces of this spec: a demo scene with a preset's settings."""
+    """Return whether many users request this spec's surfaces: a demo scene with the settings of a preset."""
     return isinstance(spec.source, Demo) and spec.config in PRESETS.values()

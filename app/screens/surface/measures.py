@@ -13,11 +13,11 @@ class SurfaceMeasures(MeasureFolder):
     """The folder *Measure* of the Surface screen."""
 
     def __init__(self, session: PanelSession) -> None:
-        """Add the folder to the current container, after the stage has been made."""
+        """Add the folder to the current container; the surface's scene nodes must exist already."""
         super().__init__(session, "/surface/after/measures", "surface.measure_job:measure_job", self._keep)
 
     def follow(self) -> None:
-        """Measure on the current settings' surface, or show no numbers until it is there."""
+        """Measure on the current settings' surface, or show no numbers until it is computed."""
         if self._session.results.fresh("surface", self._session.spec):
             self.load()
         else:

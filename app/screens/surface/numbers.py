@@ -86,7 +86,7 @@ def note_html(view: BaselineView) -> Markup:
 
 
 def quick_line(view: PaintedView) -> Markup:
-    """Return the line of a quick look, while the numbers below are still the previous ones."""
+    """Return the line about a quick look, which stands above the table of the previous surface."""
     mesh, radius_mm = next(iter(view.meshes.values())), 1000 * (view.request.radius_m or 0.0)
     part = (
         ""
@@ -101,7 +101,7 @@ def quick_line(view: PaintedView) -> Markup:
 
 
 def _rule(view: SurfaceView) -> Markup:
-    """Return the rule for holes, and the number of small ones, which the table leaves out."""
+    """Return the definition of a hole, and the number of small holes, which the table leaves out."""
     text = Markup(
         "A <b>hole</b> is a patch of a camera's picture whose rays are without a surface. The outer rim of "
         "the scene is not a hole."
@@ -120,7 +120,7 @@ def _rule(view: SurfaceView) -> Markup:
 
 
 def _price(view: SurfaceView) -> Markup:
-    """Return a sentence if the filled surface has a lower F-score; else empty."""
+    """Return a sentence if the surface after fusion has a lower F-score than before; else empty."""
     if view.before is None or view.before.truth is None or view.after.truth is None:
         return Markup("")
     before, after = (mesh.truth["f_score_5cm"] for mesh in (view.before, view.after) if mesh.truth)

@@ -34,7 +34,7 @@ QUICK_UNUSED = 8_000
 
 
 def paint_job(store: Store, spec: Spec, request: PaintRequest) -> Generator[Progress, None, PaintedView]:
-    """Return the surfaces of a spec, or of one ball in place of the spec's, in colours."""
+    """Return the surfaces of a spec, or of one ball in place of the spec's, in the requested colours."""
     rig, placement = yield from store.stages(spec, "rig", "placement")
     whole = yield from _clouds(store, spec)
     first = request.which[0]
@@ -130,7 +130,7 @@ def _painted(surface: Surface, request: PaintRequest, rig: Rig, placement: Place
 def colored_glb(
     surface: Surface, coloring: Coloring, rig: Rig, placement: Placement, worn: bool = True
 ) -> bytes:
-    """Return the mesh in its colours; photographs only if ``worn``."""
+    """Return the mesh in its colours as binary glTF; with photographs only if ``worn``."""
     if coloring in ("photo", "violet") and worn:
         closed = without_seams(surface)
         return photographed_glb(closed, dressed(rig, placement, closed), tinted=coloring == "violet")

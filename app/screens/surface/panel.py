@@ -117,7 +117,7 @@ class SurfacePanel(Panel):
         return self._quickly_drawn or self._look_quickly.moving
 
     def on_spec(self, spec: Spec) -> None:
-        """Show the current settings; remove what belongs to others."""
+        """Show the current settings; remove results of other settings."""
         if spec.key("surface") == self._key:
             return
         self._key = spec.key("surface")
@@ -147,7 +147,7 @@ class SurfacePanel(Panel):
             self._measures.follow()
 
     def on_partial(self, view: SurfaceView) -> None:
-        """Draw the partial result; while the radius is dragged, only keep it."""
+        """Draw the partial result; while the radius is dragged, only store it."""
         self._view = view
         if not self._look_quickly.moving:
             self._take(view)
@@ -163,7 +163,7 @@ class SurfacePanel(Panel):
         self.session.show_staleness()
 
     def _drawn(self) -> None:
-        """Remove older meshes and show the quick look's numbers, which slow the page, after its drawing."""
+        """Remove older meshes and show the quick look's numbers, which would have slowed its drawing."""
         with self.ui.atomic():
             self._stage.drop_old()
             if self._look_quickly.moving:
@@ -186,7 +186,7 @@ class SurfacePanel(Panel):
     # Drawing.
 
     def _take(self, view: SurfaceView) -> None:
-        """Show a view of the chain."""
+        """Show the surfaces and numbers of a result of the chain."""
         with self.ui.atomic():
             self._quickly_drawn = False
             self._ball.hide()
@@ -231,7 +231,7 @@ class SurfacePanel(Panel):
             session.quick_job(request.job, request, on_end=self._painted, key=request.key(session.spec))
 
     def _painted(self, view: PaintedView | None) -> None:
-        """Draw the painted surface, unless another one is due by now."""
+        """Draw a painted surface, unless the colours or the slider's motion have changed meanwhile."""
         if view is None or view.request.coloring != labels.COLORINGS[self._coloring.value]:
             return
         quick = view.request.radius_m is not None
@@ -285,7 +285,7 @@ class SurfacePanel(Panel):
             loops, unused = bool(self._loops.value), bool(self._unused.value)
             self._stage.arrange(place, loops, unused, self._rolling.showing)
             baseline = self._shown.value in labels.BASELINES
-            self._coloring.disabled = baseline  # a baseline's vertices are no points with a source
+            self._coloring.disabled = baseline  # its vertices are not points of the cloud
             self._legend.content = labels.legend_html(
                 labels.COLORINGS[self._coloring.value], self._has_truth(), baseline
             )
@@ -353,7 +353,7 @@ class SurfacePanel(Panel):
                 self._take(self._view)
 
     def look(self) -> bool:
-        """Show a close-up's patch in the picture. False leaves the view to the session."""
+        """Turn the view to a close-up's patch. Returns False if there is none; the session then turns it."""
         return self._walks.look()
 
     def _take_look(self, look: SurfaceLook) -> None:
@@ -380,7 +380,7 @@ class SurfacePanel(Panel):
         return numbers(scene.title, view, self._baselines.views) if fresh else {}
 
     def _show_look(self) -> None:
-        """Apply the stop's settings that needed the surface, which has just come."""
+        """Apply the stop's settings that needed the surface, which has just been computed."""
         look, session = self._look, self.session
         if look is None or self._view is None or not session.results.fresh("surface", session.spec):
             return

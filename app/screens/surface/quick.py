@@ -53,7 +53,7 @@ class QuickLook:
         return self._settle.pending
 
     def want(self, request: PaintRequest) -> None:
-        """Take a new radius."""
+        """Request a surface of a new radius; the newest request replaces one that waits."""
         if not self.moving:
             self._acknowledgement.hold()
         self._settle.restart()
@@ -61,7 +61,7 @@ class QuickLook:
         self._go_on()
 
     def sent(self, vertices: Sequence[int] = ()) -> None:
-        """Note that surfaces were sent; ``vertices`` are the vertex counts of quick ones."""
+        """Wait until the browser has drawn what was sent; ``vertices`` are vertex counts of quick looks."""
         self._acknowledgement.ask(vertices, hold=self.moving)
 
     def _go_on(self) -> None:
@@ -97,7 +97,7 @@ class QuickLook:
 class Detail:
     """The number of points to which quick looks thin a cloud, adapted to the browser's speed.
 
-    Looks at small balls need more points and tell nothing of it.
+    Looks with small balls, which need more points, do not count.
     """
 
     def __init__(self) -> None:
@@ -105,7 +105,7 @@ class Detail:
         self._times_s: list[float] = []
 
     def took(self, seconds: float) -> None:
-        """Take the time in which a look was computed, sent and drawn."""
+        """Take the time in which a look was computed, sent and drawn, and adapt the number of points."""
         self._times_s.append(seconds)
         if len(self._times_s) < LOOKS:
             return

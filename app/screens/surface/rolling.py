@@ -51,7 +51,7 @@ AWAY = 1.8
 
 
 class RollingFolder:
-    """Requests walks, and plays the one that came."""
+    """Requests walks of the ball, and plays the one that was computed."""
 
     def __init__(self, ui: Ui, on_request: Callable[[WalkRequest | None], None]) -> None:
         """Add the folder; ``on_request`` is called with the walk to compute, None when it is closed."""
@@ -61,7 +61,7 @@ class RollingFolder:
         self._drawn = 0
         self._waiting = self._here = False
         self._requested_step: int | None = None
-        """Step of the walk that an address asks for, until it is played."""
+        """Step from the address, kept until the walk is computed."""
         with ui.gui.add_folder("Watch the ball roll", expand_by_default=False):
             ui.gui.add_markdown(TEXT)
             self._add_choices(ui)
@@ -85,7 +85,7 @@ class RollingFolder:
 
     @property
     def focus(self) -> tuple[FloatArray, FloatArray] | None:
-        """(3,) centre of a close-up and (3,) camera position for it, world frame."""
+        """(3,) centre of a close-up and (3,) camera position for it, world frame; None without one."""
         if self._view is None or not self._view.request.close_up:
             return None
         view = self._view
@@ -104,7 +104,7 @@ class RollingFolder:
         return f"{WAYS[self._way.value]}-{CLOUDS[self._cloud.value]}-{step}"
 
     def take(self, place: str) -> None:
-        """Show the walk in an address once there are points; none for an empty text.
+        """Show the walk in an address as soon as there are points; an empty text closes the walk.
 
         Raises:
             InputError: there is no such walk.
@@ -122,12 +122,12 @@ class RollingFolder:
         self._request()
 
     def resume(self) -> None:
-        """Request the walk that an address asked for, now that there is a surface."""
+        """Request the walk in the address, if it is not shown yet, because a surface has been computed."""
         if self._requested_step is not None:
             self._request()
 
     def load(self, view: WalkView | None) -> None:
-        """Play a walk from its start; None if none came."""
+        """Play a walk from its start, or show the address's step; None if the job was stopped or failed."""
         self.forget()
         if view is None:
             self._status.content = Markdown("Stopped.")
@@ -205,7 +205,7 @@ def front_lane(view: WalkView) -> CurvesLane:
 
 
 def status_line(view: WalkView, done: int) -> Markdown:
-    """Return a line about the first ``done`` steps."""
+    """Return a line about the walk after ``done`` steps."""
     front, dead = view.open_edges(done)
     ball = int(view.step_radius[max(done - 1, 0)])
     radius = f"ball {1000.0 * view.radii_m[ball]:.1f} mm"

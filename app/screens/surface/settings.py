@@ -39,7 +39,7 @@ ADVANCED = (
 
 
 def with_rule(rule: RadiusRule, radius_mm: float) -> Callable[[PipelineConfig], PipelineConfig]:
-    """Return the edit that chooses a radius rule; the manual one rolls a single ball."""
+    """Return the edit that chooses a radius rule; the manual rule rolls one ball of ``radius_mm``."""
     radii_m = (round(float(radius_mm), 3) / 1000.0,) if rule == "manual" else ()
     return lambda config: replace(config, surface=replace(config.surface, radius_rule=rule, radii_m=radii_m))
 
@@ -50,7 +50,7 @@ def on_slider_mm(radius_m: float) -> float:
 
 
 def slider_range_mm(spacing: SpacingView, radii_m: Sequence[float]) -> tuple[float, float]:
-    """Return the radius slider's range, mm: half the mean spacing (>= 0.5) to clearly too large balls."""
+    """Return the slider's range, mm: from half the mean spacing, at least 0.5, to clearly too large balls."""
     widest_m = 1.5 * (spacing.r_F_m + 4.0 * spacing.sigma_D_m)
     most_m = max(*radii_m, widest_m, 6.5 * spacing.r_F_m)
     return max(0.5, math.floor(500.0 * spacing.r_F_m)), math.ceil(1000.0 * most_m)

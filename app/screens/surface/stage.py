@@ -27,7 +27,7 @@ before the middle."""
 
 
 class SurfaceStage:
-    """The surfaces after and before fusion, and a baseline's, some of which are shown."""
+    """The surfaces after and before fusion, a baseline's, and the ball; some of them are shown."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         """Draw below "/surface"."""
@@ -97,7 +97,7 @@ class SurfaceStage:
             self._baseline.draw(mesh)
 
     def arrange(self, place: Stage | None, loops: bool, unused: bool, hidden: bool) -> None:
-        """Show the surfaces to be shown, two of them side by side.
+        """Show the chosen surfaces, two of them side by side.
 
         Args:
             place: the scene's viewpoint; None before there is one.
@@ -149,7 +149,7 @@ class ChosenBall:
         self._clicked = None
 
     def _ray(self) -> Ray | None:
-        """Return the ray to its place, in the frame of the first surface shown; None without a browser."""
+        """Return the ray to the ball, in the frame of the first surface shown; None without a browser."""
         seen = self._clicked or self._middle()
         if seen is None:
             return None

@@ -16,7 +16,7 @@ from pipeline.surface.sweep import iterate_sweep, sweep_radii_m
 
 
 def suggestions_of(store: Store, spec: Spec) -> Generator[Progress, None, tuple[Suggestion, ...]]:
-    """Return the radii that the cloud after fusion suggests; none if it has no inner point."""
+    """Return the radii that the cloud after fusion suggests; none if no point has neighbours on all sides."""
     clouds = yield from store.stage(spec, "fused")
 
     def suggest() -> Generator[Progress, None, tuple[Suggestion, ...]]:
@@ -27,7 +27,7 @@ def suggestions_of(store: Store, spec: Spec) -> Generator[Progress, None, tuple[
 
 
 def sweep_job(store: Store, spec: Spec) -> Generator[Progress | SweepView, None, SweepView]:
-    """Roll each ball alone over the cloud after fusion; yield the balls done so far."""
+    """Roll each ball alone over the cloud after fusion; yields the results so far after each ball."""
     rig, placement, clouds = yield from store.stages(spec, "rig", "placement", "fused")
     suggested = yield from suggestions_of(store, spec)
 

@@ -23,7 +23,7 @@ TICKS_MM = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 AXIS_ENDS = (0.47, 6.4)
 """Ends of the axis of a whole sweep, in r_F."""
 LEVEL_SHARE = 0.01
-"""Larger balls that close less than this share of the rays have no noticeable effect."""
+"""Closing less than this share of the rays is no noticeable effect of a larger ball."""
 
 
 def sweep_figure(view: SweepView | None, below: str = WORK) -> go.Figure:
@@ -88,7 +88,7 @@ def _fill(figure: go.Figure, view: SweepView, below: str) -> None:
 
 
 def sweep_sentence(view: SweepView) -> Markdown:
-    """Return a sentence: the radius above which balls close hardly anything, and their cost."""
+    """Return a sentence on the radius above which balls close hardly more rays, and on their accuracy."""
     rows = [row for row in view.points if row.triangles]
     if not rows:
         return Markdown("No ball of the sweep leaves a triangle.")
@@ -132,7 +132,7 @@ def _radius_axis(view: SweepView | None) -> dict[str, object]:
         "anchor": "y2",
     }
     if view is not None and view.points:
-        # As wide for the first ball as for all, so that the curves grow without a jump.
+        # The axis has its final width from the first ball on, so that it does not jump during the sweep.
         widest_m = max(AXIS_ENDS[1] * view.r_F_m, 1.05 * view.points[-1].radius_m)
         ends_mm = 1000 * AXIS_ENDS[0] * view.r_F_m, 1000 * widest_m
         axis["range"] = [math.log10(end_mm) for end_mm in ends_mm]
@@ -152,7 +152,7 @@ BARS_TOP, MARKS_BOTTOM = 0.62, 0.66
 def spacing_figure(
     view: SpacingView | None, radii_m: Sequence[float] = (), suggested_m: Sequence[float] = ()
 ) -> go.Figure:
-    """Return a histogram in millimetres, lines at r_F and r_F + sigma_D, and marks at the radii.
+    """Return a histogram of the distances, mm, with lines at r_F and r_F + sigma_D and marks at the radii.
 
     Args:
         view: the distances; None gives an empty figure.

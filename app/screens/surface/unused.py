@@ -11,10 +11,10 @@ NEARLY_NOTHING = 0.05
 """Share of the points below which a mesh is no surface: all points are shown."""
 MOST_POINTS = 30_000
 POINT_SHARE = 0.5
-"""Size of a point on the screen over the mean distance of nearest points."""
+"""Size of a drawn point over the mean distance of nearest points."""
 AIM = 0.01
-"""Tangent of the angle to a ray within which the first point is selected, and the share of its distance
-within which another point is as near."""
+"""Tangent of the angle to a ray within which points are candidates; also the share of the nearest candidate's
+distance by which others may be farther away and still count as equally near."""
 
 
 def unused_view(cloud: PointCloud, surface: Surface, size_m: float, most: int = MOST_POINTS) -> UnusedView:
@@ -23,7 +23,7 @@ def unused_view(cloud: PointCloud, surface: Surface, size_m: float, most: int = 
     Args:
         cloud: the cloud over which the ball rolled.
         surface: the surface that the ball made of the cloud.
-        size_m: size of a point on the screen.
+        size_m: size of a drawn point.
         most: largest number of points; more are thinned evenly.
     """
     rows = np.flatnonzero(_unused(cloud.points_m, surface))

@@ -23,6 +23,7 @@ class SpacingView:
     """The distances between the points over which the ball rolls."""
 
     r_F_m: float
+    """Mean distance of the points from their nearest neighbours; ``sigma_D_m`` is its standard deviation."""
     sigma_D_m: float
     edges_m: FloatArray
     """(B + 1,) bin edges of the nearest-neighbour distance."""
@@ -79,7 +80,7 @@ class UnusedView:
     inferred_m: FloatArray
     """(M, 3) float32, points of the depth network."""
     size_m: float
-    """Size of a point on the screen."""
+    """Size of a drawn point."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,9 +179,9 @@ class SurfaceView:
     elapsed_s: float
     """Time from the clouds to the surface after fusion."""
     holes: Mapping[Which, tuple[HoleView, ...]] = field(default_factory=dict)
-    """Holes of both surfaces, in the final result."""
+    """Holes of both surfaces; empty in a partial result."""
     parts: RayParts | None = None
-    """Ray ends on the surface after fusion."""
+    """Shares of the pixel rays by where they end on the surface after fusion."""
     suggestions: tuple[Suggestion, ...] = ()
     """Ball radii that the cloud after fusion suggests."""
     unused: Mapping[Which, UnusedView] = field(default_factory=dict)

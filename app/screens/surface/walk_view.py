@@ -11,8 +11,8 @@ from app.screens.surface.view import Which
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 Happening = Literal["seed", "join", "glue", "end"]
-"""A ball was put on three points, pivoted onto an unused point or onto one of the front, or stopped because
-no edge is left to pivot about."""
+"""The ball was put on three points (seed), pivoted onto an unused point (join) or onto one of the front
+(glue), or stopped because no edge is left to pivot about (end)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class WalkRequest:
 
     which: Which
     close_up: bool
-    """Every pivot on a patch of the cloud; otherwise the whole cloud in batches."""
+    """True records every pivot on a patch of the cloud; False the whole cloud, several pivots per step."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class WalkView:
     left_front: IntArray
     """(R, 3 F) uint16 first step at which the half-edge has left each ball's front."""
     center_m: FloatArray
-    """(3,) middle of the points."""
+    """(3,) median of the points."""
     reach_m: float
     """Distance of the farthest point from the middle."""
     outward: FloatArray
@@ -73,7 +73,7 @@ class WalkView:
         return int(self.step_ends[done - 1]) if done else 0
 
     def open_edges(self, done: int) -> tuple[IntArray, IntArray]:
-        """Return (E, 2) points of the front after ``done`` steps; (D, 2) of edges without any hit."""
+        """Return (E, 2) points of the front's edges after ``done`` steps; (D, 2) of edges without a hit."""
         count = self.count(done)
         unglued = np.flatnonzero(self.glued_by[: 3 * count] >= count)
         on_front = self.left_front[self.step_radius[done - 1], unglued] >= done
@@ -88,7 +88,7 @@ class WalkView:
         return ends[on_front], ends[~on_front]
 
     def pivot(self, step: int) -> IntArray | None:
-        """Return (2,) points of the edge about which the ball pivots in a close-up's step, or None."""
+        """Return (2,) point indices of the edge about which the ball pivots in a close-up's step, or None."""
         if not self.happenings or self.happenings[step] not in ("join", "glue"):
             return None
         return self.triangles[self.count(step), 1::-1]

@@ -16,7 +16,9 @@ from network_sim.types import to_ns
 FLOOR = 0.02
 """Least probability of a request."""
 DECREASE = 0.7
+"""Factor of the probability where more than r_H images per control period were received."""
 INCREASE = 0.1
+"""Summand of the probability where fewer than r_L images per control period were received."""
 
 
 def probabilities(rates: np.ndarray, config: SchemeConfig) -> np.ndarray:

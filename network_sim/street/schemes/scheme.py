@@ -12,14 +12,20 @@ class Scheme:
     """Vehicles upload images only on request."""
 
     def wanted(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
-        """Return the indices, in upload order, of the images to upload of those in a summary (T,)."""
+        """Return the indices of the images to upload, in upload order, of those in a summary (T,).
+
+        Args:
+            cells: (T,) cells of the images.
+            captured_ns: (T,) capture times of the images.
+            now_ns: present time.
+        """
         raise NotImplementedError
 
     def received(self, cell: int, now_ns: int) -> None:
-        """Learn that an image arrived."""
+        """Take note that an image of this cell arrived."""
 
     def missed(self, cell: int, captured_ns: int) -> None:
-        """Learn that a requested image did not arrive."""
+        """Take note that a requested image, captured at ``captured_ns``, did not arrive."""
 
 
 class Baseline(Scheme):

@@ -29,7 +29,7 @@ PIXEL_SD = 1.0
 KINECT = DepthNoise(s0_m=0.0012, s1_m=0.0019, p=2.0, q=0.0)
 """Noise of a sensor that was not calibrated: about the Kinect's (Nguyen, Izadi, Lovell 2012)."""
 TAGS = cv2.aruco.DICT_APRILTAG_36h11
-"""Dictionary of the tags that are looked for; those with fewer cells are found in noise, too."""
+"""Family of tags that is detected; families with fewer cells are also detected in noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,10 +56,10 @@ class LiftedFeatures:
 
 
 class _Lifted(NamedTuple):
-    """Positions of those image places that have one."""
+    """Measured positions of image places; places without one are left out."""
 
     rows: IntArray
-    """(N,) rows of the places."""
+    """(N,) rows of the places that have a position."""
     points_m: FloatArray
     sigma_m: FloatArray
 
@@ -156,7 +156,7 @@ def _sd_m(frame: RgbdFrame, z_m: FloatArray) -> FloatArray:
 
 
 def _tags(gray: ByteArray, known: ByteArray | None) -> tuple[IntArray, FloatArray]:
-    """Return keys and (K, 2) places of the corners of all tags; the same tag may be there twice."""
+    """Return keys and (K, 2) places of the corners of all tags; a tag seen twice is returned twice."""
     settings = cv2.aruco.DetectorParameters()
     settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
     detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(TAGS), settings)

@@ -11,7 +11,7 @@ from pipeline.types import ByteArray, FloatArray, IntArray
 RATIO = 0.85
 """Largest ratio of the distances to the nearest and the second nearest descriptor (Lowe 2004)."""
 SIZES = 1.4
-"""Largest ratio of the sizes on the surface of two features that may be the same."""
+"""Largest ratio of the sizes, in metres, of two features that may match."""
 MOST = 600
 """Largest number of matches that are checked, most distinct first."""
 ROUNDING = 1e-6
@@ -38,16 +38,19 @@ def matches(source: LiftedFeatures, target: LiftedFeatures) -> PointPairs:
 
 
 def match_score(source: LiftedFeatures, target: LiftedFeatures) -> float:
-    """Return the number of matches of the strongest features, to order many pairs of frames in short time."""
+    """Return the number of matches of the strongest features plus ``TAG_VOTES`` for each common tag corner.
+
+    It orders many pairs of frames in short time.
+    """
     same_tags = np.intersect1d(source.tag_keys, target.tag_keys)
     return float(len(_mutual(source, target, SCORE_FEATURES)[0]) + TAG_VOTES * len(same_tags))
 
 
 def _mutual(source: LiftedFeatures, target: LiftedFeatures, most: int | None) -> tuple[IntArray, IntArray]:
-    """Return rows of the first ``most`` features that are each other's nearest and pass the ratio test.
+    """Return rows, in both frames, of features that are each other's nearest and pass the ratio test.
 
-    Descriptors are compared as RootSIFT (Arandjelovic and Zisserman 2012), and only those of features of
-    similar size, which is known with the depth.
+    Only the first ``most`` features of each frame are compared; None compares all. Descriptors are compared
+    as RootSIFT (Arandjelovic and Zisserman 2012), and only those of features of similar size in metres.
     """
     a, b = (_root(features.descriptors[:most]) for features in (source, target))
     if min(len(a), len(b)) < 2:

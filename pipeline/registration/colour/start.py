@@ -21,21 +21,22 @@ class ColourStart:
     T_target_source: FloatArray | None
     """(4, 4) pose; None if the images show too little in common."""
     matches: int
-    """Number of compared pairs of features."""
+    """Number of pairs of features that look alike."""
     inliers: int
     """Number of those that fit the pose."""
     votes: float
-    """Votes for the pose: about the number of pairs that fit, less the farther they are off."""
+    """Votes for the pose: a sum over the pairs that fit, where pairs that are farther off count less."""
     rival_votes: float
-    """Votes for the best of the clearly different poses; close to ``votes`` where things are there twice."""
+    """Votes for the best of the clearly different poses; close to ``votes`` if the scene repeats itself."""
     why_none: str
     """Reason for which there is no pose, one sentence; else empty."""
 
 
 def colour_start(source: LiftedFeatures, target: LiftedFeatures) -> ColourStart:
-    """Find the pose of the source frame that most pairs of features of the same look agree on.
+    """Find the pose of the source frame on which most pairs of features that look alike agree.
 
-    It is a start for registration, within some centimetres; the same features give the same bits.
+    It is accurate to some centimetres, enough to start a registration. The same features give exactly the
+    same pose.
     """
     if why := source.why_none or target.why_none:
         return ColourStart(None, 0, 0, 0.0, 0.0, why)

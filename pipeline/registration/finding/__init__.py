@@ -1,1 +1,1 @@
-"""The pose of two clouds from anywhere: few quick ways, evidence for each answer, and a verdict."""
+"""Search for the pose between two clouds: starts, quick registrations, their evidence, and a verdict."""

@@ -1,4 +1,4 @@
-"""Poses that a few quick registrations from a start lead to, each with its evidence."""
+"""Quick registrations from a start pose: the poses to which they lead, each with its evidence."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from pipeline.registration.loop import register
 from pipeline.types import FloatArray, PointCloud
 
 QUICK_POINTS = 5000
-"""Points of each cloud in a quick registration."""
+"""Largest number of points of each cloud in a quick registration."""
 DRAWN_SHARE = 0.8
-"""Most points of the smaller cloud, as a share, so that draws of the points differ."""
+"""Largest share of the smaller cloud's points that is drawn, so that draws with other seeds differ."""
 QUICK_DECAY = 0.92
-"""Factor by which its scale shrinks in each iteration: it must not shrink sooner than the pose moves."""
+"""Factor by which a quick registration's scale shrinks per iteration: slowly, so that the pose can follow."""
 DIRECTIONS: tuple[Direction, ...] = ("p2q", "q2p")
 
 
@@ -25,9 +25,9 @@ class Candidate:
     """A pose that a quick registration led to."""
 
     T_start: FloatArray
-    """(4, 4) its start."""
+    """(4, 4) start pose T_target_source."""
     T_target_source: FloatArray
-    """(4, 4) its end."""
+    """(4, 4) final pose."""
     gate_m: float
     direction: Direction
     evidence: Evidence
@@ -41,15 +41,17 @@ def candidates(
     judge: Judge,
     config: RegistrationConfig,
 ) -> Iterator[Candidate]:
-    """Register from a start with each gate, the smallest first; yields the better one of both directions.
+    """Register from a start pose with each gate, the smallest first, in both directions.
+
+    For each gate it yields the direction with the better score; nothing if both fail.
 
     Args:
         source: the cloud that moves.
         target: the cloud that stays.
         T_start: (4, 4) start pose T_target_source.
-        gates_m: gates in ascending order; a gate is a promise of how far the start is off.
+        gates_m: gates in ascending order, metres: upper limits of the start pose's error.
         judge: judge of these clouds.
-        config: metric and seed of the registrations.
+        config: settings as for ``quick_registration``.
     """
     for gate_m in gates_m:
         both = []
@@ -81,8 +83,8 @@ def quick_registration(
         T_start: (4, 4) start pose T_target_source.
         gate_m: gate of the registration.
         direction: direction of the registration; with a scale, it is always ``both``.
-        config: other settings of the registration.
-        seed: seed of the draw of points; None for the settings'.
+        config: other settings; method, start, decay and number of points are replaced.
+        seed: seed of the draw of points; None takes that of ``config``.
         points: largest number of points of each cloud.
 
     Raises:
@@ -105,5 +107,5 @@ def quick_registration(
 
 
 def drawn_points(source: PointCloud, target: PointCloud, points: int) -> int:
-    """Return how many points of each cloud are drawn if ``points`` are asked for: fewer of small clouds."""
+    """Return the number of points that are drawn from each cloud: ``points``, or fewer from small clouds."""
     return min(points, max(6, int(DRAWN_SHARE * min(len(source), len(target)))))

@@ -29,15 +29,15 @@ from pipeline.registration.metrics import point_error_m
 from pipeline.types import FloatArray, PointCloud
 
 DRAWS = 3
-"""Further draws of the points that must lead to the same pose, …"""
+"""Number of further draws of the points whose registrations must lead to the same pose."""
 MOST_SPREAD_VOXELS = 0.5
-"""… within so many fiftieths of the target's extent: 3 cm in a view of 3 m."""
+"""Largest distance of these poses, in fiftieths of the target's extent: 3 cm in a view of 3 m."""
 SIDE_VOXELS, SIDE_OF_GATE = 1.2, 0.9
-"""Where the stiffness is little, registrations from both sides must lead to the same pose, too. They begin so
-many fiftieths of the target's extent away, along the motion that is held least, but within this share of the
-gate."""
+"""Where the stiffness is little, registrations that start on both sides of the pose must lead to it, too.
+They start this many fiftieths of the target's extent away, along the motion that is held least, but at most
+this share of the gate."""
 CLOSE_VOXELS = 0.3
-"""Where the registrations end farther apart, they are repeated with more points."""
+"""Where the poses are farther apart, in the same unit, the registrations are repeated with more points."""
 MORE_POINTS = (4 * QUICK_POINTS, 16 * QUICK_POINTS)
 """Numbers of points of the first and of the second repetition."""
 LEAST_TURN_DEG = 10.0
@@ -58,7 +58,7 @@ class Checked(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Checks:
-    """Checks answers for two clouds; called with an answer."""
+    """Checks of answers for two clouds, by further registrations and rival poses; called with an answer."""
 
     source: PointCloud
     target: PointCloud
@@ -66,7 +66,7 @@ class Checks:
     config: RegistrationConfig
 
     def __call__(self, way: Way, answer: Candidate, tried: Sequence[Candidate]) -> Checked:
-        """Check an answer, whose evidence may only doubt its stiffness, by registrations and rival poses.
+        """Check an answer whose evidence passes all tests, except perhaps that of the stiffness.
 
         Where both clouds have colours, no rivals are tried: colours refute quarter turns, except in a room of
         one colour.
@@ -74,7 +74,7 @@ class Checks:
         Args:
             way: where the start pose came from.
             answer: the answer to check.
-            tried: all registrations that were tried.
+            tried: all registrations so far, at least one.
         """
         at, clouds = (answer.T_target_source, answer.evidence), (self.source, self.target)
         answer = better_slide(*clouds, *at, self.judge, self.config) or answer
@@ -101,13 +101,14 @@ class Checks:
 
     @property
     def _bare(self) -> bool:
-        """Whether no free space can refute a pose, since a cloud has no viewpoint."""
+        """Whether one of the clouds has no viewpoint, so that its free space cannot refute a pose."""
         return self.judge.source.view is None or self.judge.target.view is None
 
     def _with_more_points(self, answer: Candidate, spread_m: float, points: int) -> tuple[Candidate, float]:
-        """Return the answer with more points, and its spread.
+        """Return the answer of a registration with more points, and its spread.
 
-        Both stay as they were if its evidence then has doubts; the spread is infinite if it finds no pose.
+        The given answer and spread are returned if the new evidence is in doubt; the spread is infinite if
+        the registration finds no pose.
         """
         try:
             T = self._again(answer, self.config.seed, points)
@@ -121,7 +122,7 @@ class Checks:
     def _spread_m(self, answer: Candidate, points: int = QUICK_POINTS) -> float:
         """Return the largest point error between an answer and registrations of further draws of the points.
 
-        They begin at its start, and also on both sides of an answer of little stiffness.
+        They begin at its start pose, and also on both sides of an answer with little stiffness.
         """
         starts = [answer.T_start] * DRAWS
         if answer.evidence.stiffness < LITTLE_STIFFNESS:
@@ -145,8 +146,9 @@ class Checks:
     def _unless_rivalled(self, way: Way, answer: Candidate) -> tuple[Candidate, tuple[str, ...]]:
         """Return the answer or the rival that fits clearly better, and a doubt if another one fits as well.
 
-        Rivals are quarter turns and, of a given start without free space to refute its answer, the pose to
-        which features of the surfaces lead: half a room slid along the other half can fit almost as well.
+        Rivals are quarter turns. If the start was given and a cloud has no viewpoint, the poses to which
+        features of the surfaces lead are rivals, too: half a room slid along the other half can fit almost as
+        well.
         """
         clouds, T = (self.source, self.target), answer.T_target_source
         turns = quarter_turns(*clouds, T, 2.0 * answer.gate_m, self.judge, self.config)
@@ -176,7 +178,7 @@ class Checks:
         return best if elsewhere and best.evidence.score > answer.evidence.score else None
 
     def _by_features(self) -> Iterable[Candidate]:
-        """Yield where the first start by features leads."""
+        """Yield the candidates from the first start pose by surface features; none without one."""
         try:
             T_start = next(iter(by_surfaces(self.source, self.target).poses()))
         except ReconstructionError:

@@ -1,8 +1,8 @@
 """Evidence for and against a pose of two clouds: points on the other's surface, and points in its free space.
 
 A mean over all points of both clouds rewards overlap: half a room slid onto the other half fits "better" than
-at its place. Here only those points count that the other cloud can judge, and how many they are is a number
-of its own.
+at its place. Here only those points count that the other cloud can judge, and their number is reported
+separately.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from pipeline.registration.observability import open_motions, stiffness, weakest
 from pipeline.types import FloatArray
 
 CLEARLY, CLEARLY_MORE = 2.0, 0.005
-"""Clearly more speaks against a pose than against another: this multiple, and this share more."""
+"""A pose is clearly better if the other's ``against_share`` exceeds this multiple of its own plus this."""
 POINTS_OF_PATCH = 50.0
-"""Neighbouring points err together: so many count as one observation."""
+"""Number of points that count as one observation, since neighbouring points err together."""
 
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What two clouds say of a pose."""
+    """Evidence of two clouds for and against a pose."""
 
     judged: tuple[int, int]
     """Numbers of points of the source and of the target that the other cloud can judge."""
@@ -38,17 +38,18 @@ class Evidence:
     refutable: bool
     """Whether a viewpoint is known, so that free space could refute the pose."""
     one_side_share: float
-    """Share of the points on the surface that have both clouds' middles on one side: two rooms back to back
-    share a wall that they see from opposite sides. 1 with a viewpoint, whose free space tells more."""
+    """Share of the points on the surface that have both clouds' middles on one side of it; small for two
+    rooms back to back, which see one wall from opposite sides. 1 with a viewpoint: free space decides."""
     height_ratio: float
-    """Root mean square distance of the points on the surface from its tangent planes, over the noise."""
+    """Root mean square distance of the points on the surface from its tangent planes, over the noise;
+    infinite without points."""
     stiffness: float
-    """How well the points on the surface hold the motion that they hold least; 0 if it is open."""
+    """How well the points on the surface hold their least held motion (``observability.stiffness``)."""
     open_motions: str
     """Motions that they leave open, in words; empty if none."""
     color_correlation: float
     """Correlation of the colours of these points with those of their nearest points in the other cloud, -1 to
-    1; NaN without colours."""
+    1; NaN without colours, without points and if all have one colour."""
 
     @property
     def overlap_share(self) -> float:
@@ -118,7 +119,7 @@ class Judge:
         return ahead @ T_target_source, behind @ T_target_source
 
     def _judgements(self, T: FloatArray) -> tuple[Judgement, Judgement]:
-        """Return what the target says of the source's points, and the source of the target's."""
+        """Return the target's judgement of the source's points, and the source's of the target's."""
         return self.target.judge(self.source, T), self.source.judge(self.target, np.linalg.inv(T))
 
     def _overlap(self, there: Judgement, back: Judgement, T: FloatArray) -> tuple[FloatArray, FloatArray]:

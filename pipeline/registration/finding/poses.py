@@ -10,7 +10,8 @@ from pipeline.registration.metrics import point_error_m
 from pipeline.types import FloatArray, PointCloud
 
 SAME_DEG, SAME_VOXELS = 1.5, 0.8
-"""Two poses that differ by less are the same answer: 1.5 degrees and 5 cm in a view of 3 m."""
+"""Two poses that differ by less, in degrees and in fiftieths of the target's extent, are the same answer: 1.5
+degrees and 5 cm in a view of 3 m."""
 COMPARED_POINTS = 1000
 STRAY_MEDIANS = 10.0
 """A point farther from the middle of a cloud than this many times the median distance is a stray."""

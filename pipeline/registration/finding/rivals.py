@@ -74,11 +74,11 @@ def better_slide(
     judge: Judge,
     config: RegistrationConfig,
 ) -> Candidate | None:
-    """Return the pose nearby that passes all tests with a better score than an answer of which a little is in
-    free space, or whose surfaces hold it little; else None.
+    """Return a pose near an answer that passes all tests with a better score; None if there is none.
 
-    Shelves and chairs in a row fit one place farther along, too: the source is shifted to both sides along
-    the place's own axes and registered.
+    It is searched for only if a little of the answer is in free space or its stiffness is little. Shelves and
+    chairs in a row also fit when shifted by one: the source is shifted to both sides along the main
+    directions of the target's normals, and registered.
 
     Args:
         source: the cloud that moves.
@@ -117,7 +117,7 @@ def mirrored_axis(
     answer: Evidence,
     config: RegistrationConfig,
 ) -> str:
-    """Return the axis whose negation makes the source fit clearly better, without doubt; empty if none does.
+    """Return the axis (x, y or z) whose negation makes the source fit surely and clearly better; else empty.
 
     Args:
         source: the cloud that moves.

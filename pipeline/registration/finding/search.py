@@ -1,4 +1,4 @@
-"""The search for a pose: starts in the order of their cost, until the evidence is sure of one (SPEC 4.12)."""
+"""Search for a pose: start poses in the order of their cost, until an answer is sure (SPEC 4.12)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pipeline.types import PointCloud
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A pose, what speaks for it, and how it was found."""
+    """A pose with its evidence and verdict, and the way in which it was found."""
 
     way: Way
     candidate: Candidate
@@ -26,7 +26,7 @@ class Found:
     """All registrations that were compared, in their order."""
     spread_m: float = float("nan")
     """Largest point error between the pose and those of the registrations that checked it; infinite if one
-    failed, NaN of a pose that was in doubt before."""
+    failed, NaN if the pose was in doubt before these."""
     settled: bool = False
     """Whether no other start can change the answer: it is sure, or in doubt only because of a rival."""
 
@@ -39,10 +39,11 @@ def search(
     config: RegistrationConfig,
     gates_m: Sequence[float] = (),
 ) -> Found:
-    """Register from each start with a few gates: the first sure answer wins, else that with the best score.
+    """Register from each start with a few gates; return the first settled answer, else the best one.
 
     Rivals of a sure answer are tried too, such as its quarter turns; where one fits as well, the answer is
-    doubtful.
+    doubtful, and the search ends. The best answer is that with the fewest doubts; of equal ones, that from a
+    given start, then that with the best score.
 
     Args:
         source: the cloud that moves.
@@ -90,5 +91,5 @@ def _found(way: Way, candidate: Candidate, tried: Sequence[Candidate], checks: C
 
 
 def _rank(found: Found) -> tuple[int, bool, float]:
-    """Answers with fewer doubts before others, then those from a given start, then the score."""
+    """Return the rank of an answer, larger if better: by its doubts, by a given start, and by its score."""
     return -len(found.verdict.reasons), found.way == "given", found.candidate.evidence.score

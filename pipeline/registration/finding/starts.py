@@ -1,4 +1,4 @@
-"""Where start poses come from, and the gates that suit them."""
+"""Ways to find start poses, and the gates that suit them."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def by_surfaces(source: PointCloud, target: PointCloud, from_cameras: bool = Fal
 
 
 def _all(ways: Sequence[Callable[[], Iterable[FloatArray]]]) -> Iterator[FloatArray]:
-    """Yield the poses of all ways; where none has one, the last one's error is raised."""
+    """Yield the poses of all ways; if none finds a pose, the error of the last failed way is raised."""
     found, reason = 0, None
     for way in ways:
         try:
@@ -94,7 +94,7 @@ def by_colour(source: LiftedFeatures, target: LiftedFeatures) -> Start:
 
 
 def default_gates_m(target: PointCloud, way: Way, seed: int = 0) -> list[float]:
-    """Return gates for a target, ascending: a gate is a promise of how far the start is off."""
+    """Return gates for a target, metres, ascending: upper limits of the error of start poses of this way."""
     few = draw(target, QUICK_POINTS, seed, "target").points_m
     least_m = LEAST_GATE_OF_SPACING * median_spacing_m(few)
     shares = GIVEN_VOXELS if way == "given" else FOUND_VOXELS

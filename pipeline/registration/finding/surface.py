@@ -14,25 +14,25 @@ from pipeline.registration.sample import draw
 from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud
 
 REFERENCE_POINTS, JUDGED_POINTS = 20_000, 4000
-"""Most points of a cloud that stand for its surface, and that are judged by the other cloud."""
+"""Largest numbers of a cloud's points that represent its surface, and that the other cloud judges."""
 NOISE_NEIGHBOURS, SPACING_NEIGHBOURS = 8, 4
 ON_SPACINGS = 3.0
-"""A point is on a surface if its nearest point there is at most so many spacings away, …"""
+"""A point on a surface has its nearest point there at most this many spacings away."""
 ON_SIGMAS = 3.0
-"""… if its distance to the tangent plane is at most so many standard deviations of both clouds' noise, …"""
+"""Its distance to the tangent plane is at most this many standard deviations of both clouds' noise."""
 ON_COSINE = 0.7
-"""… and if the normals differ by at most 45 degrees."""
+"""Its normal has at least this cosine with the surface's: they differ by at most 45 degrees."""
 LEAST_TOLERANCE = 0.1
-"""Least tolerance of the distance to a tangent plane, in spacings: the plane leaves a curved surface."""
+"""Tolerance that is added for the distance of a curved surface from its tangent plane, in spacings."""
 LEAST_SIGMA = 0.02
-"""Least standard deviation of the noise, in spacings: quantised depth can have planes without any."""
+"""Least standard deviation of the noise, in spacings: quantised depth can have planes without noise."""
 NEAR_SPACINGS, OVER_SPACINGS = 6.0, 1.5
-"""A cloud without a viewpoint judges the points that are at most so many spacings from its nearest point, and
-so many along the surface: a point beyond the rim of what was measured is not judged."""
+"""A cloud without a viewpoint judges points at most this many spacings from its nearest point, and at most
+this many along the surface: a point beyond the rim of the measured surface is not judged."""
 
 
 class Judgement(NamedTuple):
-    """What one surface says of (n,) points of another."""
+    """Judgement of one surface on n points of another; each array is (n,)."""
 
     judged: BoolArray
     """Points that it can judge: on it, or clearly not."""
@@ -43,7 +43,7 @@ class Judgement(NamedTuple):
     heights: FloatArray
     """Distances to the tangent planes at the nearest points, over the noise."""
     nearest: IntArray
-    """Rows of the nearest points."""
+    """Rows of the nearest points of the judging surface."""
 
 
 class Surface:
@@ -55,7 +55,7 @@ class Surface:
         Args:
             cloud: any cloud.
             seed: seed of the sample.
-            from_camera: whether a camera at the origin measured it; if unknown, its points may tell.
+            from_camera: whether a camera at the origin is known to have measured it; see ``range_image``.
         """
         sample = draw(cloud, REFERENCE_POINTS, seed, "cloud").cloud
         self.points_m = sample.points_m
@@ -73,7 +73,7 @@ class Surface:
         self.asked: IntArray = np.sort(np.random.default_rng(seed).choice(len(sample), count, replace=False))
         """(n,) rows of the points that the other cloud judges."""
         self.view: RangeImage | None = range_image(cloud.points_m, from_camera)
-        """Free space, if the cloud was seen from its origin."""
+        """Free space if the cloud was seen from its origin, else None."""
         self.middle_m: FloatArray = np.median(self.points_m, axis=0)
 
     def judge(self, other: Surface, T: FloatArray) -> Judgement:
@@ -88,7 +88,7 @@ class Surface:
         heights_m = np.abs(np.einsum("ni,ni->n", arms_m, normals))
         cosines = np.einsum("ni,ni->n", turned, normals)
         if self.view is None or other.view is None:
-            cosines = np.abs(cosines)  # only towards a viewpoint do normals have a sign
+            cosines = np.abs(cosines)  # without a viewpoint, a normal's sign is arbitrary
         sigma_m = np.hypot(self.sigma_m[nearest], scale * other.sigma_m[other.asked])
         tolerance_m = ON_SIGMAS * sigma_m + LEAST_TOLERANCE * spacing_m
         near = distances_m <= ON_SPACINGS * spacing_m

@@ -31,7 +31,7 @@ MOST_HEIGHT = 1.7
 LEAST_CORRELATION = 0.75
 """Least correlation of the colours where the clouds meet: floor on ceiling has about 0."""
 NO_POSE_ON, NO_POSE_OVERLAP = 0.35, 0.02
-"""With smaller shares, nothing speaks for the pose."""
+"""With a smaller share on the surface, or a smaller overlap, there is no pose."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,9 +57,9 @@ def verdict_on(evidence: Evidence, more: tuple[str, ...] = (), tried: bool = Fal
     """Judge a pose by its evidence.
 
     Args:
-        evidence: what the clouds say of the pose.
+        evidence: evidence of the clouds for and against the pose.
         more: further reasons for doubt, from other poses that were tried.
-        tried: leaves out the test of the stiffness, in whose place other poses are tried.
+        tried: True leaves out the test of the stiffness, because other poses are tried instead.
     """
     if evidence.overlap_share < NO_POSE_OVERLAP or evidence.on_share < NO_POSE_ON:
         return Verdict("none", (*_reasons(evidence, tried), *more))

@@ -1,4 +1,4 @@
-"""The place from which a cloud was seen: where it is known, free space refutes a pose (SPEC 4.10)."""
+"""Range images of clouds seen from their origin, whose free space can refute a pose (SPEC 4.10)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.types import BoolArray, FloatArray, IntArray
 
 POINTS_OF_CELL = 6.0
-"""Mean number of points of an occupied cell; with fewer, cells between points are empty."""
+"""Least mean number of points of an occupied cell; with fewer, cells between points would be empty."""
 HIDDEN_RATIO = 1.1
 """A point of a cloud seen from the origin is hidden if another in its cell is nearer by this factor."""
 MOST_HIDDEN = 0.05
@@ -28,14 +28,14 @@ class RangeImage:
     nearest_m: FloatArray
     """(6 cells^2,) least range in each cell; NaN where there is no point."""
     farthest_m: FloatArray
-    """(6 cells^2,) largest range."""
+    """(6 cells^2,) largest range in each cell; NaN where there is no point."""
 
     def compare(self, points_m: FloatArray, tolerance_m: FloatArray) -> tuple[BoolArray, BoolArray]:
         """Compare (N, 3) points with the ranges.
 
         Args:
             points_m: points in the cloud's frame.
-            tolerance_m: (N,) tolerance of the ranges, beside a share of them.
+            tolerance_m: (N,) tolerance of the ranges; at least ``TOLERANCE`` times the range is used.
 
         Returns:
             (N,) points that were in view: not hidden, nor in an empty cell; and (N,) those of them that are

@@ -57,10 +57,10 @@ def registration_information(
     """Compute an edge's information from the normal matrix of its registration's last pairs.
 
     The covariance is that of least squares on the point-to-plane distances, s^2 (J^T W J)^-1 / n with n
-    effective pairs, plus ``FLOOR_M`` squared. One J has the source's normals and the other the target's:
-    their noise is independent and cancels, while the square of one normal's noise would seem to determine
-    every motion. A share of the matrix below ``open_share`` counts as nothing, so a corridor does not
-    determine the motion along itself.
+    effective pairs and the registration's last objective s^2, plus ``FLOOR_M`` squared. One J has the
+    source's normals and the other the target's: their noise is independent and cancels, while the square of
+    one normal's noise would seem to determine every motion. The share ``open_share`` of the largest
+    eigenvalue is subtracted from all of them, so a corridor does not determine the motion along itself.
 
     Args:
         result: a registration with at least one step.

@@ -19,6 +19,7 @@ LOOP_LIMIT = 25.0
 """Largest squared Mahalanobis distance of a loop of right edges (chi-square with six degrees of freedom: a
 chance of 3 in 10,000). For three edges whose pairs hold every motion it is an error of 5 cm."""
 _GAIN = 1e-9
+"""Gain of evidence that counts as rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,12 +60,12 @@ class Loops:
 def best_loops(nodes: int, edges: Sequence[PoseEdge]) -> Loops:
     """Find a spanning forest with which the strongest evidence agrees.
 
-    The start is the tree of the strongest edges. A tree's edge divides its group in two; if the edges across
-    that contradict it weigh more than it and those that agree with it, each of them is tried in its place,
-    and taken if the evidence that agrees with the tree increases. So no single exchange improves the result:
-    of the edges across each such division, those that stay weigh at least as much as any others that agree
-    with one another. One wrong edge among right ones is found if two right ones cross where it does, two
-    wrong ones that agree with each other if stronger ones do; an edge without loop stays.
+    The start is the tree of the strongest edges. Each edge of the tree divides its group into two parts. If
+    the edges between these parts that contradict it weigh more than it and those that agree with it, each of
+    them is tried in its place, and taken if the evidence that agrees with the tree increases. So no single
+    exchange improves the result: of the edges between two such parts, those that stay weigh at least as much
+    as any others that agree with one another. One wrong edge is found if two right edges join the same parts,
+    two wrong ones that agree with each other if stronger right ones do; an edge without a loop stays.
 
     Args:
         nodes: number of nodes.
@@ -113,7 +114,7 @@ class Groups:
             self.join(one, other)
 
     def of(self, node: int) -> int:
-        """Return the number of a node's group."""
+        """Return the number of a node's group, which is that of its first node."""
         while self._above[node] != node:
             self._above[node] = self._above[self._above[node]]
             node = self._above[node]

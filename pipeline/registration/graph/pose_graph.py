@@ -34,7 +34,7 @@ class PoseGraph:
     """Point error between each edge and the other way between its nodes: along the spanning tree or, for an
     edge of the tree, around the loop that closes best; NaN without a loop."""
     used: tuple[bool, ...]
-    """False for edges that were rejected because they contradict the loops."""
+    """False for edges that contradict the loops, and for those with ``agrees`` False."""
 
 
 def solve_pose_graph(
@@ -123,14 +123,14 @@ def _around(edges: Sequence[PoseEdge], loops: Loops, place: int, row: int) -> Fl
 def optimised(start: FloatArray, edges: Sequence[PoseEdge]) -> tuple[FloatArray, FloatArray]:
     """Minimise the sum of the edges' squared Mahalanobis distances over the poses (Levenberg-Marquardt).
 
-    There is no damping while the sum falls. Along a bare wall, where edges hardly hold a motion, full steps
-    would run away.
+    A step is damped only after one that raises the sum: along a bare wall, where edges hardly hold a motion,
+    full steps would diverge.
 
     The first node of each connected group keeps its pose. The distance of an edge X between poses A of its
     source and B of its target is that of X^-1 B^-1 A from the identity (Choi, Zhou, Koltun 2015, eq. 3).
 
     Args:
-        start: (N, 4, 4) start poses in one frame per group; those along a spanning tree are near enough.
+        start: (N, 4, 4) start poses in one frame per group; poses along a spanning tree are near enough.
         edges: the registrations.
 
     Returns:

@@ -42,7 +42,7 @@ def advance(points, normals, grid, front, scratch, radius, radius_index, limit):
 
 @compiled
 def restart(points, grid, front, scratch, radius):  # type: ignore[no-untyped-def]
-    """Start with a larger ball: queue the front's edges on whose triangle it can rest empty."""
+    """Start with a larger ball: queue the front's edges on whose triangle it rests with no point inside."""
     counts = front.counts
     counts[HEAD], counts[TAIL], counts[CURSOR], counts[SETTLED] = 0, 0, 0, 0
     for p in range(len(front.outgoing)):

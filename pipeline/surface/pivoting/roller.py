@@ -106,7 +106,7 @@ class Roller:
         """Roll a ball that is larger than those before until it stops; returns all triangles so far.
 
         Raises:
-            InputError: the radius is not positive, or not larger.
+            InputError: the radius is not positive or not larger, or it is one too many.
         """
         for _ in self.iterate(radius_m, ALL_AT_ONCE):
             pass

@@ -24,7 +24,7 @@ class Scratch(NamedTuple):
     near: FloatArray
     """(N, 4) neighbours x, y, z relative to a point, and half their squared distance."""
     rows: IntArray
-    """(N + 1,) row of the grid of each neighbour."""
+    """(N,) row of the grid of each neighbour."""
     cell: Cell
 
 
@@ -40,7 +40,7 @@ def find_seed(points, normals, grid, front, scratch, p, radius):  # type: ignore
     """Return (b, c, x, y, z): the seed triangle p, b, c and its ball's centre; b is -1 for none.
 
     SPEC 5.1 tries pairs of unused neighbours in order of distance until an empty ball rests on them and
-    p. Only corners of p's Voronoi cell can give such pairs; among these the same pair is found. The
+    p. Only corners of p's Voronoi cell can give such pairs, so this search finds the same pair. The
     ball's centre must be on the outer side of p's tangent plane.
     """
     nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
@@ -77,7 +77,7 @@ def _neighbours(points, grid, scratch, p, count, beyond_m, reach_m):  # type: ig
 
 @compiled
 def _nearest_pair(points, normals, grid, front, scratch, count, p, radius):  # type: ignore[no-untyped-def]
-    """Return, of all pairs of neighbours at far corners of the cell, the one whose farther one is nearest."""
+    """Return the seed of that pair of neighbours at a far corner of the cell whose farther one is nearest."""
     near, rows, cell = scratch.near, scratch.rows, scratch.cell
     best, seed = np.inf, (np.int64(-1), np.int64(-1), 0.0, 0.0, 0.0)
     for corner in range(cell.counts[1]):
