@@ -76,28 +76,57 @@ class Checks:
             answer: the answer to check.
             tried: all registrations so far, at least one.
         """
-        at, clouds = (answer.T_target_source, answer.evidence), (self.source, self.target)
-        answer = better_slide(*clouds, *at, self.judge, self.config) or answer
         if self._bare and (before := self._scored_better(answer, tried)) is not None:
             return Checked(answer, (self._rival_text(answer, before),), float("nan"), settled=False)
+        spread_m = self._spread_m(answer)
+        if spread_m <= self._most_m:
+            return self.repeated(way, answer, spread_m)
+        return self._checked(way, answer, spread_m)
+
+    def repeated(self, way: Way, answer: Candidate, spread_m: float) -> Checked:
+        """Check an answer, or one nearby that fits better, again with more points if its draws disagree.
+
+        Args:
+            way: where the start pose came from.
+            answer: the answer to check.
+            spread_m: distance of the poses of its draws of few points.
+        """
+        at = answer.T_target_source, answer.evidence
+        slide = better_slide(self.source, self.target, *at, self.judge, self.config)
+        if slide is not None:
+            answer, spread_m = slide, self._spread_m(slide)
+        return self._checked(way, *self._repeated(answer, spread_m))
+
+    def _checked(self, way: Way, answer: Candidate, spread_m: float) -> Checked:
+        """Return an answer, or the rival that fits better, with its doubts."""
         doubts: tuple[str, ...] = ()
-        voxel_m = default_voxel_m(self.target)
-        close_m, most_m = CLOSE_VOXELS * voxel_m, MOST_SPREAD_VOXELS * voxel_m
-        spread_m, drawn = self._spread_m(answer), drawn_points(*clouds, QUICK_POINTS)
-        for points in MORE_POINTS:
-            more = drawn_points(*clouds, points)
-            if more > drawn and close_m < spread_m < np.inf:
-                answer, spread_m = self._with_more_points(answer, spread_m, points)
-                drawn = more
-        if spread_m <= most_m and np.isnan(answer.evidence.color_correlation):
+        if spread_m <= self._most_m and np.isnan(answer.evidence.color_correlation):
             best, doubts = self._unless_rivalled(way, answer)
             if best is not answer:
                 answer, spread_m = best, self._spread_m(best)
         if np.isinf(spread_m):
             doubts = (*doubts, "registered again, the source finds no pose")
-        elif spread_m > most_m:
+        elif spread_m > self._most_m:
             doubts = (*doubts, f"registered again, the source ends up to {length(spread_m)} away")
-        return Checked(answer, doubts, spread_m, settled=spread_m <= most_m)
+        return Checked(answer, doubts, spread_m, settled=spread_m <= self._most_m)
+
+    def _repeated(self, answer: Candidate, spread_m: float) -> tuple[Candidate, float]:
+        """Return an answer with as many points as make its draws agree closely, and its spread."""
+        drawn = drawn_points(self.source, self.target, QUICK_POINTS)
+        for points in MORE_POINTS:
+            more = drawn_points(self.source, self.target, points)
+            if more > drawn and self._close_m < spread_m < np.inf:
+                answer, spread_m = self._with_more_points(answer, spread_m, points)
+                drawn = more
+        return answer, spread_m
+
+    @property
+    def _close_m(self) -> float:
+        return CLOSE_VOXELS * default_voxel_m(self.target)
+
+    @property
+    def _most_m(self) -> float:
+        return MOST_SPREAD_VOXELS * default_voxel_m(self.target)
 
     @property
     def _bare(self) -> bool:

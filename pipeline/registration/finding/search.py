@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
 from pipeline.registration.finding.candidates import Candidate, candidates
-from pipeline.registration.finding.doubts import Checks
+from pipeline.registration.finding.doubts import Checked, Checks
 from pipeline.registration.finding.evidence import Judge
 from pipeline.registration.finding.starts import Start, Way, default_gates_m
 from pipeline.registration.finding.verdict import Verdict, verdict_on
@@ -58,7 +60,7 @@ def search(
     """
     checks = Checks(source, target, judge, config)
     tried: list[Candidate] = []
-    best: Found | None = None
+    answers: list[Found] = []
     reason: ReconstructionError | None = None
     for start in starts:
         gates = gates_m or default_gates_m(target, start.way, config.seed)
@@ -67,29 +69,43 @@ def search(
                 for candidate in candidates(source, target, T_start, gates, judge, config):
                     tried.append(candidate)
                     found = _found(start.way, candidate, tried, checks)
-                    if best is None or found.settled or _rank(found) > _rank(best):
-                        best = found
                     if found.settled:
                         return replace(found, tried=tuple(tried))
+                    answers.append(found)
         except ReconstructionError as error:
             reason = error
-    if best is None:
+    if not answers:
         raise reason or ReconstructionError(
             "No start pose leads to a registration: the clouds have too little in common, or the points of "
             "one leave the pose open; try a closer start pose, or clouds that show more of the place"
         )
-    return replace(best, tried=tuple(tried))
+    answers += _with_more_points(answers, checks)
+    return replace(max(answers, key=_rank), tried=tuple(tried))
 
 
 def _found(way: Way, candidate: Candidate, tried: Sequence[Candidate], checks: Checks) -> Found:
     """Return a candidate with its verdict, or a better one that its checks find."""
     if not verdict_on(candidate.evidence, tried=True).sure:
         return Found(way, candidate, verdict_on(candidate.evidence), ())
-    checked = checks(way, candidate, tried)
+    return _checked(way, checks(way, candidate, tried))
+
+
+def _checked(way: Way, checked: Checked) -> Found:
+    """Return a checked answer with its verdict."""
     verdict = verdict_on(checked.candidate.evidence, checked.doubts, tried=checked.settled)
     return Found(way, checked.candidate, verdict, (), checked.spread_m, checked.settled)
 
 
-def _rank(found: Found) -> tuple[int, bool, float]:
-    """Return the rank of an answer, larger if better: by its doubts, by a given start, and by its score."""
-    return -len(found.verdict.reasons), found.way == "given", found.candidate.evidence.score
+def _with_more_points(answers: Sequence[Found], checks: Checks) -> Iterator[Found]:
+    """Yield the best answer whose draws of few points disagree, checked with more points, if there is one."""
+    apart = [found for found in answers if np.isfinite(found.spread_m)]
+    if apart:
+        best = max(apart, key=_rank)
+        checked = checks.repeated(best.way, best.candidate, best.spread_m)
+        yield _checked(best.way, checked)
+
+
+def _rank(found: Found) -> tuple[bool, int, bool, float]:
+    """Return the rank of an answer, larger if better: settled, by its doubts, by a given start, by its score."""
+    few_doubts = -len(found.verdict.reasons)
+    return found.settled, few_doubts, found.way == "given", found.candidate.evidence.score

@@ -147,10 +147,39 @@ def test_where_few_points_lead_apart_more_points_decide(monkeypatch, clouds, ans
     rough = Candidate(
         np.eye(4), rigid(np.eye(3), [0.05, 0.0, 0.0]) @ T_TRUE, 0.3, "p2q", answer.candidate.evidence
     )
-    checked = checks("given", rough, [rough])
+    doubtful = checks("given", rough, [rough])
+    assert not doubtful.settled
+    assert doubtful.spread_m == pytest.approx(0.05, abs=0.01)
+    checked = checks.repeated("given", rough, doubtful.spread_m)
     assert checked.settled
     assert checked.spread_m < 0.01
     assert point_error_m(checked.candidate.T_target_source, T_TRUE, source.points_m) < 0.01
+
+
+@pytest.mark.parametrize(("apart_with_more_m", "word"), [(0.001, "sure"), (1.0, "doubtful")])
+def test_of_answers_whose_draws_disagree_only_the_best_is_repeated_with_more_points(
+    monkeypatch, clouds, apart_with_more_m, word
+):
+    """With so many points a registration takes a second; each gate of each start has an answer."""
+    few, repeated = doubts.QUICK_POINTS, []
+
+    def spread_m(checks, answer, points=few):
+        return 1.0 if points == few else apart_with_more_m
+
+    def again(checks, answer, seed, points):
+        repeated.append(points)
+        return answer.T_target_source
+
+    monkeypatch.setattr(Checks, "_spread_m", spread_m)
+    monkeypatch.setattr(Checks, "_again", again)
+    monkeypatch.setattr(doubts, "QUICK_POINTS", 500)
+    monkeypatch.setattr(doubts, "MORE_POINTS", (1000, 1500))
+    found = found_from(*clouds)
+    assert len(found.tried) > 1
+    assert repeated == ([1000] if word == "sure" else [1000, 1500])
+    assert (found.verdict.word, found.settled) == (word, word == "sure")
+    assert found.spread_m == apart_with_more_m
+    assert error_m(found, clouds[0]) < 0.01
 
 
 def test_more_points_replace_no_answer_whose_evidence_was_better(monkeypatch, clouds, answer):
