@@ -39,13 +39,14 @@ from app.session.session import Session
 from app.web import viser_private as private
 from app.web.crowd import MOST_OF_ONE_ADDRESS, MOST_SESSIONS, Crowd, Visitor
 from app.web.door import Door
-from app.web.entrance import Entrance, Token, is_loopback
+from app.web.entrance import Entrance, Token, is_loopback, is_unspecified
 from app.web.gate import Gate
 from app.web.headers import strict_headers
 from app.web.names import allowed_names
 from app.web.origin import only_own_page, well_formed
 from app.web.own_folder import OwnFolder, own_folder
 from app.web.page import Page
+from app.web.silent import limit_silent
 from app.web.uploads import Uploads
 from app.window.teaching import Teaching
 from app.window.ui import Target
@@ -56,15 +57,13 @@ from pipeline.config import PRESETS, PipelineConfig
 from pipeline.sources import Demo, Recorded, RigFolder, demo_of
 
 PANEL_WIDTH_PX = 440
-ANYWHERE = "0.0.0.0"
-"""Host that stands for all addresses of this machine."""
+PROBES = {socket.AF_INET: ("192.0.2.1", "127.0.0.1"), socket.AF_INET6: ("2001:db8::1", "::1")}
+"""An address of another network, which no machine has, and this machine's loopback address, by family."""
 FULL = (
     f"This server takes at most {MOST_SESSIONS} browsers, {MOST_OF_ONE_ADDRESS} from one address, each "
     "with its own reconstruction, and all places are taken. You get in automatically as soon as one is "
     "free. With `packetmesh serve --lecture` all browsers share one reconstruction."
 )
-TRY_AGAIN = 1013
-"""Websocket close code after which a page tries again to connect."""
 PANELS = (ScenePanel, CalibratePanel, DepthPanel, FusePanel, SurfacePanel, NetworkPanel, ExportPanel)
 """Panels of the app's screens, in their order."""
 
@@ -86,7 +85,7 @@ class AppServer:
     @property
     def url(self) -> str:
         """Address for browsers on this machine."""
-        return self._at(lambda: "127.0.0.1")
+        return self._at(lambda family: PROBES[family][1])
 
     @property
     def link(self) -> str:
@@ -108,9 +107,11 @@ class AppServer:
         """Owners of the pool's jobs: the sessions, and this server for the jobs before the first session."""
         return [self, *(owner for session in list(self.sessions.values()) for owner in session.owners)]
 
-    def _at(self, anywhere: Callable[[], str]) -> str:
+    def _at(self, of_all: Callable[[socket.AddressFamily], str]) -> str:
+        """Return the address of the server; ``of_all`` names one address if it listens on all of a family."""
         host, port = self.viser_server.get_host(), self.viser_server.get_port()
-        return f"http://{anywhere() if host == ANYWHERE else host}:{port}"
+        name = of_all(_family(host)) if is_unspecified(host) else host
+        return f"http://{f'[{name}]' if ':' in name else name}:{port}"
 
     def stop(self) -> None:
         """Stop all sessions and processes and delete the server's folder."""
@@ -171,6 +172,7 @@ def build_server(
     door = Door()
     server = _listening(host, port, door, entrance, page, allowed)
     gate = Gate(server)
+    limit_silent(server)
     app = AppServer(server, pool, folder, entrance=entrance)
     if port and server.get_port() != port:
         app.stop()
@@ -274,7 +276,9 @@ def _let_in(app: AppServer, gate: Gate, begin: Callable[[Target, int], Session])
                 private.address_of(server, number),
                 begin=lambda: start(client),
                 wait=lambda: wait(client),
-                turn_away=lambda: private.close(server, number, TRY_AGAIN, "no room, or no page is shown"),
+                turn_away=lambda: private.close(
+                    server, number, private.TRY_AGAIN, "no room, or no page is shown"
+                ),
                 shows_page=lambda: gate.shows_page(number),
             )
         )
@@ -312,18 +316,23 @@ def _source(scene: str) -> Demo | RigFolder | Recorded:
     return RigFolder(str(place.resolve())) if place.is_dir() else Demo(scene)
 
 
-def own_address() -> str:
+def own_address(family: socket.AddressFamily) -> str:
     """Return the address at which the network's other machines reach this one; loopback if it has none."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.connect(("192.0.2.1", 9))  # sends nothing, but finds the route
+    elsewhere, loopback = PROBES[family]
+    try:
+        with socket.socket(family, socket.SOCK_DGRAM) as probe:
+            probe.connect((elsewhere, 9))  # sends nothing, but finds the route
             return str(probe.getsockname()[0])
-        except OSError:
-            return "127.0.0.1"
+    except OSError:
+        return loopback
+
+
+def _family(host: str) -> socket.AddressFamily:
+    return socket.AF_INET6 if ":" in host else socket.AF_INET
 
 
 def _check_address(host: str, port: int) -> None:
-    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
+    with socket.socket(_family(host)) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((host, port))

@@ -9,7 +9,6 @@ that the server has not acknowledged: of several changes within 50 ms viser send
 from __future__ import annotations
 
 import base64
-import json
 import math
 import time
 import uuid
@@ -21,6 +20,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from app.dock.messages import actions_in, is_number
 from app.dock.ticker import Ticker
 from app.drawing.timeline import Lane
 from app.web.markup import Markup
@@ -219,18 +219,18 @@ class Dock:
 
     def _on_message(self) -> None:
         """Apply the page's actions that were not applied yet."""
-        try:
-            message = json.loads(self._field.value)
-            page, actions = str(message["page"]), list(message["actions"])
-        except (ValueError, KeyError, TypeError):
+        page, actions = actions_in(self._field.value)
+        if not actions:
             return
         self._last_applied[page] = self._last_applied.pop(page, 0)
         while len(self._last_applied) > PAGES:
             del self._last_applied[next(iter(self._last_applied))]
-        for number, name, *arguments in actions:
+        for number, name, arguments in actions:
             if number > self._last_applied[page] and name in ACTIONS:
                 self._last_applied[page] = number
-                ACTIONS[name](self, *arguments)
+                apply, count = ACTIONS[name]
+                if len(arguments) == count and all(map(is_number, arguments)):
+                    apply(self, *arguments)
         self._send_state()
         self._ui.flush()
 
@@ -345,22 +345,24 @@ def _looks(lane: Lane) -> dict[str, Any]:
     }
 
 
-ACTIONS: dict[str, Callable[..., None]] = {
-    "toggle": Dock._toggle,
-    "step": Dock.step,
-    "seek": lambda dock, t_ns: dock.seek(round(t_ns)),
-    "faster": Dock._faster,
-    "loop": Dock._loop,
-    "look": Dock._look,
-    "point": Dock._point,
-    "click": Dock._click,
+ACTIONS: dict[str, tuple[Callable[..., None], int]] = {
+    "toggle": (Dock._toggle, 0),
+    "step": (Dock.step, 1),
+    "seek": (lambda dock, t_ns: dock.seek(round(t_ns)), 1),
+    "faster": (Dock._faster, 1),
+    "loop": (Dock._loop, 0),
+    "look": (Dock._look, 3),
+    "point": (lambda dock, lane, *place: dock._point(int(lane), *place), 4),
+    "click": (lambda dock, lane, *place: dock._click(int(lane), *place), 4),
 }
-"""Actions by the names that the page uses."""
+"""Actions by the names that the page uses, each with the count of its arguments, which are numbers."""
 
 
 def speed_text(speed: float) -> str:
     """Return the simulated seconds per second as text: ×4, ×1/50."""
-    return f"×{speed:.3g}" if speed >= 1.0 else f"×1/{1.0 / speed:.3g}"
+    factor = max(speed, 1.0 / speed)
+    number = f"{factor:,.0f}" if factor >= 1000.0 else f"{factor:.3g}"
+    return f"×{number}" if speed >= 1.0 else f"×1/{number}"
 
 
 def time_text(t_ns: int) -> str:

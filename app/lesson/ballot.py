@@ -28,8 +28,8 @@ class Ballot:
     title: str
     question: Question
     """The question as it is shown."""
-    votes: dict[int, int] = field(default_factory=dict)
-    """The last choice of each voter, by the voter's number; the first choice is 0."""
+    votes: dict[str, int] = field(default_factory=dict)
+    """The last choice of each voter, by the voter's id; the first choice is 0."""
     teacher: int | None = None
     """The teacher's choice; None if the teacher has not answered, or skipped."""
 

@@ -238,7 +238,7 @@ class LessonFolder(Generic[Look]):
             self._write()
             self._poll()
 
-    def _voted(self, voter: int, vote: int) -> None:
+    def _voted(self, voter: str, vote: int) -> None:
         """Count a vote of the class (1: the first choice). A voter's last vote before the answer counts."""
         ballot = self._open.get(self._index())
         if self._waits() and ballot is not None:
@@ -293,8 +293,9 @@ class LessonFolder(Generic[Look]):
 
     def _filled(self, text: str, index: int, fill: Callable[..., Text]) -> Text:
         """Replace the text's fields by the numbers of this stop, or those stored at another stop in the same
-        scene. Clauses about stops that the user has not visited are left out. ``fill`` returns its text with
-        each match of a pattern replaced.
+        scene; while this stop's numbers are computed, the scene may be another one, and all are to come.
+        Clauses about stops that the user has not visited are left out. ``fill`` returns its text with each
+        match of a pattern replaced.
         """
         now = self._numbers()
         if now:
@@ -308,7 +309,7 @@ class LessonFolder(Generic[Look]):
         def value(found: re.Match[str]) -> str:
             if found[2] is None:
                 return found[0]  # shown as text
-            known = self._known[int(found[1]) - 1] if found[1] else now
+            known = self._known[int(found[1]) - 1] if found[1] and now else now
             return known.get(found[2], TO_COME)
 
         return fill(CLAUSE.sub(clause, text), REPLACED, value)

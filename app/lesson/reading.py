@@ -258,8 +258,8 @@ def _check_fields(sections: Sequence[Lines], kind: Kind[Look], faults: _Faults) 
                 example = kind.numbers[0] if kind.numbers else "name"
                 faults.add(
                     number,
-                    f"has a brace that belongs to no field; write a number as {{{example}}}, a clause with a "
-                    f"number of another stop as {{{{… {{1:{example}}} …}}}}, and no other braces",
+                    f"has a brace that is not part of a field; write a number as {{{example}}}, a clause "
+                    f"with a number of another stop as {{{{… {{1:{example}}} …}}}}, and no other braces",
                 )
 
 
@@ -339,7 +339,14 @@ def _question(
         )
         return None
     line, written = parts["choices"]
-    _, *items = _MARK.split(written)
+    before, *items = _MARK.split(written)
+    if items and before.strip():
+        faults.add(
+            line,
+            f"{where} has '{' '.join(before.split())[:40]}' before the first choice; move it to 'ask:', or "
+            "begin its line with '- [x] ' or '- [ ] '",
+        )
+        return None
     marks, texts = items[::2], [" ".join(item.split()) for item in items[1::2]]
     whens = [(name, word) if word else None for name, _, word in (mark.partition("=") for mark in marks)]
     computed = [when for when in whens if when is not None]

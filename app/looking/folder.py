@@ -47,7 +47,7 @@ class LookFolder:
         self._source = session.spec.source
         self._known: tuple[object, Room] | None = None
         self._sent = 0
-        self._handles = CutHandles(session.ui.scene, f"{below}/look", self._grabbed)
+        self._handles = CutHandles(session.ui.scene, f"{below}/look", session.ui.post, self._dragged)
         self._mark = session.ui.gui.add_html(Markup(""))  # outside the folder, which may be closed
         with session.ui.gui.add_folder("Look", expand_by_default=False):
             self._add_cut()
@@ -57,7 +57,7 @@ class LookFolder:
     def _add_cut(self) -> None:
         ui, hints = self._session.ui, labels.HINTS
         ui.gui.add_markdown(labels.TEXT)
-        self._cut = ui.gui.add_dropdown("Leave out", list(labels.CUTS), hint=hints["cut"])
+        self._cut = ui.gui.add_dropdown("Cut away", list(labels.CUTS), hint=hints["cut"])
         self._note = ui.gui.add_markdown(Markdown(""), visible=False)
         self._height = ui.gui.add_slider("Height (m)", 0.0, 3.0, STEP_M, 3.0, hint=hints["height"])
         facings = {
@@ -65,7 +65,7 @@ class LookFolder:
         }
         self._plane = ui.buttons("Plane", facings, hints["plane"], visible=False)
         self._turn = ui.gui.add_slider("Turn (°)", -90, 90, 1, 0, hint=hints["turn"])
-        self._inside = ui.gui.add_checkbox("Leave out the inside", False, hint=hints["inside"])
+        self._inside = ui.gui.add_checkbox("Cut away the inside", False, hint=hints["inside"])
         ui.when_changed(self._cut, self._picked)
         for handle in (self._height, self._turn, self._inside):
             ui.when_changed(handle, self._set)
@@ -172,9 +172,6 @@ class LookFolder:
         return (0.0, 1.0, 0.0)
 
     # Changes by the handles.
-
-    def _grabbed(self, cut: Cut, ended: bool) -> None:
-        self._session.ui.post(self._dragged, cut, ended)
 
     def _dragged(self, cut: Cut, ended: bool) -> None:
         if type(cut) is not type(self._look.cut):

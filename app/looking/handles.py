@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,9 +30,22 @@ _SQUARE = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0,
 class CutHandles:
     """The handles that move a cut, as children of a scene node; the page's script reads their poses."""
 
-    def __init__(self, scene: viser.SceneApi, below: str, on_drag: Callable[[Cut, bool], object]) -> None:
-        """Draw nothing yet; ``on_drag`` gets the cut and whether the drag has ended."""
-        self._scene, self._below, self._on_drag = scene, below, on_drag
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        below: str,
+        post: Callable[..., None],
+        on_drag: Callable[[Cut, bool], object],
+    ) -> None:
+        """Draw nothing yet.
+
+        Args:
+            scene: the scene.
+            below: name of the node that gets the handles.
+            post: runs a function on the session's thread, on which all methods run.
+            on_drag: called with the dragged cut and whether the drag has ended.
+        """
+        self._scene, self._below, self._post, self._on_drag = scene, below, post, on_drag
         self._cut: Cut = None
         self._frame: viser.FrameHandle | None = None
         self._grips: list[viser.TransformControlsHandle] = []
@@ -86,7 +100,7 @@ class CutHandles:
                 disable_rotations=not turns,
                 depth_test=False,
             )
-            grip.on_update(self._dragging(row))
+            grip.on_update(partial(self._grabbed, row, grip))
             self._grips.append(grip)
         self._outline = scene.add_line_segments(
             f"{self._below if isinstance(cut, Box) else self._grips[0].name}/outline",
@@ -115,17 +129,30 @@ class CutHandles:
         corners_m = middle_m + _CORNERS * size_m
         self._outline.points = np.array([[corners_m[a], corners_m[b]] for a, b in _EDGES], np.float32)
 
-    def _dragging(self, row: int) -> Callable[[Any], object]:
-        return lambda event: self._on_drag(self._dragged(row), event.phase == "end")
+    def _grabbed(self, row: int, grip: viser.TransformControlsHandle, event: Any) -> None:
+        """Note the pose of a dragged handle, on the thread of the browser's messages."""
+        pose = np.array(grip.position, float), np.array(grip.wxyz, float)
+        self._post(self._dragged, row, grip, *pose, event.phase == "end")
 
-    def _dragged(self, row: int) -> Cut:
-        """Return the cut moved to the dragged handle ``row``; None if there is no cut."""
-        cut, grip = self._cut, self._grips[row]
-        at_m = np.asarray(grip.position, float)
+    def _dragged(
+        self,
+        row: int,
+        grip: viser.TransformControlsHandle,
+        at_m: FloatArray,
+        wxyz: FloatArray,
+        ended: bool,
+    ) -> None:
+        """Report the cut moved to the dragged handle, unless other handles have replaced it meanwhile."""
+        if grip in self._grips:
+            self._on_drag(self._moved(row, at_m, wxyz), ended)
+
+    def _moved(self, row: int, at_m: FloatArray, wxyz: FloatArray) -> Cut:
+        """Return the cut moved to a handle's (3,) position and (4,) quaternion; None if there is no cut."""
+        cut = self._cut
         if isinstance(cut, Top):
             return Top(float(at_m[2]))
         if isinstance(cut, Plane):
-            return Plane(_place(at_m), _place(turned(grip.wxyz)[:, 2]))
+            return Plane(_place(at_m), _place(turned(wxyz)[:, 2]))
         if isinstance(cut, Box) and self._frame is not None:
             frame_m = box_axes(cut) @ np.asarray(self._frame.position)
             return with_face(cut, row, float((frame_m + at_m)[row // 2]))

@@ -14,19 +14,19 @@ TEXT = Markdown(
     "This changes only the view and pictures of it: what is measured, and all other files, have everything."
 )
 HINTS = {
-    "cut": "What is left out of the picture. Drag the arrows and rings in the picture to move the cut.",
-    "height": "What is above this height is left out.",
-    "plane": "Turn the plane: across the x or y axis, level, or across the view, with its front left out. "
-    "Flip keeps the other side.",
+    "cut": "What is cut away from the picture. Drag the arrows and rings in the picture to move the cut.",
+    "height": "What is above this height is cut away.",
+    "plane": "Turn the plane: across the x or y axis, level, or across the view, with its front cut "
+    "away. Flip keeps the other side.",
     "turn": "Turn of the box about the vertical.",
-    "inside": "Leave out what is in the box, and keep what is around it.",
+    "inside": "Cut away what is in the box, and keep what is around it.",
     "draw": "Wireframe: the edges of the triangles. Light by hand: surfaces in the light of a lamp; a "
     "photograph's own light stays in its colours.",
     "light": "Where the light comes from: the direction seen from above, from the x axis towards the y axis, "
     "and the height above the horizon.",
     "points": "Diameter of all points; 0 leaves them as they are.",
-    "ruler": "A scale bar for the distance at which the view turns, and the directions of the world's axes. "
-    "Lengths are the reconstruction's own, without a scale set under Measure.",
+    "ruler": "A scale bar, valid at the distance of the point about which the view turns, and the directions "
+    "of the world's axes. Lengths are the reconstruction's own, without a scale set under Measure.",
 }
 
 
@@ -44,4 +44,4 @@ def top_text(room: Room | None) -> Markdown:
             "The cameras saw no ceiling: above them is no level surface of 1 m² or more. Lower the height "
             "to cut off more."
         )
-    return Markdown("Cut off 10 cm below the ceiling that the cameras saw.")
+    return Markdown("The cameras saw a ceiling; the cut starts 10 cm below it.")

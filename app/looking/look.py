@@ -107,4 +107,6 @@ def _is_direction(azimuth_deg: int, height_deg: int) -> bool:
 
 
 def _wrong(text: str) -> InputError:
-    return InputError(f"The address has look={text[:40]}, which is no look; try one such as {EXAMPLE}")
+    return InputError(
+        f"The address has look={text[:40]}, which is not a valid display setting; try one such as {EXAMPLE}"
+    )

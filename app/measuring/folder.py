@@ -224,11 +224,15 @@ class MeasureFolder:
         return taken.name or KIND_NAMES[taken.kind].lower()
 
     def _choose_row(self, row: int) -> None:
+        self._mark_row(row)
+        self._choose()
+
+    def _mark_row(self, row: int) -> None:
+        """Show the measures' names, and which one is chosen."""
         names = self._names()
         self._chosen.options = names or [NONE]
         if names:
             self._chosen.value = names[min(row, len(names) - 1)]
-        self._choose()
 
     def _choose(self) -> None:
         row, scale = self._row, self._tape.scale
@@ -249,7 +253,9 @@ class MeasureFolder:
         if not fits(tape):
             raise InputError("The address has no room for this name; take a shorter one")
         self._take_tape(tape)
-        self._choose_row(row)
+        self._mark_row(row)
+        self._name.value = taken[row].name
+        self._show()
 
     def _delete(self) -> None:
         row = self._row
@@ -265,7 +271,8 @@ class MeasureFolder:
         row = self._row
         if row is None or not self._true.value:
             return None
-        check = Scale(self._tape.taken[row].unnamed, self._true.value / 100.0)
+        true_m = round(self._true.value / 100.0, 4)  # tenths of a millimetre, as in the address
+        check = Scale(self._tape.taken[row].unnamed, true_m)
         return None if check == self._tape.scale else check
 
     def _set_scale(self) -> None:

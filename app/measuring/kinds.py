@@ -44,13 +44,13 @@ _STEPS: Mapping[Kind, tuple[Step, ...]] = {
         Step("point", "Click the second end."),
     ),
     "hole": (Step("rim", "Click a hole or its rim."),),
-    "box": (Step("part", "Click a thing that stands on a plane."),),
+    "box": (Step("part", "Click an object that stands on a plane."),),
 }
 _OF_PLANES: Mapping[Kind, tuple[Step, ...]] = {"angle": _PLANES[:2], "box": _PLANES}
 """Clicks of the kinds that *Snap to: Plane* turns into measures between planes."""
 SNAPPED: Mapping[Kind, str] = {
     "angle": "With Snap to: Plane, two planes give their angle.",
-    "box": "With Snap to: Plane, three of its faces give its size.",
+    "box": "With Snap to: Plane, three faces of the object give its size.",
 }
 """Sentences on what *Snap to: Plane* changes, by kind."""
 

@@ -13,9 +13,9 @@ from app.window.tables import WAITING, table
 from pipeline.measuring.values import HELD, HELD_IN_SHORT
 
 TEXT = Markdown(
-    """Turn on **Clicks measure** and click in the picture. Every number has an interval, computed for 95 %:
-half of it after ±, or both ends. {}. **Violet** is *guessed*: an end is on surface that the network
-inferred, and the interval has the odds of such guesses."""
+    """Turn on **Clicks measure** and click in the picture. Every number has a 95 % interval, written as
+± half its width or as its two ends. {}. **Violet** is *guessed*: an end is on surface that the network
+inferred, and the interval includes the usual error of such guesses."""
 ).format(HELD_IN_SHORT)
 OFF = Markdown("Clicks do not measure now.")
 NOTHING_YET = Markdown("There is nothing to measure yet.")

@@ -43,7 +43,7 @@ from pipeline.measuring.planes import Plane, rectangle
 from pipeline.measuring.surface import MeasuredSurface
 from pipeline.types import FloatArray
 
-CUT_OFF = "Only what Look leaves out is under the pointer; click on the surface, or set Leave out to Nothing"
+CUT_OFF = "Only what Look cuts away is under the pointer; click on the surface, or set Cut away to Nothing"
 NO_HOLE = "There is no hole at the click; click a red rim, or into a hole"
 EXTENT = (2.0, 98.0)
 """Percentiles of a plane's vertices between which it is drawn."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from app.compute.measures import Quantity
 from app.drawing.colors import INFERRED, css
-from app.drawing.quantities import quantity_text, short_text
+from app.drawing.quantities import quantity_text
 from app.reports.html import table
 from app.web.markup import Markup
 from pipeline.measuring.values import HELD
@@ -22,9 +22,9 @@ def measured_sections(measures: dict[str, Any]) -> Iterator[Markup]:
         "click, the scale and, but for boxes and holes, the poses of the nodes. {}. {}.</p>"
     ).format(measures["scale"].rstrip("."), HELD)
     if measures["scaled_by"] is not None:
-        yield Markup("<p><b>All lengths are scaled by {}, by a true length that was typed.</b></p>").format(
-            f"{measures['scaled_by']:.4f}"
-        )
+        yield Markup(
+            "<p><b>All lengths are multiplied by {}, from a true length that was entered.</b></p>"
+        ).format(f"{measures['scaled_by']:.4f}")
 
 
 def measured_sentence(measures: dict[str, Any]) -> str:
@@ -33,7 +33,7 @@ def measured_sentence(measures: dict[str, Any]) -> str:
     for one in measures["measures"]:
         values = [_quantity(value) for value in one["values"]]
         guessed = " (guessed)" if any(value.guessed for value in values) else ""
-        texts += [f"{one['name']} {short_text(values)}{guessed}"] if values else []
+        texts += [f"{one['name']} {', '.join(_lines(values))}{guessed}"] if values else []
     return f"Measured, with 95 % intervals: {'; '.join(texts)}." if texts else ""
 
 
@@ -42,12 +42,16 @@ def _row(one: dict[str, Any]) -> tuple[str, str, str]:
     if one["trouble"]:
         return one["name"], kind, one["trouble"]
     values = [_quantity(value) for value in one["values"]]
-    named = len(values) > 1
-    lines = [f"{value.name} {quantity_text(value)}" if named else quantity_text(value) for value in values]
-    text = Markup("<br>").join(lines)
+    text = Markup("<br>").join(_lines(values))
     if any(value.guessed for value in values):
         text = Markup('{}<br><b style="color: {}">● guessed</b>').format(text, css(INFERRED))
     return one["name"], kind, text
+
+
+def _lines(values: list[Quantity]) -> list[str]:
+    """Return each number with its interval, and with its name if there are several."""
+    named = len(values) > 1
+    return [f"{value.name} {quantity_text(value)}" if named else quantity_text(value) for value in values]
 
 
 def _quantity(value: dict[str, Any]) -> Quantity:

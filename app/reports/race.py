@@ -28,6 +28,8 @@ class RaceRun:
     """(K, 4, 4) T_world_source."""
     offs_cm: FloatArray
     """(K,) error, centimetres; NaN if unknown."""
+    offs: tuple[str, ...]
+    """(K,) the same as texts."""
     notes: tuple[str, ...]
     """(K,) status texts."""
     arrived: bool | None
@@ -100,6 +102,7 @@ def race_page(race: RaceShow) -> Markup:
                 "color": css(run.color),
                 "poses": [pose.T.ravel().tolist() for pose in run.poses],
                 "offs_cm": [float(off) if np.isfinite(off) else None for off in run.offs_cm],
+                "offs": run.offs,
                 "notes": run.notes,
                 "arrived": run.arrived,
                 "lens": [len(points) for points in run.lens],

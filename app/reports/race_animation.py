@@ -57,16 +57,10 @@ def _head(pen: ImageDraw.ImageDraw, run: RaceRun, row: int, left: int, wide: int
     """Draw name, number and status."""
     pen.rectangle((left, _TITLE_PX, left + wide, _TITLE_PX + 5), run.color)
     pen.text((left + EDGE_PX, _TITLE_PX + 18), run.name, INK, font(17), anchor="lm")
-    number = off_text(float(run.offs_cm[row]))
-    pen.text((left + EDGE_PX, _TITLE_PX + 50), number, INK, font(38), anchor="lm")
+    pen.text((left + EDGE_PX, _TITLE_PX + 50), run.offs[row], INK, font(38), anchor="lm")
     ended = row == len(run.poses) - 1 and run.arrived is not None
     color = (DELIVERED if run.arrived else LOSS) if ended else SOFT
     pen.text((left + EDGE_PX, _TITLE_PX + 82), run.notes[row], color, font(15), anchor="lm")
-
-
-def off_text(off_cm: float) -> str:
-    """Return the error as text."""
-    return "–" if not np.isfinite(off_cm) else f"{off_cm:.{2 if off_cm < 1.0 else 1}f} cm"
 
 
 def _clouds(race: RaceShow, run: RaceRun, row: int, camera: Camera) -> ByteArray:

@@ -23,7 +23,6 @@ const POINT_M = 0.012, PLAY_S = 10, MOST_STEP_S = 0.5, DOT_CM = 0.35, RULER_CM =
 const CURVE_PX = [66, 18]; // space left and right of the curves
 const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 const rgbOf = css => [1, 3, 5].map(at => parseInt(css.slice(at, at + 2), 16) / 255);
-const offText = cm => cm === null ? "–" : `${cm.toFixed(cm < 1 ? 2 : 1)} cm`;
 
 class Clouds extends View {
   constructor(canvas, record, rooms, {source, target, shades}) {
@@ -168,7 +167,7 @@ class Race {
     find("scrub").value = find("now").textContent = this.now;
     this.lanes.forEach((lane, index) => {
       const {run} = lane, row = this.clouds.rows[index] = Math.min(this.now, run.poses.length - 1);
-      lane.number.textContent = offText(run.offs_cm[row]);
+      lane.number.textContent = run.offs[row];
       lane.note.textContent = run.notes[row];
       const ended = row === run.poses.length - 1 && run.arrived !== null;
       lane.lane.dataset.state = !ended ? "running" : run.arrived ? "arrived" : "missed";

@@ -94,8 +94,12 @@ class History:
         self._first = self._now = self._read()
 
     def accept(self) -> None:
-        """Take the present state without recording a step, because a link has opened it."""
-        self._now = self._read()
+        """Take the present state without recording a step, because a link has opened it.
+
+        After a step of the user it was not opened: the browser's *Back* is a step like others.
+        """
+        if not any(self.has_steps):
+            self._now = self._read()
 
     def follow(self, by_hand: bool) -> None:
         """Record a step if a user has changed the settings (``by_hand``); a result's change is no step."""
@@ -170,7 +174,7 @@ class History:
                 try:
                     parts[name].take(text)
                 except InputError as error:  # such as a choice that its scene alone has
-                    session.notify("Part of it could not be undone", str(error))
+                    session.notify("Part of the change could not be restored", str(error))
         session.want(_with(session.spec, settings))
         self._now = self._read()
 

@@ -1,6 +1,7 @@
 // A student's page: messages for the student, votes, and whether the view is the teacher's or the student's.
 window.packetmeshLecture = (() => {
   const REFUSED_MS = 4000;
+  const VOTER = "packetmesh-voter"; // key of the browser's id
   let name = null; // name of the seat's hidden field
   let said = 0;
   let refused = 0; // timer that removes the refusal message
@@ -26,12 +27,21 @@ window.packetmeshLecture = (() => {
     say(follows ? "follow" : "roam");
   }
 
+  // The browser's random id, which it keeps: a student who reloads the page still has one vote.
+  function voter() {
+    if (localStorage.getItem(VOTER) === null) {
+      const bytes = [...crypto.getRandomValues(new Uint8Array(16))];
+      localStorage.setItem(VOTER, bytes.map(byte => byte.toString(16).padStart(2, "0")).join(""));
+    }
+    return localStorage.getItem(VOTER);
+  }
+
   // Take a choice in the lesson as a vote. Returns false if no vote is open.
   function cast(vote) {
     if (!state.asks || ![1, 2, 3].includes(vote)) return false;
     state.vote = vote;
     draw();
-    say(`vote ${vote}`);
+    say(`vote ${vote} ${voter()}`);
     return true;
   }
 

@@ -29,8 +29,10 @@ from app.window.page import page_call
 from app.window.ui import Count, Ui
 from pipeline.types import ByteArray
 
-STUDENT_MESSAGE = re.compile(r"\d+ (?:(follow)|(roam)|vote ([123]))")
-"""A message of a student's page: its number, which makes equal messages differ, and its content."""
+STUDENT_MESSAGE = re.compile(r"\d+ (?:(follow)|(roam)|vote ([123]) ([0-9a-f]{32}))")
+"""A message of a student's page: its number, which makes equal messages differ, and its content; a vote has
+the random id that the browser keeps, because every reload is a new connection.
+"""
 UNREACHED = Markup(
     "<b>No other machine reaches this address.</b> Stop the lecture and start it again with <code>--host "
     "0.0.0.0</code>; then the class can open its address."
@@ -47,6 +49,8 @@ class _Seat:
     follows: bool = True
     vote: int = 0
     """The vote, 1 to 3; 0 for none."""
+    voter: str = ""
+    """Id of its browser, from the first vote of this connection, which has one vote."""
     call: Callable[..., None] = lambda *_: None
     """Calls a function of the seat's page: its name, then its arguments."""
     show_size: Callable[[Markdown], None] = lambda _: None
@@ -231,9 +235,9 @@ class Lecture:
             message = STUDENT_MESSAGE.fullmatch(field.value)
             if message is None:
                 return
-            follow, _, vote = message.groups()
+            follow, _, vote, voter = message.groups()
             if vote is not None:
-                self._vote(seat, int(vote))
+                self._vote(seat, int(vote), voter)
                 return
             seat.follows = follow is not None
             if seat.follows:
@@ -258,10 +262,10 @@ class Lecture:
         }
         seat.call("showSeat", state)
 
-    def _vote(self, seat: _Seat, vote: int) -> None:
+    def _vote(self, seat: _Seat, vote: int, voter: str) -> None:
         if self._count_vote is not None:
-            seat.vote = vote
-            self._count_vote(seat.client.client_id, vote)
+            seat.vote, seat.voter = vote, seat.voter or voter
+            self._count_vote(seat.voter, vote)
 
     # Who may use shared controls: called on the thread of the connections.
 

@@ -198,7 +198,9 @@ class OwnPalette:
         yield Entry("View from the next camera node", "View", self._look_from_next, KEYS["node"])
         yield Entry("View as opened", "View", looking.look_as_opened, KEYS["opened"])
         yield Entry("Fit the view to the window", "View", looking.fit, KEYS["fit"])
-        yield Entry("Full screen: the stage alone", "View", partial(self._call, "standAlone"), KEYS["alone"])
+        yield Entry(
+            "Full screen: only the 3-D picture", "View", partial(self._call, "standAlone"), KEYS["alone"]
+        )
         yield Entry(
             "Picture of the view, at twice its size", "View, PNG file", self._picture.take, KEYS["picture"]
         )

@@ -92,4 +92,4 @@ def _fail() -> None:
     Raises:
         InputError: always; the session shows it.
     """
-    raise InputError("The browser delivered no picture of the view; try again, or make the window smaller.")
+    raise InputError("The browser sent no picture of the view; try again, or make the window smaller.")

@@ -97,6 +97,7 @@ class Crowd:
                 pass  # it continues to build
             except Exception:  # the failure may concern only this one
                 logger.exception("a session could not begin")
+                visitor.turn_away()
         with self._lock:
             waiting = [one for one in self._waiting.values() if not one.shows_waiting]
         for one in waiting:

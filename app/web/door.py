@@ -16,7 +16,7 @@ MOST_AT_ONCE, MOST_A_SECOND = 48.0, 4.0
 connects in one burst."""
 MOST_ADDRESSES = 10_000
 """Number of addresses above which those with a full allowance are forgotten."""
-NOT_NOW = "PacketMesh takes no more connections at this moment; the page tries again by itself.\n"
+NOT_NOW = "PacketMesh takes no more connections at this moment; the page tries again automatically.\n"
 
 
 @dataclass(slots=True)

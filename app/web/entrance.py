@@ -98,3 +98,11 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return urlsplit(f"//{host}").hostname == "localhost"
+
+
+def is_unspecified(host: str) -> bool:
+    """Whether a listening host stands for all addresses of this machine: 0.0.0.0 for IPv4, :: for IPv6."""
+    try:
+        return ipaddress.ip_address(host).is_unspecified
+    except ValueError:
+        return False

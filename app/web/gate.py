@@ -38,7 +38,7 @@ PNG = b"\x89PNG\r\n\x1a\n"
 MOST_FORGED = 60
 """Number of messages that no page sends after which the connection is closed."""
 MOST_AT_ONCE, MOST_A_SECOND = 1000.0, 200.0
-"""Messages other than parts of files: the largest burst, and the rate per second after it."""
+"""Messages other than parts of accepted files: the largest burst, and the rate per second after it."""
 FLOOD, FORGED_CLOSE = "more than a hand can do", 1008
 
 logger = logging.getLogger(__name__)
@@ -84,7 +84,7 @@ class Gate:
         self.on_too_much: Callable[[int, str], None] = lambda *_: None
         """Called with the number of a browser that uploads too much, and a sentence for its user."""
         private.listen(server, self._on_message)
-        server.on_client_disconnect(lambda client: self._guests.pop(client.client_id, None))
+        private.on_closed(server, lambda number: self._guests.pop(number, None))
 
     def shows_page(self, number: int) -> bool:
         """Return whether a browser has sent a message that only a shown page sends."""
@@ -92,7 +92,8 @@ class Gate:
 
     async def _on_message(self, number: int, message: Any, go_on: Callable[[], Awaitable[None]]) -> None:
         guest = self._guests.setdefault(number, _Guest())
-        if not isinstance(message, messages.FileTransferPart) and not _within_rate(guest):
+        is_part = isinstance(message, messages.FileTransferPart)
+        if not (is_part and guest.uploads.awaits(message.transfer_uuid)) and not _within_rate(guest):
             self.dropped[FLOOD] += 1
             return
         rule = RULES.get(type(message), _judge_unknown)
@@ -154,8 +155,8 @@ class Gate:
         found = private.find_control(self._server, number, message.source_component_uuid)
         if found is None or not isinstance(found[0], viser.GuiUploadButtonHandle):
             return Verdict.FORGED
-        if not private.is_live(found[0]):
-            return Verdict.LATE
+        if not private.is_live(found[0]) or number not in self._server.get_clients():
+            return Verdict.LATE  # of a browser that sent no view, viser would keep the parts when it leaves
         if (touched := self._touch(number, found)) is not Verdict.PASSES:
             self.on_refused(number)
             return touched

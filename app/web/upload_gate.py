@@ -9,12 +9,12 @@ MOST_BYTES = 256 << 20
 """Largest file, bytes; screens may have lower limits."""
 MOST_TOTAL_BYTES = 1 << 30
 """Most bytes of all files of one connection."""
-MOST_PARTS = 10_000
-"""Most parts of a file."""
+LEAST_PART_BYTES = 64 << 10
+"""What each part of a file, and a file without parts, counts at least: the server keeps a record of it."""
 MOST_A_MINUTE = 300
 REFUSED = (
     f"The app takes files of up to {MOST_BYTES >> 20} MB, {MOST_TOTAL_BYTES >> 30} GB in all, and "
-    f"{MOST_A_MINUTE} a minute: reload the page to begin anew, or use the command line."
+    f"{MOST_A_MINUTE} a minute: reload the page to reset these limits, or use the command line."
 )
 
 
@@ -31,16 +31,23 @@ class UploadGate:
         """Whether a file of this size may be uploaded; an accepted file is counted at once."""
         now_s = time.monotonic()
         too_often = len(self._begun_s) == MOST_A_MINUTE and now_s - self._begun_s[0] < 60.0
-        too_much = not 0 <= size_bytes <= min(MOST_BYTES, MOST_TOTAL_BYTES - self._total)
-        if too_often or too_much or not 0 <= parts <= MOST_PARTS or transfer in self._left:
+        if too_often or parts < 0 or not 0 <= size_bytes <= MOST_BYTES or transfer in self._left:
+            return False
+        counted_bytes = max(size_bytes, LEAST_PART_BYTES * max(parts, 1))
+        if self._total + counted_bytes > MOST_TOTAL_BYTES:
             return False
         self._begun_s.append(now_s)
-        self._total += size_bytes
+        self._total += counted_bytes
         self._left[transfer] = size_bytes
         return True
 
+    def awaits(self, transfer: object) -> bool:
+        """Whether a transfer is that of an accepted file, of which there is no part too many yet."""
+        return isinstance(transfer, str) and self._left.get(transfer, -1) >= 0
+
     def goes_on(self, transfer: str, size_bytes: int) -> bool:
         """Whether a part belongs to an accepted file and keeps within the announced size."""
-        left = self._left.get(transfer, -1) - size_bytes
-        self._left[transfer] = left
-        return left >= 0
+        if transfer not in self._left:
+            return False
+        self._left[transfer] -= size_bytes
+        return self._left[transfer] >= 0

@@ -10,6 +10,8 @@ is a seventh of the time in which a session's panels are built.
 - ``call_in_order``: viser handles a browser's messages on any of 32 threads, so that on busy cores a click on
 *Reset* can be handled before the choice that it should undo.
 - ``listen``: viser gives every message of a browser to its handlers and has no hook before them.
+- ``on_opened``, ``on_closed``: viser reports a browser with its first view only, and not the end of a
+connection that sent none.
 - ``find_control``, ``find_command``, ``find_node``, ``is_live``, ``awaits_render``: the target of a message,
 and whether a user could reach it.
 - ``send_value``: the control of a browser whose change was refused shows the server's value again.
@@ -31,6 +33,8 @@ from viser._assignable_props_api import AssignablePropsBase
 
 Listener: TypeAlias = Callable[[int, Any, Callable[[], Awaitable[None]]], Awaitable[None]]
 """Takes the browser's number, its message, and a function that lets viser handle the message."""
+TRY_AGAIN = 1013
+"""Websocket close code after which a page tries again to connect."""
 
 
 class AnyThreadEvent(asyncio.Event):
@@ -103,6 +107,16 @@ def listen(server: viser.ViserServer, listener: Listener) -> None:
     setattr(server._websock_server, "_handle_incoming_message", on_message)  # noqa: B010
     server._websock_server.on_client_connect(connected)
     server._websock_server.on_client_disconnect(lambda connection: own.pop(connection.client_id, None))
+
+
+def on_opened(server: viser.ViserServer, call: Callable[[int], object]) -> None:
+    """Call a function on the thread of the connections with the number of each connection that opens."""
+    server._websock_server.on_client_connect(lambda connection: call(connection.client_id))
+
+
+def on_closed(server: viser.ViserServer, call: Callable[[int], object]) -> None:
+    """Call a function on the thread of the connections with the number of each connection that has closed."""
+    server._websock_server.on_client_disconnect(lambda connection: call(connection.client_id))
 
 
 def find_control(server: viser.ViserServer, number: int, uuid: str) -> tuple[Any, bool] | None:

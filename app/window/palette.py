@@ -70,19 +70,26 @@ class Palette:
         """Keep the panel; ``post`` runs a function on the session's thread."""
         self._gui, self._post = gui, post
         self._added: dict[tuple[str, str], Any] = {}
+        self._entries: dict[tuple[str, str], Entry] = {}
+        """The entries that are offered, by label and kind."""
 
     def offer(self, entries: Iterable[Entry]) -> None:
-        """Offer exactly these entries. One of a known label and kind keeps its place and its old action."""
-        named = {(entry.label, entry.kind): entry for entry in entries}
-        for name in [name for name in self._added if name not in named]:
+        """Offer exactly these entries. One of a known label and kind keeps its place, with the new action."""
+        self._entries = {(entry.label, entry.kind): entry for entry in entries}
+        for name in [name for name in self._added if name not in self._entries]:
             self._added.pop(name).remove()
-        for name, entry in named.items():
+        for name, entry in self._entries.items():
             if name not in self._added:
-                self._added[name] = self._add(entry)
+                self._added[name] = self._add(name, entry)
 
-    def _add(self, entry: Entry) -> Any:
+    def _add(self, name: tuple[str, str], entry: Entry) -> Any:
         letter, modifier = (None, None) if entry.key is None else (entry.key.letter, entry.key.modifier)
         label, kind = plain(entry.label), plain(entry.kind)
         command = self._gui.add_command(label, description=kind, hotkey=letter, modifier=modifier)
-        command.on_trigger(lambda _: self._post(entry.action))
+        command.on_trigger(lambda _: self._post(self._run, name))
         return command
+
+    def _run(self, name: tuple[str, str]) -> None:
+        """Run the newest action of an entry; nothing if it is no longer offered."""
+        if name in self._entries:
+            self._entries[name].action()

@@ -56,7 +56,7 @@ def row_html(undo: bool, redo: bool) -> Markup:
         _VIEWS.format(_icon("views")),
         _button("fit", "Fit the view to the window (V)"),
         _button("picture", "Picture of the view, at twice its size, as a PNG file (P)"),
-        _button("alone", "Full screen: the stage alone (M); Escape comes back"),
+        _button("alone", "Full screen: only the 3-D picture (M); Esc leaves it"),
     ]
     letters = "".join(key.name for key in KEYS.values() if key.modifier is None)
     return Markup('<div class="packetmesh-tools" data-letters="{}">{}{}</div>').format(

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 Input = TypeVar("Input", bound="viser.GuiInputHandle[Any]")
 Target: TypeAlias = "viser.ClientHandle | viser.ViserServer"
 """Where a session's controls and drawings go: one browser, or the server in a lecture."""
-Count: TypeAlias = Callable[[int, int], None]
-"""Counts a vote: takes the voter's number and the choice, which starts at 1."""
+Count: TypeAlias = Callable[[str, int], None]
+"""Counts a vote: takes the voter's id and the choice, which starts at 1."""
 
 
 class SharedBy(Protocol):

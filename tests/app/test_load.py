@@ -1,15 +1,18 @@
 """The load of many browsers: its figures, and turns in drawing."""
 
+import math
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import pytest
 
+from app.cli.bench import _browsers
 from app.compute.turns import Turns
 from app.load.connection import DRAWN_QUERY, OLD, Connection
 from app.load.load import Load
 from app.load.serving import Look
-from app.load.visitor import RADIUS_MM, Diary
+from app.load.visitor import RADIUS_MM, Diary, Visitor
 from app.screens.surface.settings import STEP_MM
 from app.window.page import page_call, stale_html
 from app.window.stepper import _style
@@ -40,6 +43,27 @@ def test_the_figures_of_a_load():
     assert (first["server_least_bytes"], first["server_bytes"]) == (100, 150)
     assert "100 s of computing ahead" in load.notes()[0]
     assert any("lost: 1 of 2" in note for note in load.notes())
+
+
+def test_a_load_test_without_any_answer_is_reported(monkeypatch):
+    lost = Diary(lost="TimeoutError: what was awaited did not come within 240 s")
+    load = Load((lost,), ((0.0, look()),), look(), look())
+    monkeypatch.setattr("app.load.load.soak", lambda seconds: load)
+    measured = _browsers("soak", 1.0)
+    assert math.isnan(measured.ours_s)
+    assert measured.runs[0]["lost"] == [lost.lost]
+    assert any("lost: 1 of 1" in note for note in measured.notes)
+
+
+def test_a_browser_that_is_lost_keeps_its_notices(monkeypatch):
+    page = SimpleNamespace(notices=[], lost=True, close=lambda: None, uuids={"Radius (mm)": ["1"]}, steps="?")
+    monkeypatch.setattr("app.load.visitor.Connection", lambda url: page)
+    monkeypatch.setattr("app.load.visitor.THINKING_S", 1e-3)
+    page.notices.append("Surface failed: out of memory")
+    visitor = Visitor("http://nowhere", 0)
+    visitor._thread.join(10.0)
+    assert visitor.diary.lost == "ConnectionError: the server ended the connection"
+    assert visitor.diary.notices == ["Surface failed: out of memory"]
 
 
 def test_one_draws_after_the_other_and_who_waits_goes_on_with_other_things():

@@ -109,6 +109,7 @@ def race(folder: Path) -> str:
             color=(0, 114, 178),
             poses=np.tile(np.eye(4), (3, 1, 1)),
             offs_cm=np.array([9.0, 3.0, np.nan]),
+            offs=(EVIL, EVIL, EVIL),
             notes=(EVIL, EVIL, EVIL),
             arrived=True,
             shades=rng.integers(0, 256, (3, 200), dtype=np.uint8),

@@ -256,7 +256,11 @@ def test_the_histogram_moves_with_the_player(fuse):
     assert "w = −p log p" in sigma.inner_text()
 
 
-DOUBTS = {11: "sliding along x changes nothing", 12: "turned by 90 degrees", 13: "one cloud is mirrored"}
+DOUBTS = {
+    11: "the overlap does not determine sliding along x",
+    12: "turned by 90 degrees",
+    13: "one cloud is mirrored",
+}
 SHOWS = *["node on node"] * 9, "inferred on sensor", "corridor", "square room", "mirrored room"
 METHODS = 2, 2, 2, 2, 4, 4, 2, 2, 3, 3, 2, 2, 2
 """What the lesson's stops show, and how many methods race there."""
@@ -307,7 +311,7 @@ def test_the_map_can_be_stopped(fuse):
     fuse.get_by_role("button", name="Compute the map").click()
     fuse.get_by_text("Computing; the bar").wait_for()
     fuse.get_by_role("button", name="Stop the map").click()
-    fuse.get_by_text("Stopped.").wait_for()
+    fuse.get_by_text("No map: the computation was stopped").wait_for()
     assert fuse.locator("button[data-packetmesh-press]").count() == 0
 
 

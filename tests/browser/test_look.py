@@ -52,7 +52,7 @@ def plane(page):
 
 
 def test_a_plane_cuts_the_surface_and_the_link_shows_it_again(looking):
-    pick(looking, "Leave out", "Behind a plane")
+    pick(looking, "Cut away", "Behind a plane")
     first = plane(looking)
     press(looking, "Flip")
     looking.wait_for_function(
@@ -70,7 +70,7 @@ def test_a_plane_cuts_the_surface_and_the_link_shows_it_again(looking):
 def test_two_surfaces_side_by_side_keep_their_names_above_a_cut(looking):
     pick(looking, "Show", "side by side")
     looking.wait_for_function(f"() => ({SHOWN_LABELS})() === 2")
-    pick(looking, "Leave out", "Around a box")
+    pick(looking, "Cut away", "Around a box")
     plane(looking)
     looking.wait_for_timeout(1000)
     assert looking.evaluate(SHOWN_LABELS) == 2

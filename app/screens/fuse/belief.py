@@ -23,10 +23,27 @@ class Belief:
     These trials take about a second; the evidence of a pose takes 10 ms.
     """
 
-    def __init__(self, source: PointCloud, target: PointCloud, config: RegistrationConfig) -> None:
-        """Prepare both clouds; ``config`` has the gate, metric and seed of further registrations."""
+    def __init__(
+        self,
+        source: PointCloud,
+        target: PointCloud,
+        config: RegistrationConfig,
+        from_cameras: tuple[bool, bool] = (False, False),
+    ) -> None:
+        """Prepare both clouds.
+
+        Args:
+            source: the cloud that moves.
+            target: the cloud that stays.
+            config: gate, metric and seed of further registrations.
+            from_cameras: whether a camera at the origin is known to have measured the source, and the target.
+        """
         self._source, self._target, self._config = source, target, config
-        self._judge = Judge(Surface(source, config.seed), Surface(target, config.seed))
+        surfaces = (
+            Surface(cloud, config.seed, from_camera)
+            for cloud, from_camera in zip((source, target), from_cameras, strict=True)
+        )
+        self._judge = Judge(*surfaces)
         self._known: list[tuple[FloatArray, tuple[str, ...]]] = []
         """Judged poses, each with the reasons for doubt that the trials gave."""
 

@@ -15,6 +15,7 @@ from app.drawing.colors import DISTANCE_STOPS, MOST_DISTANCE_M, css
 from app.screens.fuse.draw import FOOT, HEAD, HEAD_PX, WHOLE_FOOT
 from app.screens.fuse.labels import MARKS, OFF_FROM
 from app.screens.fuse.methods import METHODS, METRICS, color_of
+from app.screens.fuse.numbers import off_text
 from app.screens.fuse.view import OFF_DIGITS, SUCCESS_M, LensView, RaceLane, RaceStep, RaceView, Reference
 from app.web.markup import Markup
 from app.window.hidden import add_hidden
@@ -125,7 +126,7 @@ def distance_text(step: RaceStep) -> tuple[str, str]:
     distance from the nearest points."""
     if step.off_m != step.off_m:
         return UNKNOWN, ""
-    return number(step.off_m, OFF_DIGITS, scale=100.0), "cm"
+    return off_text(step, unit=""), "cm"
 
 
 def _cm(distance_m: float) -> str:

@@ -18,6 +18,7 @@ TEXT = Markdown(
 each cloud, with the methods, clouds and degradations chosen above."""
 )
 COMPUTING = Markdown("Computing; the bar at the top shows the progress.")
+NO_MAP = Markdown("No map: the computation was stopped, failed, or the race has changed.")
 
 
 class CaptureFolder:
@@ -66,7 +67,7 @@ class CaptureFolder:
         """Show a map; None if it was stopped, has failed or belongs to another race."""
         self.forget()
         if view is None:
-            self._status.content = Markdown("Stopped.")
+            self._status.content = NO_MAP
             return
         self._view = view
         names = tuple(f"{mark} {label}" for mark, label in zip(MARKS, view.labels, strict=False))

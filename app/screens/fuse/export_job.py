@@ -14,7 +14,7 @@ from app.reports.race import RaceRun, RaceShow, race_page
 from app.reports.race_animation import race_animation
 from app.screens.fuse.labels import MODES, OFF_FROM
 from app.screens.fuse.methods import color_of
-from app.screens.fuse.numbers import winner
+from app.screens.fuse.numbers import off_text, winner
 from app.screens.fuse.race_job import race_job
 from app.screens.fuse.view import SUCCESS_M, Race, RaceLane, RaceView
 from packetmesh.progress import Progress
@@ -83,6 +83,7 @@ def _run(lane: RaceLane, view: RaceView) -> RaceRun:
         color=color_of(lane.rival),
         poses=np.array([view.T_world_target @ step.T_target_source for step in lane.steps]),
         offs_cm=np.array([100.0 * step.off_m for step in lane.steps]),
+        offs=tuple(off_text(step) for step in lane.steps),
         notes=(*notes, f"{end} after {lane.iterations} iterations · {lane.verdict}"),
         arrived=arrived,
         shades=np.stack([step.shades for step in lane.steps]),

@@ -56,7 +56,7 @@ DEGRADATIONS: dict[str, tuple[str, float, float, float, str]] = {
         60.0,
         5.0,
         100.0,
-        "Share of random points added in the cloud's bounding box.",
+        "Share of the points that are replaced by random points in the cloud's bounding box.",
     ),
     "hole_share": ("Holes (%)", 80.0, 5.0, 100.0, "Share of points removed in round patches of the view."),
     "crop_share": (
@@ -69,6 +69,7 @@ DEGRADATIONS: dict[str, tuple[str, float, float, float, str]] = {
     "depth_bias": ("Bias (%)", 15.0, 0.5, 100.0, "RMS of a smooth relative error of the depth."),
 }
 """By field of ``Race``: label, maximum, step, shown units per unit of the field, hint."""
+UNDEGRADED = Markdown("The scanners stood inside the synthetic rooms; only a camera's cloud is degraded.")
 MOST_LANES = 4
 MOST_SEED = 20
 MARKS = "①②③④"

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from app.drawing.colors import MOST_DISTANCE_M
-from app.screens.fuse.view import LensView
+from app.screens.fuse.view import REACH_M, LensView
 from pipeline.kernels.geometry import apply
 from pipeline.registration.neighbourhood import pca_normals
 from pipeline.types import BoolArray, ByteArray, FloatArray
@@ -122,10 +122,6 @@ def _some(rows: FloatArray) -> FloatArray:
     return rows[np.sort(np.random.default_rng(0).choice(len(rows), DRAWN, replace=False))]
 
 
-REACH_M = 0.5
-"""Largest distance to the nearest target point; a point that is farther away gets this distance."""
-
-
 @dataclass(frozen=True, slots=True)
 class Distances:
     """Distance of each point from its reference position or, if unknown, from the target's nearest point."""
@@ -138,7 +134,10 @@ class Distances:
     """Search tree of the target."""
 
     def at(self, T_target_source: FloatArray) -> tuple[FloatArray, float]:
-        """Return (N,) distances at a pose and their median (NaN if ``T_home`` is known), in metres."""
+        """Return (N,) distances at a pose and their median (NaN if ``T_home`` is known), in metres.
+
+        Distances from the target are at most ``REACH_M``.
+        """
         places_m = apply(T_target_source, self.points_m)
         if self.T_home is not None:
             return np.linalg.norm(places_m - apply(self.T_home, self.points_m), axis=1), float("nan")

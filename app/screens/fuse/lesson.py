@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -11,6 +11,8 @@ import numpy as np
 
 from app.lesson.files import LESSONS, NUMBER, SCENE, Kind, Numbers, Setting, choice, quantity, sets, short
 from app.screens.fuse.labels import DIRECTIONS, MODES, MOST_LANES, RIVAL_NAMES, RIVALS, STARTS
+from app.screens.fuse.numbers import off_text
+from app.screens.fuse.place import MOST_AWAY
 from app.screens.fuse.view import Race, RaceView, Rival, Start
 from app.window.tables import UNKNOWN, number
 
@@ -35,7 +37,14 @@ class RaceLook:
 
 def _races(key: str, read: Callable[[str], Any]) -> Setting[RaceLook]:
     """Return a setting that stores what ``read`` makes of the text in one field of the race."""
-    return lambda look, text: replace(look, race=replace(look.race, **{key: read(text)}))
+
+    def put(look: RaceLook, text: str) -> RaceLook:
+        race = replace(look.race, **{key: read(text)})
+        if race.degrades_room:
+            raise ValueError("a synthetic room cannot be degraded; try another mode, or no degradation")
+        return replace(look, race=race)
+
+    return put
 
 
 _VECTOR = " ".join([rf"(-?{NUMBER[1:-1]})"] * 3)
@@ -53,10 +62,11 @@ def _start(text: str) -> Start:
     names = {short(name): error for name, error in STARTS.items()}
     found = re.fullmatch(rf"{NUMBER} deg {NUMBER} cm", text)
     if found is not None:
-        return Start.towards(float(found[1]), float(found[2]), seed=0)
+        turn_deg, shift_cm = _within(found.groups())
+        return Start.towards(turn_deg, shift_cm, seed=0)
     vectors = re.fullmatch(rf"turn {_VECTOR} deg shift {_VECTOR} cm", text)
     if vectors is not None:
-        values = [float(value) for value in vectors.groups()]
+        values = _within(vectors.groups())
         return Start((values[0], values[1], values[2]), (values[3], values[4], values[5]))
     if text not in names:
         raise ValueError(
@@ -65,10 +75,18 @@ def _start(text: str) -> Start:
     return Start.towards(*names[text], seed=0)
 
 
+def _within(numbers: Sequence[str]) -> list[float]:
+    """Return the degrees and centimetres of a start."""
+    values = [float(number) for number in numbers]
+    if max(map(abs, values)) > MOST_AWAY:
+        raise ValueError(f"try at most {MOST_AWAY:g} deg and {MOST_AWAY:g} cm")
+    return values
+
+
 def _place(text: str) -> int | None:
     if text in ("start", "end"):
         return 0 if text == "start" else None
-    if not text.isdigit():
+    if re.fullmatch(r"\d{1,9}", text) is None:
         raise ValueError("try start, end or the number of an iteration")
     return int(text)
 
@@ -109,13 +127,13 @@ def numbers(scene: str, race: Race, view: RaceView) -> Numbers:
     values = dict.fromkeys(NUMBERS, UNKNOWN)
     for place, lane in enumerate(view.lanes, 1):
         values[f"name_{place}"] = RIVAL_NAMES[lane.rival].replace(",", "")
-        values[f"end_{place}"] = number(lane.steps[-1].off_m, 2, "cm", 100.0)
+        values[f"end_{place}"] = off_text(lane.steps[-1])
         values[f"iterations_{place}"] = str(lane.iterations)
         values[f"time_{place}"] = number(lane.elapsed_s, 0, "ms", 1000.0)
         values[f"rmse_{place}"] = number(lane.steps[-1].rmse_m, 1, "cm", 100.0)
         values[f"verdict_{place}"] = lane.verdict_text
     values |= {
-        "begin": number(view.lanes[0].steps[0].off_m, 1, "cm", 100.0),
+        "begin": off_text(view.lanes[0].steps[0], digits=1),
         "turn": f"{np.linalg.norm(race.start.turn_deg):.0f}°",
         "shift": number(float(np.linalg.norm(race.start.shift_cm)), 0, "cm"),
         "holes": number(race.hole_share, 0, "%", 100.0),

@@ -9,7 +9,16 @@ import numpy as np
 from app.drawing.colors import css
 from app.screens.fuse.labels import MARKS, OFF_FROM
 from app.screens.fuse.methods import color_of
-from app.screens.fuse.view import OFF_DIGITS, SUCCESS_M, FuseView, RaceLane, Reference, RegistrationRow
+from app.screens.fuse.view import (
+    OFF_DIGITS,
+    REACH_M,
+    SUCCESS_M,
+    FuseView,
+    RaceLane,
+    RaceStep,
+    Reference,
+    RegistrationRow,
+)
 from app.web.markup import Markdown, Markup
 from app.window.tables import Row, number, table
 
@@ -47,6 +56,13 @@ def winner(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markdown:
     )
 
 
+def off_text(step: RaceStep, digits: int = OFF_DIGITS, unit: str = "cm") -> str:
+    """Return a step's error in centimetres, with its unit; a gap out of reach as ``≥ 50 cm``."""
+    if step.out_of_reach:
+        return f"≥ {number(REACH_M, 0, unit, 100.0)}"
+    return number(step.off_m, digits, unit, 100.0)
+
+
 def _cm(error_m: float) -> str:
     return number(error_m, OFF_DIGITS, "cm", 100.0)
 
@@ -78,18 +94,18 @@ def race_table(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markup:
             "Stopped",
             "converged: it moves less than 0.1 mrad and a 3000th of the gate; stalled: no change of the "
             "error; limit: all allowed iterations done; degenerate: too few pairs to go on; lost: no pair "
-            "within the gate.",
+            "of points to begin with.",
             lambda x: _stop_word(x.stop_reason),
         ),
         row(
             f"Start {word}",
             f"{hint}, at the start.",
-            lambda x: number(x.steps[0].off_m, OFF_DIGITS, "cm", 100),
+            lambda x: off_text(x.steps[0]),
         ),
         row(
             f"End {word}",
             "The same measure at the end." + (" Below 2 cm counts as success." if word == "error" else ""),
-            lambda x: number(x.steps[-1].off_m, OFF_DIGITS, "cm", 100),
+            lambda x: off_text(x.steps[-1]),
         ),
         row(
             "AHD",
@@ -142,7 +158,7 @@ def _doubts(lanes: tuple[RaceLane, ...]) -> Markup:
 def _stop_word(reason: str) -> str:
     """Return the reason of the stop in one word."""
     head = reason.partition(":")[0]
-    return "lost" if reason.startswith("No point") else STOPS.get(head, head)
+    return "lost" if reason.startswith("No pair") else STOPS.get(head, head)
 
 
 def places_table(view: FuseView) -> Markup:

@@ -28,7 +28,7 @@ from app.screens.fuse.place import moment_of, moment_text, race_of, race_text
 from app.screens.fuse.player import END, RacePlayer
 from app.screens.fuse.setup import RaceSetup
 from app.screens.fuse.shown import ShownChoice
-from app.screens.fuse.view import CaptureView, FuseView, Race, RaceView, Start
+from app.screens.fuse.view import OF_NODES, CaptureView, FuseView, Race, RaceView, Start
 from app.screens.fuse.walk_part import BELOW, WalkPart
 from app.web.markup import Markdown, Markup
 from app.window.controls import Controls
@@ -126,7 +126,7 @@ class FusePanel(Panel):
             self._forget()
             self._offer(single=len(view.nodes) == 1, walk=view.has_walk)
         if step == "depth":
-            self._choose_nodes([node.name for node in view.nodes])
+            self._choose_nodes(view)
         if step == "fuse":
             self._draw_result(view)
             self._rows.content = places_table(view)
@@ -165,11 +165,10 @@ class FusePanel(Panel):
         if self._here:
             self._start()
 
-    def _choose_nodes(self, names: list[str]) -> None:
+    def _choose_nodes(self, depth: DepthView) -> None:
         with self.ui.atomic():
-            self._setup.choose_nodes(names)
-            if self._shown.mode is not None:
-                self._setup.choose_mode(self._shown.mode)
+            self._setup.choose_nodes([node.name for node in depth.nodes])
+            self._setup.choose_mode(self._shown.mode or self._offered(self._setup.race).mode)
 
     @property
     def _racing(self) -> bool:
@@ -189,8 +188,7 @@ class FusePanel(Panel):
 
     def _take_stop(self, stop: RaceLook) -> None:
         """Set the controls for a stop of the lesson, and race."""
-        single = "nodes" not in self._shown.races
-        race = replace(stop.race, mode="inferred") if single and stop.race.mode == "nodes" else stop.race
+        race = self._offered(stop.race)
         with self.ui.atomic():
             self._shown.race(race.mode)
             self._setup.write(race)
@@ -199,6 +197,10 @@ class FusePanel(Panel):
         if not self._start() and self._view is not None:
             self._take_race(self._view)
         self._charts.choose_lane(stop.lane)
+
+    def _offered(self, race: Race) -> Race:
+        """Return the race or, of two nodes in a scene with one, the first race that is offered."""
+        return race if race.mode in self._shown.races else replace(race, mode=self._shown.races[0])
 
     def _reset(self) -> None:
         with self.ui.atomic():
@@ -231,11 +233,13 @@ class FusePanel(Panel):
         return race_text(self._setup.race)
 
     def _take_race_text(self, text: str) -> None:
-        race = race_of(text)
+        race = self._offered(race_of(text))
         with self.ui.atomic():
-            if self._shown.mode is not None and race.mode in self._shown.races:
+            if self._shown.mode is not None:
                 self._shown.race(race.mode)
             self._setup.choose(race)
+            if self.session.results.fresh("depth", self.session.spec):
+                self._choose_nodes(self.session.results.view("depth"))
         self._start()
 
     def _moment(self) -> str:
@@ -357,7 +361,7 @@ class FusePanel(Panel):
 
     def _stage(self) -> Stage:
         """Return the viewpoint for the race that has arrived: its room, or the scene."""
-        if self._arrived is not None and self._arrived[1].mode not in ("nodes", "inferred"):
+        if self._arrived is not None and self._arrived[1].mode not in OF_NODES:
             return ROOM_STAGE
         return stage_of(self.session.results.view("scene").nodes)
 

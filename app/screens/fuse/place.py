@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 
-from app.lesson.files import NUMBER, choice
+from app.lesson.files import choice
 from app.screens.fuse.labels import DEGRADATIONS, MOST_LANES, MOST_SEED, MS, RIVALS, SLIGHTLY, STARTS
 from app.screens.fuse.player import END
 from app.screens.fuse.view import Race, Rival, Start
@@ -31,7 +31,8 @@ def race_of(text: str) -> Race:
     """Return the race in a text.
 
     Raises:
-        InputError: a setting is unknown, or its value is invalid or outside the sliders' range.
+        InputError: a setting is unknown, its value is invalid or outside the sliders' range, or a synthetic
+            room is degraded.
     """
     changes = dict(change.partition("=")[::2] for change in text.split())
     rivals = changes.pop(_RIVALS, None)
@@ -62,8 +63,10 @@ def moment_of(text: str) -> tuple[float | None, bool]:
         InputError: the text is no moment.
     """
     number = text.removesuffix(MS)
-    if re.fullmatch(rf"{NUMBER}|{END}|", number) is None:
-        raise InputError(f"The address has t={text[:20]}; try an iteration, such as 12ms or {END}")
+    if re.fullmatch(rf"\d{{1,9}}(\.\d{{1,9}})?|{END}|", number) is None:
+        raise InputError(
+            f"The address has t={text[:20]}; try an iteration such as 12, a time such as 12ms, or {END}"
+        )
     return None if number == END else float(number or 0.0), text.endswith(MS)
 
 
@@ -73,6 +76,8 @@ def _settings(race: Race) -> dict[str, str]:
 
 def _check(race: Race) -> None:
     vectors = (race.start.turn_deg, race.start.shift_cm)
+    if race.degrades_room:
+        raise InputError("The address degrades a synthetic room; try mode=nodes, or no degradation")
     worse = all(
         0.0 <= getattr(race, name) <= most / per for name, (_, most, _, per, _) in DEGRADATIONS.items()
     )

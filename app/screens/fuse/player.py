@@ -85,8 +85,12 @@ class RacePlayer:
 
 
 def error_lane(reference: Reference, lanes: Sequence[RaceLane], clock: RaceClock) -> CurvesLane:
-    """Return a lane of the error of every method on one scale; curves are hidden after the clock's time."""
-    offs_cm = [np.array([100.0 * step.off_m for step in lane.steps]) for lane in lanes]
+    """Return a lane of the error of every method on one scale; curves are hidden after the clock's time, and
+    have a gap where the error is out of reach."""
+    offs_cm = [
+        np.array([np.nan if step.out_of_reach else 100.0 * step.off_m for step in lane.steps])
+        for lane in lanes
+    ]
     high_cm = round_up(max(1.0, *(float(np.nanmax(off_cm, initial=0.0)) for off_cm in offs_cm)))
     curves = [
         Curve(

@@ -64,6 +64,8 @@ class Contest:
     error_points_m: FloatArray
     """(N, 3) points before degradation whose distance from their reference positions is the error."""
     T_world_target: FloatArray
+    from_cameras: tuple[bool, bool]
+    """Whether source and target are a camera's own measurement, so that they show its free space."""
 
     def start_pose(self, start: Start) -> FloatArray:
         """Return T_target_source of a start: the aligned pose with the start's error."""
@@ -96,7 +98,8 @@ def race_job(store: Store, spec: Spec, race: Race) -> Generator[Progress, None, 
         yield Progress("race: a corner to magnify", 0.9)
         lens = lens_of(contest.source.points_m, contest.target.points_m, contest.T_aligned, distances)
         yield Progress("race: whether to believe the answers", 0.95)
-        belief = Belief(contest.source, contest.target, spec.config.node_registration)
+        clouds = contest.source, contest.target
+        belief = Belief(*clouds, spec.config.node_registration, contest.from_cameras)
         return RaceView(
             source=source,
             target=sample(contest.target.points_m, contest.target.colors, LANE_POINTS),
@@ -146,13 +149,21 @@ def contest_of(rig: Rig, nodes: Sequence[NodeClouds], race: Race) -> Contest:
     T_aligned = geometry.inverse(poses[race.target]) @ poses[race.source] if T_home is None else T_home
     if reference == "cloud" and rig.walk is not None:
         T_home, reference = T_aligned, "walk"
-    return _contest(race, source, target, T_aligned, T_home, reference, poses[staying])
+    measured = (race.mode == "nodes", True)
+    return _contest(race, source, target, T_aligned, T_home, reference, poses[staying], measured)
 
 
 def _contest_in_room(race: Race) -> Contest:
     scans = ROOMS[race.mode]()
     return _contest(
-        race, scans.source, scans.target, scans.T_aligned, scans.T_home, "truth", scans.T_room_target
+        race,
+        scans.source,
+        scans.target,
+        scans.T_aligned,
+        scans.T_home,
+        "truth",
+        scans.T_room_target,
+        (False, False),
     )
 
 
@@ -164,6 +175,7 @@ def _contest(
     T_home: FloatArray | None,
     reference: Reference,
     T_world_target: FloatArray,
+    from_cameras: tuple[bool, bool],
 ) -> Contest:
     how = Degradation(
         noise_m=race.noise_m,
@@ -172,8 +184,9 @@ def _contest(
         depth_bias=race.depth_bias,
         crop_share=race.crop_share,
     )
+    plain = how == Degradation()
     return Contest(
-        source=source if how == Degradation() else degrade(source, how, race.seed),
+        source=source if plain else degrade(source, how, race.seed),
         target=target,
         T_aligned=T_aligned,
         T_home=T_home,
@@ -181,6 +194,7 @@ def _contest(
         center_m=geometry.apply(T_aligned, source.points_m.mean(axis=0, keepdims=True))[0],
         error_points_m=_every(source.points_m, ERROR_POINTS),
         T_world_target=T_world_target,
+        from_cameras=(from_cameras[0] and plain, from_cameras[1]),
     )
 
 

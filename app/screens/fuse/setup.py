@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import viser
 
@@ -20,9 +21,10 @@ from app.screens.fuse.labels import (
     RIVALS,
     SLIGHTLY,
     STARTS,
+    UNDEGRADED,
 )
 from app.screens.fuse.place import FIRST
-from app.screens.fuse.view import Race, RaceMode, Rival, Start
+from app.screens.fuse.view import OF_NODES, Race, RaceMode, Rival, Start
 from app.window.ui import Ui
 
 METHOD_HINT = "Method and what it minimises: distance to the paired point, or to the plane at it."
@@ -116,6 +118,7 @@ class RaceSetup:
 
     def add_degradations(self) -> None:
         """Add the sliders of the moving cloud's degradation."""
+        self._undegraded = self._ui.gui.add_markdown(UNDEGRADED, visible=False)
         self._worse = {
             name: self._ui.gui.add_slider(label, 0.0, most, step, 0.0, hint=hint)
             for name, (label, most, step, _, hint) in DEGRADATIONS.items()
@@ -133,17 +136,17 @@ class RaceSetup:
         names = self._source.options
         self._source.value, self._target.value = names[min(1, len(names) - 1)], names[0]
         self.write(Race(mode=mode, start=FIRST.start))
-        self._race = self._read(self._race)
+        self._race = self._between_chosen(self._race)
 
     def choose_nodes(self, names: Sequence[str]) -> None:
         """Offer the nodes of another scene."""
         if tuple(names) != tuple(self._source.options):
             self._source.options = self._target.options = tuple(names)
             self._source.value, self._target.value = names[min(1, len(names) - 1)], names[0]
-            if self._from_address:
-                self._show_nodes()
+        if self._from_address:
+            self._show_nodes()
         self._from_address = False
-        self._race = self._read(self._race)
+        self._race = self._between_chosen(self._race)
 
     def choose(self, race: Race) -> None:
         """Show another race between its own nodes, now or when the scene's nodes are known."""
@@ -152,16 +155,32 @@ class RaceSetup:
         self._show_nodes()
 
     def _show_nodes(self) -> None:
-        names = self._source.options
-        for handle, index in ((self._source, self._race.source), (self._target, self._race.target)):
-            if index < len(names):
-                handle.value = names[index]
+        """Show the race's nodes, or the first race's if the scene lacks one of them."""
+        names, race = self._source.options, self._race
+        there = max(race.source, race.target) < len(names)
+        source, target = (race.source, race.target) if there else (min(1, len(names) - 1), 0)
+        self._source.value, self._target.value = names[source], names[target]
+
+    def _between_chosen(self, race: Race) -> Race:
+        """Return ``race`` between the nodes that are chosen."""
+        names = list(self._source.options)
+        return replace(race, source=names.index(self._source.value), target=names.index(self._target.value))
 
     def choose_mode(self, mode: RaceMode) -> None:
-        """Race two nodes, one node's inferred cloud, or the scans of a synthetic room, which has no nodes."""
+        """Race two nodes, one node's inferred cloud, or the scans of a synthetic room.
+
+        A room has no nodes, and its scans cannot be degraded, because the scanners stood inside it.
+        """
         self._race = replace(self._race, mode=mode)
-        self._source.disabled = mode not in ("nodes", "inferred")
-        self._target.disabled = mode != "nodes"
+        room = mode not in OF_NODES
+        self._source.disabled, self._target.disabled = room, mode != "nodes"
+        self._undegraded.visible = room
+        for handle in self._worse.values():
+            handle.disabled = room
+            handle.value = 0.0 if room else handle.value
+        if room:
+            whole: dict[str, Any] = dict.fromkeys(self._worse, 0.0)
+            self._race = replace(self._race, **whole)
 
     def write(self, race: Race) -> None:
         """Show another race, between the nodes that are chosen."""
@@ -188,12 +207,9 @@ class RaceSetup:
 
     def _read(self, race: Race) -> Race:
         """Return ``race`` with the values of the controls of clouds and methods."""
-        names = list(self._source.options)
         worse = {name: handle.value / DEGRADATIONS[name][3] for name, handle in self._worse.items()}
         return replace(
-            race,
-            source=names.index(self._source.value),
-            target=names.index(self._target.value),
+            self._between_chosen(race),
             rivals=tuple(RIVALS[slot.value] for slot in self._slots if slot.value != NOBODY),
             direction=DIRECTIONS[self._direction.value],
             seed=int(self._seed.value),

@@ -15,6 +15,9 @@ RaceMode = Literal["nodes", "inferred", "corridor", "square", "mirrored"]
 """nodes: one node's sensor cloud onto another's; inferred: a node's inferred cloud onto its sensor cloud;
 otherwise two scans of a synthetic room (``rooms.py``)."""
 
+OF_NODES: tuple[RaceMode, ...] = ("nodes", "inferred")
+"""The modes that race a scene's nodes."""
+
 Reference: TypeAlias = Literal["truth", "pixels", "walk", "cloud"]
 """Reference of a race's errors: the points' true positions; the measured points of their own pixels, which
 need no ground truth; the poses that a recording's whole walk gives; or, if all are unknown, the nearest
@@ -100,6 +103,16 @@ class Race:
     seed: int = 0
     """Seed of the degradation."""
 
+    @property
+    def degrades_room(self) -> bool:
+        """Whether it degrades a scan of a synthetic room, which is not possible: the scanner stood inside."""
+        worse = (self.noise_m, self.outlier_share, self.hole_share, self.crop_share, self.depth_bias)
+        return self.mode not in OF_NODES and any(worse)
+
+
+REACH_M = 0.5
+"""Largest distance to the nearest target point; a point that is farther away gets this distance."""
+
 
 @dataclass(frozen=True, slots=True)
 class PairHistogram:
@@ -133,7 +146,8 @@ class RaceStep:
     point_error_m: float | None
     """RMS distance of the points from their reference positions at this pose; None if these are unknown."""
     gap_m: float
-    """Median distance of the drawn points from the nearest target point; NaN if an error is known."""
+    """Median distance of the drawn points from the nearest target point, at most ``REACH_M``; NaN if an error
+    is known."""
     shades: ByteArray
     """(N,) each drawn point's distance from its reference position or, if unknown, the target's nearest
     point: 0 to 255 for zero to ``MOST_DISTANCE_M`` and beyond."""
@@ -145,6 +159,11 @@ class RaceStep:
     def off_m(self) -> float:
         """Error: distance from the reference position, or else from the other cloud."""
         return self.gap_m if self.point_error_m is None else self.point_error_m
+
+    @property
+    def out_of_reach(self) -> bool:
+        """Whether the error is known only to be at least ``REACH_M``."""
+        return self.point_error_m is None and self.gap_m >= REACH_M
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,7 +38,7 @@ MOST_FRUSTUM_M = 0.3
 FITTED, MARGIN = 3000, 0.9
 """Most map points that are fitted into the picture, and the share of the picture that they may fill."""
 MOST_SEGMENTS = 1000
-"""A path is drawn in fewer than twice this number of segments."""
+"""A path is drawn in at most this number of segments, and one more for each part between lost frames."""
 DASHES = 30
 """Number of dashes of the path by tracking alone."""
 NAME = 2.2
@@ -146,8 +146,8 @@ class WalkDrawing:
         for index in range(min(whole, self._whole), max(whole, self._whole)):
             self._pieces[index].visible = index < whole
         self._whole = whole
-        self._show_line(self._solid, _segments(view.at_m[: frame + 1]))
-        self._show_line(self._faint, _segments(view.at_m[frame:]))
+        self._show_line(self._solid, segments(view.at_m[: frame + 1]))
+        self._show_line(self._faint, segments(view.at_m[frame:]))
         T = view.T_world_camera[frame]
         known = bool(np.isfinite(T).all())
         self._camera.visible = known
@@ -223,21 +223,28 @@ def viewpoint(view: WalkView, fov_rad: float, aspect: float) -> tuple[FloatArray
     return center_m, center_m - float(back_m.max()) * axes[2]
 
 
-def _segments(at_m: FloatArray) -> FloatArray:
-    """Return (S, 2, 3) segments between successive (F, 3) positions, thinned if many; none at NaN."""
-    every = max(1, len(at_m) // MOST_SEGMENTS)
-    at_m = at_m[::every]
-    segments = np.stack([at_m[:-1], at_m[1:]], axis=1).astype(np.float32)
-    known: FloatArray = segments[np.isfinite(segments).all(axis=(1, 2))]
-    return known
+def segments(at_m: FloatArray) -> FloatArray:
+    """Return (S, 2, 3) segments between successive (F, 3) positions; none at NaN.
+
+    Many positions are thinned; the first and the last one before and after NaN stay.
+    """
+    known = np.isfinite(at_m).all(axis=1)
+    around = np.pad(known, 1)
+    ends = ~(around[:-2] & around[2:])
+    regular = np.arange(len(at_m)) % max(1, -(-len(at_m) // MOST_SEGMENTS)) == 0
+    kept = np.flatnonzero(known & (ends | regular))
+    part = np.cumsum(~known)[kept]
+    joined = part[1:] == part[:-1]
+    found: FloatArray = np.stack([at_m[kept[:-1]], at_m[kept[1:]]], axis=1)[joined].astype(np.float32)
+    return found
 
 
 def _dashes(at_m: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the dashes and the gaps of a line through (F, 3) positions, each as (S, 2, 3) segments."""
-    segments = _segments(at_m)
-    length_m = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).cumsum()
+    lines_m = segments(at_m)
+    length_m = np.linalg.norm(lines_m[:, 1] - lines_m[:, 0], axis=1).cumsum()
     dash = (2 * DASHES * length_m / max(float(length_m.max(initial=0.0)), 1e-9)).astype(int)
-    return segments[dash % 2 == 0], segments[dash % 2 == 1]
+    return lines_m[dash % 2 == 0], lines_m[dash % 2 == 1]
 
 
 def _rgb(jpeg: bytes) -> ByteArray:

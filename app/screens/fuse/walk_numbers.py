@@ -37,7 +37,7 @@ def walk_table(view: WalkView) -> Markup:
         ),
         (
             "Lost",
-            "Frames without a pose: they show too little of what was seen before.",
+            "Frames without a pose: they have too little depth, or show too little of what was seen before.",
             f"{view.lost_frames:,}",
         ),
         (
@@ -65,7 +65,8 @@ def walk_table(view: WalkView) -> Markup:
         ),
         (
             "Points in the map",
-            "Points of the surface that at least two frames measured, averaged; a part of them is drawn.",
+            "Points of the surface, averaged; at least two frames measured each (one, if fewer than 10 "
+            "frames are tracked). A part of them is drawn.",
             f"{view.map_points:,}",
         ),
     ]
@@ -76,7 +77,7 @@ def frame_line(view: WalkView, frame: int) -> str:
     """Return a line about a frame: number, time, and whether it is a keyframe or lost."""
     line = f"Frame {frame}, {view.times_s[frame]:.2f} s"
     if np.isnan(view.drift_m[frame]):
-        return f"{line}: lost, it shows too little of what was seen before"
+        return f"{line}: lost, it has too little depth or shows too little of what was seen before"
     kind = "keyframe" if frame in view.keyframes else "tracked"
     return f"{line}: {kind}; tracking alone is {_cm(view.drift_m[frame])} off"
 
@@ -118,7 +119,7 @@ def loop_html(view: WalkView, loop: LoopView, pictures: Pictures) -> Markup:
         (
             "Fixed motions",
             "How many of the camera's three turns and three shifts this registration fixes to 1.8° and 3 cm. "
-            "Along the others it can slide, as beside a bare wall, and agrees wherever it is.",
+            "Along the other motions it can slide, as along a bare wall, and fits everywhere.",
             f"{loop.held} of {MOTIONS}",
         ),
         ("Counts", why, counts),

@@ -26,8 +26,8 @@ from packetmesh.errors import InputError
 
 BELOW = "/fuse/walk"
 TEXT = Markdown(
-    """**What you see.** One camera walked through the room. Each frame is registered with a keyframe, and
-loops correct what adds up. Press **Play** below (space), or click a loop in the dock."""
+    """**What you see.** One camera walked through the room. Each frame is registered with a keyframe. Small
+errors add up to drift; loops correct it. Press **Play** below (space), or click a loop in the dock."""
 )
 WAITING = Markdown("The walk is shown as soon as the recording is tracked.")
 NO_LOOP = "none"
@@ -181,8 +181,11 @@ class WalkPart:
         self._dock.show(self._visible)
         requested, self._requested_frame = self._requested_frame, None
         self._dock.seek(end_ns if requested is None else self._time_of(requested))
-        self._take_loop(self._requested_loop)
+        self._picked_loop()
         self._take_waiting_look()
+        loop, self._requested_loop = self._requested_loop, ""
+        if loop:
+            self._ui.post(self._take_loop, loop)
 
     # The moment.
 
@@ -276,7 +279,6 @@ class WalkPart:
         if self._view is None:
             self._requested_loop = text
             return
-        self._requested_loop = ""
         names = ["", *self._pairs()]
         if text not in names:
             raise InputError(f"The address has loop={text}, but no loop joins these frames")

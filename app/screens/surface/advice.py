@@ -13,12 +13,13 @@ from pipeline.config import SurfaceConfig
 from pipeline.surface.findings import Suggestion
 
 TEXT = Markdown(
-    """A ball closes the triangles around a point if its radius is at least that of their largest
+    """A ball can close the triangles around a point only if its radius is at least that of their largest
 circumcircle. The app computes this radius from the points before any ball rolls."""
 )
 NO_ADVICE = "No point has neighbours on all sides, so this cloud gives no radius; try more points."
 WAITING = Markdown("The first ball is about to roll.")
-STOPPED = Markdown("Stopped; the curves show the balls that have rolled.")
+NO_CURVES = Markdown("No curves: the computation was stopped or failed.")
+STOPPED = Markdown("Stopped or failed; the curves show the balls that have rolled.")
 UNNAMED = "–"
 """Label of the only button before there is a suggestion; it is hidden."""
 
@@ -73,7 +74,7 @@ class AdviceFolder:
     def load(self, view: SweepView | None) -> None:
         """Show a sweep, complete or partial; None if it was stopped or failed."""
         if view is None:
-            self._status.content = Markdown("Stopped.") if self._view is None else STOPPED
+            self._status.content = NO_CURVES if self._view is None else STOPPED
             return
         self._view = view
         self._draw()

@@ -34,8 +34,8 @@ from pipeline.surface.pictures import beside, mesh_picture
 from pipeline.types import ByteArray, PointSource, Rig, Surface, SurfaceResult
 
 PICTURE_WIDTH_PX = 480
-MOST_PICTURES, LEG_PICTURES = 32, 16
-"""Most pictures of the way there, unless its legs have only two each, and of one leg between cameras; the way
+MOST_PICTURES, LEG_PICTURES, LEAST_LEG_PICTURES = 32, 16, 2
+"""Most pictures of the way there before its last one, and most and fewest of one leg between cameras; the way
 back repeats them."""
 PICTURE_MS, REST_MS = 120, 800
 """Display time of a picture, and of one at an end of the flight."""
@@ -58,7 +58,7 @@ def page_job(store: Store, spec: Spec, coloring: Coloring) -> Generator[Progress
     cameras = cameras_of(rig, placement)
     page = SurfacePage(
         title=rig.name,
-        sentence=f"{_sentence(len(rig.frames))} {measured}".rstrip(),
+        sentence=f"{sentence_of(rig)} {measured}".rstrip(),
         left=_side(left, one, coloring, rig, placement),
         right=_side(right, other, coloring, rig, placement),
         view=viewpoint_of([camera.T_world_camera for camera in cameras], points_m),
@@ -78,7 +78,7 @@ def flight_job(store: Store, spec: Spec, coloring: Coloring) -> Generator[Progre
     cameras, legend = cameras_of(rig, placement), legend_of(coloring, rig.truth is not None)
     picture = _painter(surface, coloring, rig, placement)
     there: list[Image.Image] = []
-    way = list(_way(cameras, surface))
+    way = list(flight(cameras, surface))
     for done, camera in enumerate(way):
         yield Progress(f"picture {done + 1} of {len(way)}", 0.1 + 0.8 * done / len(way))
         there.append(captioned(picture(camera), rig.name, NAMES[spec.shown], legend))
@@ -108,9 +108,11 @@ def _check(*surfaces: Surface) -> None:
         raise InputError("The surface has no triangle to show; try a larger ball radius")
 
 
-def _sentence(cameras: int) -> str:
-    made = "one camera node" if cameras == 1 else f"{cameras} camera nodes"
-    return f"A surface from what {made} delivered. Drag the line to compare."
+def sentence_of(rig: Rig) -> str:
+    """Return a sentence on the cameras of a surface, for its page."""
+    nodes = "one camera node" if len(rig.frames) == 1 else f"{len(rig.frames)} camera nodes"
+    source = nodes if rig.walk is None else "one walking camera"
+    return f"A surface made from the images of {source}. Drag the line to compare."
 
 
 def _side(name: Shown, surface: SurfaceResult, coloring: Coloring, rig: Rig, placement: Placement) -> Side:
@@ -139,14 +141,19 @@ def _painter(
     return picture
 
 
-def _way(cameras: Sequence[Camera], surface: Surface) -> Iterator[Camera]:
-    """Yield cameras from the first to the last through all others, slower near each; a single one swings."""
+def flight(cameras: Sequence[Camera], surface: Surface) -> Iterator[Camera]:
+    """Yield cameras from the first to the last through the others, slower near each; a single one swings.
+
+    If there are too many, it passes evenly chosen ones.
+    """
     first = cameras[0]
     K = first.intrinsics
     K = scaled(K, PICTURE_WIDTH_PX / K.width_px)
     if len(cameras) == 1:
         cameras = [beside(first, surface, -SWING_DEG), first, beside(first, surface, SWING_DEG)]
-    count = max(2, min(LEG_PICTURES, MOST_PICTURES // (len(cameras) - 1)))
+    legs = min(len(cameras) - 1, MOST_PICTURES // LEAST_LEG_PICTURES)
+    cameras = [cameras[row] for row in np.linspace(0, len(cameras) - 1, legs + 1).round().astype(int)]
+    count = min(LEG_PICTURES, MOST_PICTURES // legs)
     shares = np.linspace(0.0, 1.0, count, endpoint=False)
     for one, other in pairwise(camera.T_world_camera for camera in cameras):
         turn = Slerp([0.0, 1.0], Rotation.from_matrix([one[:3, :3], other[:3, :3]]))

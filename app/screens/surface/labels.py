@@ -61,7 +61,9 @@ HINTS = {
 
 
 _BOX = "display: inline-block; width: 0.9em; height: 0.9em; vertical-align: -0.1em; margin-right: 0.3em"
-CLOSED = f"Holes of up to {100 * SEAM_M:.0f} cm around are closed here, not in the numbers."
+CLOSED = (
+    f"Holes whose rim is at most {100 * SEAM_M:.0f} cm long are closed in the picture, not in the numbers."
+)
 _INFERRED = ("inferred by the network", INFERRED)
 _OWN: dict[Coloring, str] = {
     "photo": "The cameras' photographs; where no camera sees the surface, the colours of its points.",

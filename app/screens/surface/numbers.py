@@ -27,7 +27,8 @@ def quality_table(view: SurfaceView, baselines: Iterable[BaselineView], has_trut
         ),
         row(
             "Area of holes",
-            "Area of all holes that the cameras see, at the depth of the surface next to them.",
+            "Area of all holes that the cameras see, at the depth of the surface next to them; a hole that "
+            "two cameras see counts twice.",
             lambda m: UNKNOWN if m.quality.gaps is None else number(m.quality.gaps.area_m2, 2, "m²"),
         ),
         row(
@@ -103,8 +104,8 @@ def quick_line(view: PaintedView) -> Markup:
 def _rule(view: SurfaceView) -> Markup:
     """Return the definition of a hole, and the number of small holes, which the table leaves out."""
     text = Markup(
-        "A <b>hole</b> is a patch of a camera's picture whose rays are without a surface. The outer rim of "
-        "the scene is not a hole."
+        "A <b>hole</b> is a patch of a camera's picture whose rays are without a surface. The outer rim "
+        "counts only where a camera looks past it."
     )
     before, after = (mesh and mesh.quality.gaps for mesh in (view.before, view.after))
     if before and after:

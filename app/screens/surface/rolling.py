@@ -34,6 +34,7 @@ turned yet. Red: edges at which it found no point, the rims of holes. Darker tri
 balls."""
 )
 WAITING = Markdown("Rolling; the bar at the top shows the progress.")
+NO_WALK = Markdown("No ball to watch: the computation was stopped or failed.")
 HAPPENED: dict[Happening, str] = {
     "seed": "put down on three points",
     "join": "joined a new point",
@@ -130,7 +131,7 @@ class RollingFolder:
         """Play a walk from its start, or show the address's step; None if the job was stopped or failed."""
         self.forget()
         if view is None:
-            self._status.content = Markdown("Stopped.")
+            self._status.content = NO_WALK
             return
         self._drawn += 1
         with self._ui.atomic():

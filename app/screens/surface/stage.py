@@ -50,6 +50,8 @@ class SurfaceStage:
         self.shown = AFTER
         """One of ``app.screens.surface.labels.SHOWN``."""
         self._offset_m: FloatArray = np.zeros(3)
+        self._middle_m: FloatArray = np.zeros(3)
+        """(3,) middle of the scene."""
 
     @property
     def which(self) -> tuple[Which, ...]:
@@ -61,6 +63,15 @@ class SurfaceStage:
     def offset_m(self, which: Which) -> FloatArray:
         """Return the (3,) offset of a surface from the middle of the scene."""
         return self._offset_m if which == "after" else -self._offset_m
+
+    def aimed_at(self, origin_m: FloatArray, direction: FloatArray) -> Which:
+        """Return the shown surface whose middle a ray, world frame, passes at the smallest angle."""
+
+        def along(which: Which) -> float:
+            there_m = self._middle_m + self.offset_m(which) - origin_m
+            return float(there_m @ direction) / max(float(np.linalg.norm(there_m)), 1e-9)
+
+        return max(self.which, key=along)
 
     def draw(self, which: Which, mesh: MeshView | PaintedMesh, unseen: bool = False) -> bool:
         """Draw one of the ball's surfaces; False if it is drawn already.
@@ -105,9 +116,10 @@ class SurfaceStage:
             unused: whether the points that the ball left out are drawn.
             hidden: whether the surfaces are hidden by a walk.
         """
-        both = self.shown == BOTH and place is not None
-        self._offset_m = APART * place.width_m * place.right if both and place is not None else np.zeros(3)
-        top_m = place.top_m if both and place is not None else None
+        self._offset_m, top_m = np.zeros(3), None
+        if self.shown == BOTH and place is not None:
+            self._offset_m, self._middle_m = APART * place.width_m * place.right, place.middle_m
+            top_m = place.top_m
         baseline = self.shown in BASELINES
         for which, drawing in self._drawings.items():
             visible = which in self.which and not hidden and not baseline
@@ -130,6 +142,7 @@ class ChosenBall:
     def __init__(self, session: PanelSession, stage: SurfaceStage) -> None:
         self._session, self._stage = session, stage
         self._clicked: tuple[FloatArray, FloatArray] | None = None
+        """(3,) origin and direction of the clicked ray, in the frame of the surface that was clicked."""
         self._request: PaintRequest | None = None
 
     def clicked(self, origin_m: FloatArray, direction: FloatArray, cut: Cut) -> None:
@@ -140,8 +153,8 @@ class ChosenBall:
             direction: (3,) direction of the ray.
             cut: what is left out of the picture, in the frame of the surface.
         """
-        offset_m = self._stage.offset_m(self._stage.which[0])
-        for begin, _ in kept_on_ray(cut, origin_m - offset_m, direction)[:1]:
+        origin_m = self._in_surface(origin_m, direction)
+        for begin, _ in kept_on_ray(cut, origin_m, direction)[:1]:
             self._clicked = origin_m + begin * direction, direction
 
     def forget(self) -> None:
@@ -149,13 +162,16 @@ class ChosenBall:
         self._clicked = None
 
     def _ray(self) -> Ray | None:
-        """Return the ray to the ball, in the frame of the first surface shown; None without a browser."""
+        """Return the ray to the ball, in the frame of the surfaces; None without a browser."""
         seen = self._clicked or self._middle()
         if seen is None:
             return None
         origin_m, direction = seen
-        origin_m = origin_m - self._stage.offset_m(self._stage.which[0])
         return Ray(tuple(origin_m.tolist()), tuple(direction.tolist()))
+
+    def _in_surface(self, origin_m: FloatArray, direction: FloatArray) -> FloatArray:
+        """Return (3,) the origin of a ray in the scene, in the frame of the surface that it aims at."""
+        return origin_m - self._stage.offset_m(self._stage.aimed_at(origin_m, direction))
 
     def show(self, request: PaintRequest) -> None:
         """Draw the ball of a quick look once its place is computed, unless it is hidden by then."""
@@ -178,4 +194,5 @@ class ChosenBall:
         if client is None:
             return None
         origin_m = np.array(client.camera.position, float)
-        return origin_m, np.array(client.camera.look_at, float) - origin_m
+        direction = np.array(client.camera.look_at, float) - origin_m
+        return self._in_surface(origin_m, direction), direction

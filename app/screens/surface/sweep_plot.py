@@ -101,7 +101,7 @@ def sweep_sentence(view: SweepView) -> Markdown:
         f"({start.no_hit_ray_share:.1%} are without a surface)"
     ]
     if missed[-1] >= missed[best] + LEVEL_SHARE:
-        parts.append(f"with the widest, {_mm(last)}, {missed[-1]:.1%} are again")
+        parts.append(f"with the widest ball, {_mm(last)}, {missed[-1]:.1%} are without a surface again")
     if level < len(rows) - 1 and math.isfinite(start.accuracy_1cm):
         change = _change_text(start.accuracy_1cm, last.accuracy_1cm)
         parts.append(f"accuracy within 1 cm {change} up to {_mm(last)}")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import html
 import json
+import math
 
 import numpy as np
 import pytest
 
-from app.dock.dock import COUNT_NS, Dock, speed_text, time_text
+from app.dock.dock import COUNT_NS, SPEEDS, Dock, speed_text, time_text
 from app.drawing.levels import levels_of
 from app.drawing.timeline import Curve, CurvesLane, FramesLane
 from tests.app.fakes import page_calls, ui_of
@@ -138,7 +139,25 @@ def test_a_click_goes_there_and_picks_what_is_there(hand):
     assert hand.picks == [(0, 1), (0, -1)]
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", '{"page": 1}', '{"page": "a", "actions": [[1, "close"]]}'])
+WRONG = (
+    *(["loop"], [[]], [[1]], ["1", "loop"], [[math.inf, "loop"]], [[math.nan, "loop"]], [[True, "loop"]]),
+    *([[10**400, "loop"]], [[1.0, "loop"]], [[1, []]], [[1, "close"]], [[1, "loop", 1]], [[1, "step"]]),
+    *([[1, "seek", math.nan]], [[1, "seek", math.inf]], [[1, "seek", 10**400]], [[1, "seek", None]]),
+    *([[1, "seek", "1"]], [[1, "click", 0, [], 0, 0]], [[1, "look", 0, 1e9]], [[1, "faster", 1e300]]),
+)
+
+
+@pytest.mark.parametrize("actions", WRONG, ids=str)
+def test_what_no_page_says_changes_nothing_and_every_page_can_read_the_answer(hand, actions):
+    hand.ui.gui.set("Dock", json.dumps({"page": "evil", "actions": actions}))
+    assert hand.moves == [START_NS]
+    assert not hand.dock._loops
+    json.loads(html.unescape(hand.told("state")), parse_constant=pytest.fail)
+    hand.say(["seek", 3_000_000_000])
+    assert hand.dock.now_ns == 3_000_000_000
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"page": 1}', "[" * 4000])
 def test_what_it_does_not_understand_changes_nothing(hand, text):
     hand.ui.gui.set("Dock", text)
     assert hand.moves == [START_NS]
@@ -204,12 +223,9 @@ def test_hiding_it_stops_the_clock(hand):
 
 
 def test_speeds_and_times_are_round():
-    assert [speed_text(speed) for speed in (0.02, 0.5, 1.0, 5.0, 100.0)] == [
-        "×1/50",
-        "×1/2",
-        "×1",
-        "×5",
-        "×100",
-    ]
+    speeds = {0.0002: "×1/5,000", 0.001: "×1/1,000", 0.02: "×1/50", 0.5: "×1/2", 1.0: "×1", 100.0: "×100"}
+    speeds |= {1.5: "×1.5", 1000.0: "×1,000", 5000.0: "×5,000"}
+    assert {speed: speed_text(speed) for speed in speeds} == speeds
+    assert not any("e" in speed_text(speed) for speed in SPEEDS)
     times = [3_210_400_000, 12_430_000, 999, 157_228_380_000, 0]
     assert [time_text(t_ns) for t_ns in times] == ["3.21 s", "12.4 ms", "1.00 µs", "157 s", "0 s"]

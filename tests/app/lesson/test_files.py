@@ -217,6 +217,9 @@ def test_a_field_is_the_number_of_now_or_of_another_stop_in_the_same_scene(tmp_p
     shown.update(scene="room", end="3 cm")
     folder.refresh()
     assert "Now 3 cm, it was 2 cm." in ui.gui.text()
+    shown.clear()  # another scene is being computed
+    folder.refresh()
+    assert "Now …, it was …." in ui.gui.text()
     shown.update(scene="desk", end="4 cm")
     folder.refresh()
     assert "Now 4 cm." in ui.gui.text()
@@ -376,12 +379,18 @@ def test_a_start_in_numbers_and_the_end(tmp_path):
         ("# A\n## One\nset: holes = 95 %\nx", "try 0 to 80 %"),
         ("# A\n## One\nset: start = near\nx", "try one of aligned, slightly off, far off or for example"),
         ("# A\n## One\nset: position = -1\nx", "try start, end or the number"),
+        (f"# A\n## One\nset: position = {'9' * 400}\nx", "try start, end or the number"),
+        (f"# A\n## One\nset: start = 1 deg {'9' * 400} cm\nx", "try at most 1000 deg and 1000 cm"),
+        ("# A\n## One\nset: start = turn 0 0 0 deg shift 0 -1001 0 cm\nx", "try at most 1000 deg"),
+        ("# A\n## One\nset: mode = corridor\nset: noise = 1 cm\nx", "a synthetic room cannot be degraded"),
+        ("# A\n## One\nset: holes = 10 %\nset: mode = square room\nx", "a synthetic room cannot be degraded"),
         ("# A\n## One\nset: mode\nx", "cannot set mode = : try one of node on node"),
         ("# A\n## One\nask: Why?\nchoices:\n- [x] So.\nreveal: So.", "has no text"),
         ("# A\n## One\nx\nask: Why?", "must ask with 'ask:', 'choices:' and 'reveal:'"),
         ("# A\n## One\nx\nreveal: So.", "must ask with"),
         ("# A\n## One\nx\nask:\nchoices:\n- [x] a\nreveal: So.", "must ask with"),
         ("# A\n## One\nx\nask: Why?\nchoices:\n- [x] a\n- [ ] b | c\nreveal: So.", "needs 3 choices"),
+        (ASKED.replace("choices:", "choices: One\nis right."), "has 'One is right.' before the first choice"),
         (ASKED.replace("[x] Blue.", "[sky=blue] Blue. | no."), "or all of them such as"),
         (ASKED.replace("[ ]", "[sky=blue]").replace("[x]", "[sky=red]"), "or all of them such as"),
         (ASKED.replace("[x]", "[ ]"), "needs 3 choices: '- \\[x\\] choice' once"),

@@ -59,18 +59,18 @@ def session(server):
 def test_nothing_is_left_out_at_first_and_few_controls_are_there(session):
     assert session.folder.place() == ""
     assert session.sent["planes"] == []
-    assert set(session.live()) == {"Leave out", "Draw", "Scale bar and axes"}
+    assert set(session.live()) == {"Cut away", "Draw", "Scale bar and axes"}
 
 
 def test_the_ceiling_comes_off_just_below_it(session):
-    session.gui.set("Leave out", labels.TOP)
+    session.gui.set("Cut away", labels.TOP)
     cut = look_of(session.folder.place()).cut
     assert isinstance(cut, Top)
     assert 2.4 < cut.height_m < 2.55
     (plane,) = session.sent["planes"]
     assert plane["normal"] == [0.0, 0.0, -1.0]
     assert plane["point"][2] == pytest.approx(cut.height_m, abs=0.001)
-    assert "below the ceiling" in session.gui.text()
+    assert "10 cm below it" in session.gui.text()
     session.gui.set("Height (m)", 1.2)
     assert session.folder.place() == "top_1200"
     assert session.sent["planes"][0]["point"][2] == 1.2
@@ -78,20 +78,20 @@ def test_the_ceiling_comes_off_just_below_it(session):
 
 def test_without_a_ceiling_the_folder_says_so_and_cuts_nothing_yet(server):
     session = Session(server.scene, OPEN)
-    session.gui.set("Leave out", labels.TOP)
+    session.gui.set("Cut away", labels.TOP)
     assert "saw no ceiling" in session.gui.text()
     assert look_of(session.folder.place()).cut.height_m > 2.6
 
 
 def test_without_a_scene_nothing_can_be_cut(server):
     session = Session(server.scene)
-    session.gui.set("Leave out", labels.PLANE)
+    session.gui.set("Cut away", labels.PLANE)
     assert session.folder.place() == ""
-    assert session.gui.find("Leave out").value == labels.NOTHING
+    assert session.gui.find("Cut away").value == labels.NOTHING
 
 
 def test_a_plane_leaves_out_what_is_nearer_and_turns_and_flips(session):
-    session.gui.set("Leave out", labels.PLANE)
+    session.gui.set("Cut away", labels.PLANE)
     cut = look_of(session.folder.place()).cut
     assert isinstance(cut, Plane)
     assert cut.normal == pytest.approx((0.0, 1.0, 0.0))  # level, away from the viewer
@@ -108,10 +108,10 @@ def test_a_plane_leaves_out_what_is_nearer_and_turns_and_flips(session):
 
 
 def test_a_box_turns_and_can_be_left_out_itself(session):
-    session.gui.set("Leave out", labels.BOX)
+    session.gui.set("Cut away", labels.BOX)
     assert len(session.sent["planes"]) == 6
     session.gui.set("Turn (°)", 30)
-    session.gui.set("Leave out the inside", True)
+    session.gui.set("Cut away the inside", True)
     cut = look_of(session.folder.place()).cut
     assert isinstance(cut, Box)
     assert (cut.turn_deg, cut.inside) == (30.0, True)
@@ -130,7 +130,7 @@ def test_wireframe_light_points_and_ruler_are_told_to_the_page(server, session):
     assert session.folder.place() == "light_-90_10~ruler"
     assert session.sent["light"] == [-90, 10]
     points = Session(server.scene, OPEN, surface=False)
-    assert set(points.live()) == {"Leave out", "Points (mm)", "Scale bar and axes"}
+    assert set(points.live()) == {"Cut away", "Points (mm)", "Scale bar and axes"}
     points.gui.set("Points (mm)", 8)
     assert points.folder.place() == "points_8"
     assert points.sent["point"] == 0.008
@@ -144,7 +144,7 @@ def test_an_address_waits_for_the_scene_and_is_cut_at_once(server):
     session.folder.redraw()
     assert session.sent["planes"][0]["handle"].startswith(f"{session.below}/look/")
     assert session.folder.place() == "top_1500~wire"
-    assert session.gui.find("Leave out").value == labels.TOP
+    assert session.gui.find("Cut away").value == labels.TOP
     session.folder.take("")
     assert (session.folder.place(), session.sent["planes"]) == ("", [])
     with pytest.raises(InputError):
@@ -153,12 +153,12 @@ def test_an_address_waits_for_the_scene_and_is_cut_at_once(server):
 
 def test_a_dragged_handle_is_in_the_address_when_it_is_let_go(session):
     session.folder.take("top_1500")
-    session.folder._grabbed(Top(1.25), False)
+    session.folder._dragged(Top(1.25), False)
     assert session.folder.place() == "top_1500"
-    session.folder._grabbed(Top(1.25), True)
+    session.folder._dragged(Top(1.25), True)
     assert session.folder.place() == "top_1250"
     assert session.gui.find("Height (m)").value == 1.25
-    session.folder._grabbed(Plane((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), True)  # of a cut that is gone
+    session.folder._dragged(Plane((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), True)  # of a cut that is gone
     assert session.folder.place() == "top_1250"
 
 

@@ -17,15 +17,33 @@ NAMES = itertools.count()
 
 @pytest.fixture
 def handles(server):
-    dragged = []
-    made = CutHandles(server.scene, f"/h{next(NAMES)}/look", lambda *drag: dragged.append(drag))
-    made.dragged = dragged
+    dragged, posted = [], []
+    made = CutHandles(
+        server.scene,
+        f"/h{next(NAMES)}/look",
+        lambda *call: posted.append(call),
+        lambda *drag: dragged.append(drag),
+    )
+    made.dragged, made.posted = dragged, posted
     yield made
     made.draw(None, None)
 
 
-def drag(server, name, phase="end", **pose):
-    """Move a handle as a hand does."""
+def drag(server, handles, name, phase="end", **pose):
+    """Move a handle as a hand does, and let the session hear of it."""
+    grab(server, name, phase, **pose)
+    run(handles.posted)
+
+
+def run(posted):
+    """Run what was posted to the session's thread."""
+    while posted:
+        function, *arguments = posted.pop(0)
+        function(*arguments)
+
+
+def grab(server, name, phase, **pose):
+    """Move a handle as a hand does; the session has not heard of it."""
     grip = server.scene.get_handle_by_name(name)
     for key, value in pose.items():
         setattr(grip, key, value)
@@ -72,15 +90,25 @@ def test_they_come_again_after_the_screen_has_cleared_its_drawing(server, handle
 
 def test_dragging_a_height_or_a_plane_moves_the_cut(server, handles):
     handles.draw(Top(1.8), ROOM)
-    drag(server, handles.planes[0][0], "update", position=(2.0, 1.5, 1.2))
+    drag(server, handles, handles.planes[0][0], "update", position=(2.0, 1.5, 1.2))
     assert handles.dragged[-1] == (Top(1.2), False)
     handles.draw(Plane((1.0, 1.0, 1.0), (0.0, 1.0, 0.0)), ROOM)
     half = np.sqrt(0.5)
-    drag(server, handles.planes[0][0], position=(1.0, 0.5, 1.0), wxyz=(half, 0.0, half, 0.0))
+    drag(server, handles, handles.planes[0][0], position=(1.0, 0.5, 1.0), wxyz=(half, 0.0, half, 0.0))
     cut, ended = handles.dragged[-1]
     assert ended
     assert cut.point_m == (1.0, 0.5, 1.0)
     assert cut.normal == pytest.approx((1.0, 0.0, 0.0), abs=1e-6)  # z turned about y by 90 degrees
+
+
+def test_a_drag_that_the_session_hears_of_when_its_handle_is_gone_is_dropped(server, handles):
+    handles.draw(BOX, ROOM)
+    for cut in (Plane((1.0, 1.0, 1.0), (0.0, 1.0, 0.0)), None):
+        name, _ = handles.planes[-1]
+        grab(server, name, "update", position=(0.0, 0.0, 3.0))
+        handles.draw(cut, ROOM)
+        run(handles.posted)
+    assert handles.dragged == []
 
 
 @pytest.mark.parametrize("row", range(6))
@@ -91,7 +119,7 @@ def test_dragging_a_face_of_a_box_moves_that_face_only(server, handles, row):
     moved = np.array(grip.position)
     moved[row // 2] += 0.1
     for phase in ("update", "end"):  # the frame stays while the face is dragged
-        drag(server, name, phase, position=tuple(moved))
+        drag(server, handles, name, phase, position=tuple(moved))
         cut, _ = handles.dragged[-1]
         for face, ((old_m, normal), (new_m, _)) in enumerate(
             zip(planes_of(BOX), planes_of(cut), strict=True)

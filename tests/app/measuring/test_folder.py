@@ -219,6 +219,27 @@ def test_a_true_length_checks_and_sets_the_scale_and_it_is_undone(session):
     assert "scaled" not in session.gui.text()
 
 
+def test_a_new_name_leaves_the_typed_true_length_and_its_check(session):
+    session.folder.take(PLACE)
+    session.gui.set("True length (cm)", 66.0)
+    session.gui.set("Its name", "Side  ~")
+    assert session.gui.find("True length (cm)").value == 66.0
+    assert session.gui.find("Its name").value == "Side -"
+    assert session.gui.find("Chosen measure").value == "1: Side -"
+    assert "66 cm does not agree" in session.gui.text()
+    session.gui.press("Scale", SET)
+    assert session.folder.place() == f"{PLACE.replace('Top', 'Side -')}~t6600"
+
+
+@pytest.mark.parametrize("true", [70, 90, 110, 6600, 99999])
+def test_the_scale_of_an_address_is_not_checked_against_itself(session, true):
+    session.folder.take(f"{PLACE}~t{true}")
+    session.gui.set("Chosen measure", "1: Top")
+    session.gui.set("True length (cm)", session.gui.find("True length (cm)").value)
+    assert session.asked[-1][0].check is None
+    assert "agree" not in session.gui.text()
+
+
 def test_the_scale_goes_with_the_measure_that_set_it(session):
     session.folder.take(f"{PLACE}~t6600~~{PLACE.replace('100_100', '100_200')}")
     assert session.texts()[0].startswith("Top: 66.0")

@@ -20,7 +20,7 @@ def shown(monkeypatch, away_m):
     source = RNG.random((50, 3)) + away_m
     T = rigid(np.eye(3), away_m) @ POSE @ rigid(np.eye(3), -away_m)
     empty = np.zeros((1, 50), np.uint8)
-    run = page.RaceRun("icp", (1, 2, 3), T[None], np.zeros(1), ("",), None, empty, ())
+    run = page.RaceRun("icp", (1, 2, 3), T[None], np.zeros(1), ("",), ("",), None, empty, ())
     view = Viewpoint(away_m - [5.0, 0.0, 0.0], away_m, np.array([0.0, 0.0, 1.0]))
     target = apply(T, source)
     page.race_page(page.RaceShow("t", "s", source, target, view, (run,), None, 1.0, ("", "", "")))

@@ -117,6 +117,23 @@ def test_a_new_change_forgets_what_was_undone(hand):
     assert hand.history.has_steps == (True, False)
 
 
+def test_a_first_address_is_no_step_unless_a_hand_has_changed_something_before(hand):
+    opened = replace(START, preset="thesis")
+    hand.spec = opened
+    hand.history.accept()
+    hand.history.follow(by_hand=True)
+    assert hand.history.has_steps == (False, False)
+    hand.set(POINTS, 6000)
+    hand.now_s += 10.0
+    changed, hand.spec = hand.spec, opened  # the browser's Back
+    hand.history.accept()
+    hand.history.follow(by_hand=True)
+    assert hand.history.undo() == "Undone: max points."
+    assert hand.spec == changed
+    hand.history.undo()
+    assert hand.spec == opened
+
+
 def test_what_a_result_brings_belongs_to_the_step_before(hand):
     hand.set(POINTS, 6000)
     hand.set(LOWEST, 0.25, by_hand=False)

@@ -185,10 +185,16 @@ def test_only_the_student_whose_command_failed_is_told(teacher, student):
 
 
 def test_what_no_page_says_is_not_heard(teacher, student):
-    student.set("Seat", "1 vote 9")
+    student.set("Seat", f"1 vote 9 {voter_id(0)}")
+    student.set("Seat", "1 vote 1")
     student.set("Seat", "roam")
     student.set("Seat", "2 roam")
     wait_for(lambda: teacher.reads("**0** of them follow"))
+
+
+def voter_id(number):
+    """An id as a page makes it."""
+    return f"{number:032x}"
 
 
 def test_thirty_browsers_see_the_room_and_each_vote_is_counted_once(lecture, teacher):
@@ -203,12 +209,17 @@ def test_thirty_browsers_see_the_room_and_each_vote_is_counted_once(lecture, tea
         teacher.set("Go", "Next", which=1)
         wait_for(lambda: all(one.reads("The class votes") for one in students))
         for number, one in enumerate(students):
-            one.set("Seat", "1 vote 3")
-            one.set("Seat", f"2 vote {1 if number < 20 else 2}")
+            one.set("Seat", f"1 vote 3 {voter_id(number)}")
+            one.set("Seat", f"2 vote {1 if number < 20 else 2} {voter_id(number)}")
         wait_for(lambda: all(one.reads("████████ **20**") and one.reads("████ **10**") for one in students))
+        students[1].set("Seat", f"3 vote 1 {voter_id(CLASS)}")  # another id, but the same connection
+        students.append(Connection(lecture.url))  # the browser of the last one, which has reloaded the page
+        students[-1].set("Seat", f"1 vote 3 {voter_id(CLASS - 1)}")
+        wait_for(lambda: all(one.reads("**20**") and one.reads("███ **9**") for one in students))
+        assert teacher.reads("**1**")
         teacher.set("Your guess", "Skip", which=1)
         wait_for(lambda: all(not one.reads("The class votes") for one in students))
-        students[0].set("Seat", "3 vote 3")
+        students[0].set("Seat", f"3 vote 3 {voter_id(0)}")
         teacher.set("Go", "Back", which=1)
         assert students[1].reads("**20**")
     finally:

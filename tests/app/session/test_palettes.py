@@ -43,6 +43,10 @@ def test_entries_keep_their_place_and_those_no_longer_offered_go():
     assert gui.commands[0] is first
     gui.press("c")
     assert done == ["c"]
+    palette.offer([Entry("a", "Setting", lambda: done.append("new a"))])
+    assert gui.commands == [first]
+    gui.press("a")
+    assert done == ["c", "new a"]
 
 
 def test_two_of_one_name_are_both_offered_if_they_are_of_different_kinds():

@@ -24,6 +24,7 @@ from app.web.gate import Gate
 from app.web.headers import strict_headers
 from app.web.origin import only_own_page
 from app.web.upload_gate import (
+    LEAST_PART_BYTES,
     MOST_A_MINUTE,
     MOST_BYTES,
     MOST_TOTAL_BYTES,
@@ -210,6 +211,27 @@ def test_a_file_is_too_large_too_many_or_more_than_it_said():
     quick = UploadGate()
     assert all(quick.begins(0, 0, str(k)) for k in range(MOST_A_MINUTE))
     assert not quick.begins(0, 0, "one more")
+
+
+def test_parts_of_unknown_files_are_not_kept_and_empty_parts_are_bounded(monkeypatch):
+    gate = UploadGate()
+    assert not any(gate.goes_on(f"unknown {k}", 0) for k in range(1000))
+    assert not gate._left
+    monkeypatch.setattr("app.web.upload_gate.MOST_A_MINUTE", 10**6)
+    assert sum(gate.begins(0, 0, f"empty {k}") for k in range(10)) == 10
+    most = MOST_TOTAL_BYTES // LEAST_PART_BYTES - 10
+    assert not gate.begins(most, most + 1, "parts")
+    assert gate.begins(most, most, "parts")
+    assert not gate.begins(0, 0, "one more")
+
+
+def test_only_parts_of_accepted_files_are_awaited():
+    gate = UploadGate()
+    gate.begins(10, 2, "a")
+    gate.goes_on("a", 6)
+    assert [gate.awaits(transfer) for transfer in ("a", "b", ["a"], None)] == [True, False, False, False]
+    gate.goes_on("a", 5)
+    assert not gate.awaits("a")
 
 
 def test_an_upload_makes_room_for_another_when_it_is_a_minute_old(monkeypatch):

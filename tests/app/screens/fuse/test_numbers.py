@@ -81,7 +81,7 @@ def test_one_ceicp_that_loses_to_another_is_no_loss_of_ceicp():
 
 def test_the_table_has_a_column_for_each_lane_and_explains_every_row():
     html = race_table(
-        "truth", tuple(lane(str(i), 0.01, "No point of the source lies within") for i in range(4))
+        "truth", tuple(lane(str(i), 0.01, "No pair of points is within the gate") for i in range(4))
     )
     assert re.findall("[①②③④]", html) == list("①②③④")
     assert html.count("data-hint=") == 9

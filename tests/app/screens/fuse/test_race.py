@@ -9,6 +9,7 @@ import pytest
 from app.compute.state import Spec
 from app.drawing.cameras import stage_of
 from app.drawing.colors import MOST_DISTANCE_M
+from app.screens.fuse.belief import Belief
 from app.screens.fuse.capture_job import capture_job
 from app.screens.fuse.draw import RaceDrawing
 from app.screens.fuse.race_job import contest_of, race_job
@@ -16,9 +17,11 @@ from app.screens.fuse.view import CAPTURE_SHIFTS_M, CAPTURE_TURNS_DEG, Race, Sta
 from app.screens.scene.job import scene_job
 from packetmesh.errors import InputError
 from packetmesh.progress import drain as end
+from pipeline.config import RegistrationConfig
 from pipeline.io.rigs import save_rig
-from pipeline.kernels.geometry import inverse
+from pipeline.kernels.geometry import inverse, rigid
 from pipeline.sources import Demo, RigFolder
+from pipeline.types import PointCloud
 from tests.app.screens.fuse.walks import walk
 
 SPEC = Spec(Demo("box-on-table"))
@@ -184,6 +187,34 @@ def test_a_node_that_an_address_names_has_to_be_there(rig, nodes, which):
         contest_of(rig, nodes, Race(**{which: 99}))
 
 
+@pytest.mark.parametrize(
+    ("race", "from_cameras"),
+    [
+        (Race(), (True, True)),
+        (Race(noise_m=0.01), (False, True)),
+        (Race(mode="inferred"), (False, True)),
+        (Race(mode="corridor"), (False, False)),
+    ],
+)
+def test_a_cloud_shows_free_space_if_it_is_a_cameras_own_and_not_degraded(rig, nodes, race, from_cameras):
+    assert contest_of(rig, nodes, race).from_cameras == from_cameras
+
+
+def test_a_camera_that_looks_through_a_fence_knows_the_free_space_between_its_bars():
+    """Half a metre nearer than it was seen, the wall behind the fence is where the camera saw through."""
+    columns, rows = (part.ravel() for part in np.meshgrid(np.arange(240), np.arange(180)))
+    z_m = np.where(columns % 24 < 8, 1.0, 2.0)
+    seen_m = np.column_stack([(columns - 120) / 200.0 * z_m, (rows - 90) / 200.0 * z_m, z_m])
+    fence = PointCloud(seen_m)
+    nearer = rigid(np.eye(3), np.array([0.0, 0.0, -0.5]))
+    known, unknown = (
+        Belief(fence, fence, RegistrationConfig(), from_cameras)._judge(nearer)
+        for from_cameras in ((True, True), (False, False))
+    )
+    assert known.through > 1000
+    assert (unknown.refutable, unknown.through) == (False, 0)
+
+
 def test_a_node_is_not_moved_onto_itself(rig, nodes):
     with pytest.raises(InputError, match="cannot be moved onto itself"):
         contest_of(rig, nodes, Race(source=1, target=1))
@@ -192,7 +223,7 @@ def test_a_node_is_not_moved_onto_itself(rig, nodes):
 def test_a_method_that_finds_no_pair_stays_at_its_start(store):
     view = end(race_job(store, SPEC, replace(SLIGHT, start=Start((0.0, 0.0, 0.0), (0.0, 0.0, 5000.0)))))
     lost = view.lanes[1]
-    assert lost.stop_reason.startswith("No point of the source")
+    assert lost.stop_reason.startswith("No pair of points is within the gate")
     assert len(lost.steps) == 1
     assert lost.iterations == 0
 

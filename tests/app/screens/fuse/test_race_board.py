@@ -1,6 +1,7 @@
 """What stands over the lanes of a race, and the colours of its points."""
 
 import re
+from dataclasses import replace
 from itertools import combinations
 from typing import get_args
 
@@ -12,9 +13,10 @@ from scipy.spatial import cKDTree
 from app.drawing.colors import MOST_DISTANCE_M
 from app.screens.fuse.board import scale, score
 from app.screens.fuse.labels import COMPARISONS, RIVALS
-from app.screens.fuse.lens import REACH_M, Distances, shades_of
+from app.screens.fuse.lens import Distances, shades_of
 from app.screens.fuse.methods import METHODS, color_of
-from app.screens.fuse.view import SUCCESS_M, Race, Reference
+from app.screens.fuse.numbers import off_text, race_table
+from app.screens.fuse.view import REACH_M, SUCCESS_M, Race, Reference
 from pipeline import config
 from pipeline.kernels.geometry import rigid, rotation_exp
 from tests.app.screens.fuse.test_numbers import lane
@@ -71,6 +73,21 @@ def test_without_truth_it_is_the_distance_to_the_other_cloud_and_nobody_arrives(
     said = score(lane("ICP point", None), 0)
     assert (said["number"], said["unit"]) == ("3.00", "cm to the nearest point")
     assert said["state"] == "running"
+
+
+@pytest.mark.parametrize(
+    ("gap_m", "number", "text"),
+    [(0.4999, "49.99", "49.99 cm"), (REACH_M, "≥ 50", "≥ 50 cm"), (float("nan"), "–", "–")],
+)
+def test_a_distance_beyond_the_search_is_given_as_a_lower_limit(gap_m, number, text):
+    """Also where it is the last one, in the table."""
+    bare = lane("ICP point", None)
+    far = replace(bare, steps=(replace(bare.steps[0], gap_m=gap_m),))
+    assert score(far, 0)["number"] == number
+    assert off_text(far.steps[0]) == text
+    assert race_table("cloud", (far,)).count(f">{text}</td>") == 2
+    known = replace(far.steps[0], point_error_m=0.7)
+    assert off_text(known) == "70.00 cm"
 
 
 def test_the_scale_names_the_truth_only_where_it_is_known():

@@ -8,6 +8,7 @@ import pytest
 from app.dock.dock import COUNT_NS
 from app.screens.fuse.clock import RaceClock
 from app.screens.fuse.player import error_lane
+from app.screens.fuse.view import REACH_M
 from tests.app.screens.fuse.test_numbers import lane
 
 MS = 1_000_000
@@ -54,3 +55,16 @@ def test_the_curves_tell_the_distance_at_the_clock_and_hide_what_is_to_come():
     assert curves.veil == 1.0
     said = [label.text for label in curves.labels(3 * COUNT_NS)]
     assert said == ["from the truth", "① 6.00 cm", "② 1.00 cm"]
+
+
+def test_a_curve_begins_where_the_distance_is_within_reach():
+    clock = RaceClock.of([SHORT], in_ms=False)
+    gaps_m = (REACH_M, 0.3, 0.1)
+    steps = [
+        replace(step, point_error_m=None, gap_m=gap_m)
+        for step, gap_m in zip(SHORT.steps, gaps_m, strict=True)
+    ]
+    curves = error_lane("cloud", [replace(SHORT, steps=tuple(steps))], clock)
+    said = [curves.labels(row * COUNT_NS)[1].text for row in range(3)]
+    assert said == ["① –", "① 30.00 cm", "① 10.00 cm"]
+    assert curves.ticks[0].text == "40 cm"

@@ -15,10 +15,11 @@ from PIL import Image
 from app.compute.state import Spec
 from app.drawing.colors import NEUTRAL
 from app.reports.race import race_page
-from app.reports.race_animation import off_text, race_animation
+from app.reports.race_animation import race_animation
 from app.screens.fuse.export import race_offers
 from app.screens.fuse.export_job import race_show
 from app.screens.fuse.methods import color_of
+from app.screens.fuse.numbers import off_text
 from app.screens.fuse.race_job import race_job
 from app.screens.fuse.view import Race, Start
 from packetmesh.progress import drain
@@ -42,6 +43,7 @@ def test_every_step_of_every_method_is_there_with_its_error(view, show):
     for lane, run in zip(view.lanes, show.runs, strict=True):
         assert len(run.poses) == len(run.notes) == len(run.lens) == len(lane.steps)
         np.testing.assert_allclose(run.offs_cm, [100.0 * step.off_m for step in lane.steps])
+        assert list(run.offs) == [off_text(step) for step in lane.steps]
         assert run.color == color_of(lane.rival)
         assert run.notes[-1].endswith(f"after {lane.iterations} iterations · {lane.verdict}")
     assert show.steps == max(len(lane.steps) for lane in view.lanes)
@@ -72,10 +74,6 @@ def test_the_moving_picture_shows_the_cloud_coming_nearer(show):
     grey = [int((np.abs(picture - NEUTRAL).max(axis=2) < 12).sum()) for picture in pictures]
     assert min(grey) > 500
     assert np.abs(pictures[0] - pictures[1]).max(axis=2).astype(bool).mean() > 0.02
-
-
-def test_numbers_have_as_many_digits_as_on_the_board():
-    assert [off_text(off_cm) for off_cm in (28.14, 0.034, float("nan"))] == ["28.1 cm", "0.03 cm", "–"]
 
 
 def test_a_race_is_offered_with_an_honest_word_on_commands():

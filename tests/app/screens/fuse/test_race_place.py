@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.screens.fuse.place import FIRST, race_of, race_text
+from app.screens.fuse.place import FIRST, moment_of, moment_text, race_of, race_text
 from app.screens.fuse.view import Start
 from packetmesh.errors import InputError
 
@@ -41,8 +41,26 @@ def test_only_what_differs_is_in_it():
         "source=-1",
         "speed=3",
         "seed",
+        "mode=corridor noise_m=0.01",
+        "mode=square crop_share=0.2",
     ],
 )
 def test_what_is_beyond_the_sliders_gets_a_sentence(text):
     with pytest.raises(InputError):
         race_of(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "moment"),
+    [("", (0.0, False)), ("12", (12.0, False)), ("3.25ms", (3.25, True)), ("end", (None, False))],
+)
+def test_a_moment_is_an_iteration_a_time_or_the_end(text, moment):
+    assert moment_of(text) == moment
+    at, in_ms = moment
+    assert moment_text("end" if at is None else f"{at:g}", in_ms) == text
+
+
+@pytest.mark.parametrize("text", ["-1", "12 ms", "nan", "1e9", "9" * 400, "0." + "1" * 400])
+def test_what_is_no_moment_of_a_race_gets_a_sentence(text):
+    with pytest.raises(InputError, match="such as 12, a time such as 12ms, or end"):
+        moment_of(text)

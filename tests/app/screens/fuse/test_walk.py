@@ -12,7 +12,7 @@ import pytest
 
 from app.drawing.colors import DELIVERED, LOSS
 from app.screens.fuse import walk_job
-from app.screens.fuse.walk_draw import enlarging, pieces, shifted, viewpoint
+from app.screens.fuse.walk_draw import MOST_SEGMENTS, enlarging, pieces, segments, shifted, viewpoint
 from app.screens.fuse.walk_job import MOST_PICTURES, PICTURE_PX, pictures_of, view_of
 from app.screens.fuse.walk_lane import ARCS_PX, KEYFRAME, TRACKED, WalkLane, drift_lane
 from app.screens.fuse.walk_lesson import WalkLook, loop_of
@@ -102,6 +102,22 @@ def test_pieces_of_the_map_end_with_frames(view):
 def test_the_drift_is_enlarged_until_it_can_be_seen_and_no_further(view):
     most_m = 39 * DRIFT_M
     assert enlarging(view) == max(n for n in (1, 2, 5, 10, 20, 50) if n * most_m <= 0.2 * 2 * np.sqrt(2))
+
+
+@pytest.mark.parametrize("frames", [1, 2, 40, 1001, 1999, 2000, 54_321])
+@pytest.mark.parametrize("lost", [(), (0,), (20,), (17, 20, 21, 39), (500, 501, 998, 1999)])
+def test_a_path_reaches_its_last_frame_and_crosses_no_lost_one(frames, lost):
+    """A camera on a straight line: the lengths of its segments add up to those of the parts between."""
+    at_m = np.outer(np.arange(frames, dtype=float), (0.0, 3.0, 4.0))
+    at_m[[frame for frame in lost if frame < frames]] = np.nan
+    drawn_m = segments(at_m)
+    known = np.flatnonzero(np.isfinite(at_m[:, 0]))
+    parts = np.split(known, np.flatnonzero(np.diff(known) > 1) + 1)
+    length_m = np.linalg.norm(drawn_m[:, 1] - drawn_m[:, 0], axis=1).sum()
+    assert length_m == 5.0 * sum(np.ptp(part) for part in parts if len(part))
+    assert len(drawn_m) <= MOST_SEGMENTS + len(parts)
+    if frames <= MOST_SEGMENTS:
+        assert len(drawn_m) == sum(len(part) - 1 for part in parts if len(part))
 
 
 class Images:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 
 import cv2
@@ -120,6 +121,25 @@ def test_before_a_recording_is_tracked_its_walk_is_awaited(store, recording):
     bench.steps = ("scene",)
     bench.advance()
     assert bench.gui.find("Show").value == RESULT
+    server.stop()
+
+
+@pytest.mark.parametrize(("loop", "chosen"), [("0-39", "0-39"), ("5-7", "")])
+def test_an_address_with_an_unknown_loop_shows_the_rest_of_its_walk(store, recording, loop, chosen):
+    server, posted = viser.ViserServer(port=0, verbose=False), []
+    ui = ui_of(server.scene, post=lambda *call: posted.append(call))
+    bench = Bench(FusePanel, ui, store, steps=("scene",), spec=Spec(recording))
+    bench.panel.on_show()
+    bench.panel.in_address["loop"].take(loop)
+    bench.panel._walk._take_look(WalkLook(moment=None))
+    bench.advance()
+    part = bench.panel._walk
+    assert part._view.frame_at(part._dock.now_ns) == LOST[0]
+    assert part._pictures.files
+    ((take, text),) = posted
+    with contextlib.nullcontext() if chosen else pytest.raises(InputError, match="5-7, but no loop"):
+        take(text)
+    assert bench.panel.in_address["loop"].place() == chosen
     server.stop()
 
 

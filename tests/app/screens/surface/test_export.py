@@ -20,14 +20,25 @@ from app.drawing.colors import BACKGROUND, DISTANCE_STOPS, INFERRED, LOSS, TARGE
 from app.drawing.legend import Legend
 from app.reports.captioned import captioned
 from app.screens.surface.export import surface_offers
-from app.screens.surface.export_job import flight_job, page_job, view_job
+from app.screens.surface.export_job import (
+    MOST_PICTURES,
+    flight,
+    flight_job,
+    page_job,
+    sentence_of,
+    view_job,
+)
 from app.screens.surface.labels import AFTER, POISSON
 from app.screens.surface.paint_job import colored_glb
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from packetmesh.settings import with_settings
 from pipeline.config import PipelineConfig
+from pipeline.kernels.geometry import rigid
+from pipeline.kernels.rays import Camera
 from pipeline.sources import Demo
+from pipeline.types import Rig
+from tests.app.screens.fuse.walks import CAMERA, walk
 
 SPEC = Spec(Demo("box-on-table"), config=with_settings(PipelineConfig(), ["surface.max_points=3000"]))
 
@@ -88,6 +99,26 @@ def test_a_flight_goes_to_the_last_camera_and_back(store, monkeypatch):
         pictures.append(np.asarray(film.convert("RGB")).astype(int))
     assert np.abs(pictures[0] - pictures[1]).mean() > 5.0
     np.testing.assert_array_equal(pictures[2], pictures[3])  # the way back
+
+
+@pytest.mark.parametrize("count", [2, 3, 16, 17, 18, 40, 300])
+def test_a_flight_past_many_cameras_is_not_longer(count):
+    """It flies along a straight line of cameras, whose ends it reaches, and never back."""
+    cameras = [Camera(CAMERA, rigid(np.eye(3), np.array([float(row), 0.0, 0.0]))) for row in range(count)]
+    x_m = [camera.T_world_camera[0, 3] for camera in flight(cameras, None)]
+    assert len(x_m) <= MOST_PICTURES + 1
+    assert (x_m[0], x_m[-1]) == (0.0, count - 1.0)
+    assert np.all(np.diff(x_m) > 0.0)
+    assert len(x_m) > 2 * min(count - 1, MOST_PICTURES // 2)
+
+
+@pytest.mark.parametrize(
+    ("frames", "walked", "source"),
+    [(1, False, "one camera node"), (3, False, "3 camera nodes"), (12, True, "one walking camera")],
+)
+def test_the_page_names_the_cameras_that_the_surface_is_from(frames, walked, source):
+    rig = Rig("a room", (None,) * frames, walk=walk() if walked else None)
+    assert sentence_of(rig) == f"A surface made from the images of {source}. Drag the line to compare."
 
 
 def test_the_view_has_the_apps_background_and_a_title_above(store):

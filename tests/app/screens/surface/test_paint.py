@@ -115,7 +115,7 @@ def test_what_is_not_known_is_grey(made):
 def test_every_colouring_but_the_cameras_has_a_legend():
     for coloring in COLORINGS.values():
         assert "Points that the ball left out" in legend_html(coloring, True)
-        closed = "Holes of up to 15 cm around are closed" in legend_html(coloring, True)
+        closed = "Holes whose rim is at most 15 cm long are closed" in legend_html(coloring, True)
         assert closed == (coloring in ("photo", "violet"))
         assert (legend_html(coloring, True) == legend_html("color", True)) == (coloring == "color")
     assert "10 cm or more" in legend_html("distance", True)

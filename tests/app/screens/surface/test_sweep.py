@@ -121,7 +121,7 @@ def test_the_sentence_says_when_the_widest_balls_miss_more_again():
     sentence = sweep_sentence(swept(row(10, 0.60), row(28, 0.20), row(60, 0.30)))
     assert sentence == (
         "From 28 mm on, larger balls close less than 1% more of the rays (20.0% are without a surface); "
-        "with the widest, 60 mm, 30.0% are again."
+        "with the widest ball, 60 mm, 30.0% are without a surface again."
     )
 
 
@@ -253,4 +253,4 @@ def test_the_lower_plot_can_be_chosen(advice):
     assert advice.curves is None
     assert not advice.gui.find("Lower plot").seen
     advice.folder.load(None)
-    assert "Stopped." in advice.gui.text()
+    assert "No curves: the computation was stopped or failed." in advice.gui.text()

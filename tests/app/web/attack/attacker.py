@@ -6,6 +6,7 @@ import contextlib
 import math
 
 import viser
+from websockets.sync.client import connect
 
 from app.load.connection import Connection, wait_for
 
@@ -60,3 +61,15 @@ def connected(url, label, cookie=""):
     with contextlib.closing(Connection(url, cookie)) as one:
         wait_for(lambda: label in one.uuids, 120.0)
         yield one
+
+
+def silent_connection(url):
+    """A browser's connection that sends nothing by itself."""
+    protocols = [f"viser-v{viser.__version__}"]
+    return connect(url.replace("http://", "ws://"), subprotocols=protocols, max_size=None, proxy=None)
+
+
+def receive(connection):
+    """Take what the server sends until it closes the connection."""
+    while True:
+        connection.recv(timeout=30.0)

@@ -8,15 +8,16 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from websockets.exceptions import InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 sys.path.insert(0, str(Path(__file__).parent))
-from attacker import connected
+from attacker import connected, receive, silent_connection
 
 from app.load.connection import Connection, wait_for
 from app.server import FULL, build_server
 from app.session.session import Session
 from app.web import crowd as crowds
+from app.web import silent
 from app.web.crowd import (
     MOST_OF_ONE_ADDRESS,
     MOST_SESSIONS,
@@ -110,6 +111,17 @@ def test_a_hundred_that_leave_at_once_cost_nothing(crowd):
     assert len(house.begun) <= 3  # a session or two that had begun before it was left
 
 
+def test_a_browser_whose_session_fails_is_turned_away_and_the_next_one_comes_in(crowd):
+    house = House(crowd)
+    house.building = Future()
+    house.building.set_exception(ValueError("no session"))
+    house.come(1)
+    wait_for(lambda: house.away == [1])
+    house.building = None
+    house.come(2)
+    wait_for(lambda: house.begun == [1, 2])
+
+
 def test_a_session_that_shows_no_page_goes(crowd, monkeypatch):
     monkeypatch.setattr(crowds, "SILENT_S", 0.2)
     monkeypatch.setattr(crowds, "LOOK_S", 0.05)
@@ -169,6 +181,12 @@ def test_after_a_hundred_connections_in_a_second_the_next_browser_is_in_soon(run
     with connected(running.url, "Radius (mm)"):
         wait_for(lambda: len(running.sessions) == 1)
     assert len(begun) < answers.count(101) / 2  # those that left at once were not built for
+
+
+def test_the_app_closes_a_connection_that_sends_nothing(running, monkeypatch):
+    monkeypatch.setattr(silent, "SILENT_S", 0.2)
+    with silent_connection(running.url) as connection, pytest.raises(ConnectionClosed):
+        receive(connection)
 
 
 def test_who_finds_no_place_is_told_and_comes_in_when_one_is_free(running, monkeypatch):

@@ -244,6 +244,14 @@ def test_a_flood_is_not_heard_but_the_hand_after_it_is(server, browser, monkeypa
     wait_for(lambda: server.controls["list"].value == "b")
 
 
+def test_parts_of_no_file_are_counted_like_other_messages(server, browser, monkeypatch):
+    monkeypatch.setattr(gates, "MOST_AT_ONCE", 20.0)
+    monkeypatch.setattr(gates, "MOST_A_SECOND", 0.0)
+    for k in range(100):
+        browser.send(messages.FileTransferPart(None, f"{k}", 0, b""))
+    wait_for(lambda: server.gate.dropped[FLOOD] >= 80)
+
+
 def test_the_control_of_another_browser_is_nobody_elses(running):
     with connected(running.url, "Radius (mm)") as one, connected(running.url, "Radius (mm)") as other:
         mine, theirs = (page.uuids["Steps"][0] for page in (one, other))
