@@ -22,6 +22,9 @@ MAX_PAYLOAD_BYTES: dict[MacKind, int] = {"ieee802154": 116, "ieee80211b": 2304}
 LEAST_CAPTURE_DB = -5.0
 """Ratio of a frame's power to noise and interference below which ns-3 does not receive it (SPEC 6.3)."""
 
+GUARD_S = 0.05
+"""Time before the nodes fall asleep in which no transmission begins."""
+
 
 @dataclass(frozen=True, slots=True)
 class LossConfig:
@@ -98,7 +101,7 @@ class MacConfig:
     """Unslotted IEEE 802.15.4, IEEE 802.11b DCF, a link of its own for every node (ideal), a serial line
     with ten bits a byte, or a recorded link for every node (replay)."""
     rts: bool = False
-    """Ask for the channel before every packet (RTS/CTS); only IEEE 802.11b can."""
+    """Reserve the channel before every packet (RTS/CTS); only IEEE 802.11b can."""
     ack: bool = True
     """Acknowledge frames and send lost ones again; IEEE 802.11b always does."""
     retries: int | None = None
@@ -171,6 +174,12 @@ class NodesConfig:
         for key in ("spacing_m", "deadline_s", "duty_cycle", "duty_period_s", "recovery_s"):
             above(f"nodes.{key}", getattr(self, key), 0.0)
         share("nodes.duty_cycle", self.duty_cycle)
+        if self.duty_cycle < 1.0 and self.duty_cycle * self.duty_period_s < GUARD_S:
+            raise InputError(
+                f"nodes.duty_cycle is {self.duty_cycle} with a nodes.duty_period_s of {self.duty_period_s}, "
+                f"which keeps nodes awake for less than {GUARD_S} s, too short to send; try "
+                f"nodes.duty_period_s={2.0 * GUARD_S / self.duty_cycle:.3g}"
+            )
         nodes = f"nodes.count is {self.count}"
         places = f"x and y of each node and of the sink ({nodes})"
         one_each("nodes.places_m", self.places_m, 2 * (self.count + 1), places)

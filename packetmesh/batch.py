@@ -39,7 +39,7 @@ def run_batch(
         tasks: arguments of ``function``, one per call.
         scheduler: address of a Dask scheduler; None uses processes on this machine.
         processes: largest number of processes, by default one per core. With 1, or for a single task, the
-            tasks run in this process, and ``killed`` is not used.
+            tasks run in this process, unless ``killed`` is given.
         killed: called with a task whose process was killed also when the task ran alone; returns the task's
             answer, and the other tasks continue. None raises an error instead.
 
@@ -51,7 +51,7 @@ def run_batch(
         yield from _on_cluster(function, tasks, scheduler, killed)
         return
     processes = min(len(tasks), processes or os.cpu_count() or 1)
-    if processes <= 1:
+    if processes <= 1 and killed is None:
         yield from ((index, function(task)) for index, task in enumerate(tasks))
         return
     waiting = deque(enumerate(tasks))

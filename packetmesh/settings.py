@@ -106,9 +106,12 @@ def _replaced(config: Any, values: dict[str, str], known: list[str], prefix: str
         inner = {k.partition(".")[2]: v for k, v in values.items() if k.partition(".")[0] == key}
         if key not in hints:
             raise _unknown(".".join(filter(None, (prefix + key, next(iter(inner))))), known)
-        if dataclasses.is_dataclass(hints[key]) != all(inner):
+        nested = dataclasses.is_dataclass(hints[key])
+        if nested and "" in inner:
             raise InputError(f"'{prefix}{key}' is not a single setting; try {prefix}{key}.NAME=value")
-        if dataclasses.is_dataclass(hints[key]):
+        if not nested and any(inner):
+            raise InputError(f"'{prefix}{key}' is a single setting; try {prefix}{key}=VALUE")
+        if nested:
             changes[key] = _replaced(getattr(config, key), inner, known, f"{prefix}{key}.")
         else:
             changes[key] = _parsed(hints[key], inner[""], prefix + key)
@@ -143,7 +146,8 @@ def _parsed(hint: Any, text: str, key: str) -> Any:
     try:
         value = hint(text)
     except ValueError:
-        raise InputError(f"{key}={text} is not a number; try {key}={hint(1)}") from None
+        kind = "whole number in digits" if hint is int else "number"
+        raise InputError(f"{key}={text} is not a {kind}; try {key}={hint(1)}") from None
     if isinstance(value, float) and not math.isfinite(value):
         raise InputError(f"{key}={text} is not finite; try {key}=1.0")
     return value

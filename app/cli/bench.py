@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -23,12 +24,13 @@ def bench(
     """Measure speed and memory of PacketMesh and of other programs, in one run.
 
     Args:
-        out: Folder for bench.json.
+        out: Folder for bench.json; for problems.json and problems.csv with `--problems`, for recording.json
+            with `--recording`.
         only: Cases to run, or groups (the text before the colon), for example `chain,network`; all by
             default.
         problems: Solve registration problems instead: a folder of lists and clouds in the form of the
-            point-clouds-registration-benchmark (arXiv 2003.12841); writes problems.csv, a row for each
-            problem and method.
+            point-clouds-registration-benchmark (arXiv 2003.12841); problems.csv gets a row for each problem
+            and method.
         recording: Follow the camera of a recording instead, by ours and by other programs: a folder of TUM,
             7-Scenes or another form that has poses, which are the truth and no program gets.
         load_s: Duration of the cases `load` and `soak`, which run thirty browsers, in seconds.
@@ -88,14 +90,16 @@ def _solve(folder: Path, out: Path) -> dict[str, object]:
 
 
 def _browsers(kind: Literal["load", "soak"], seconds: float) -> Benchmark:
-    """Run the load test of thirty browsers; its time is the median from a click to its answer."""
+    """Run the load test of thirty browsers; its time is the median from a click to its answer, NaN if none
+    was answered.
+    """
     from app.load.load import put_load, soak
     from lab.benchmarks.benchmark import Benchmark
 
     load = put_load(seconds) if kind == "load" else soak(seconds)
     record = load.record()
     return Benchmark(
-        record["answers_s"]["median"],
+        record["answers_s"].get("median", math.nan),
         {},
         record["server_peak_bytes"] + record["workers_peak_bytes"],
         runs=(record,),

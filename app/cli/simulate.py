@@ -31,7 +31,8 @@ def simulate(
 
     Args:
         preset: thesis-link, street-grid, greenhouse, office, or the config.json of a finished run.
-        out: Folder for trace.ndjson, trace.csv (of the first run), metrics.json and config.json.
+        out: Folder for config.json, metrics.json and, without --sweep, the trace of the first run
+            (trace.ndjson, trace.csv and trace.json).
         set: Settings to change, for example `--set nodes.images=5 radio.shadowing_db=4`.
         replications: Number of runs, with seeds that count up from run.seed; 95 % intervals need two or
             more.
@@ -131,7 +132,7 @@ def _say_disconnected(config: NetworkConfig) -> None:
 
     alone = disconnected(config) if config.scenario == "collection" else ()
     if alone:
-        say(f"no path of links leads to the sink from {', '.join(alone)}; try a larger radio.range_m")
+        say(f"No path of links leads from {', '.join(alone)} to the sink; try a larger radio.range_m")
 
 
 def _sweep(

@@ -18,6 +18,10 @@ from packetmesh.files import file_trouble
 
 NICENESS = 5
 """Niceness of the computing processes: the server process gets the processor first."""
+OUT_OF_MEMORY = (
+    "There is not enough memory for this: "
+    "try smaller settings (fewer points, images or nodes, or a shorter run)."
+)
 
 
 def attend(connection: Connection, warm_up: Callable[[], Iterator[None]], threads: int) -> None:
@@ -92,7 +96,7 @@ def _answer(
     except PacketMeshError as error:
         return "error", str(error)
     except MemoryError:
-        return "error", "There is not enough memory for this: try fewer points or a smaller ball."
+        return "error", OUT_OF_MEMORY
     except OSError as error:
         if isinstance(error, (BrokenPipeError, ConnectionError)):
             raise

@@ -30,7 +30,10 @@ RESPAWN_PAUSE_S = 1.0
 """Pause before a process is started that replaces one that died at its start or grew too large, seconds."""
 MEMORY_LIMIT_BYTES = 2 << 30
 """Memory limit of a process: one that holds more after a job is replaced by a new process."""
-DIED = "The computing process ended unexpectedly, perhaps out of memory: try fewer points or a smaller ball."
+DIED = (
+    "The computing process ended unexpectedly, perhaps out of memory: "
+    "try smaller settings (fewer points, images or nodes, or a shorter run)."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,6 +198,7 @@ class ComputePool:
             if ticket not in self._waiting:
                 return False
             self._waiting.remove(ticket)
+            self._note_use(ticket)
         _run_callback(ticket.on_end, Outcome("stopped"))
         return True
 
@@ -298,27 +302,33 @@ class ComputePool:
             return
         with self._lock:
             slot.ready, slot.ticket = True, None
-            if ticket is not None and not ticket.ahead:
-                self._last_used_s = time.monotonic()
-            others = self._served(ticket, kind)
+            ended = self._ended(ticket, kind)
             if kind != "ready" and _memory_bytes(slot.process) > MEMORY_LIMIT_BYTES:
                 slot.ready = False
                 assert slot.process is not None
                 slot.process.terminate()
             self._dispatch()
-        if ticket is not None:
-            for one in (ticket, *others):
-                _run_callback(one.on_end, Outcome(kind, value))  # type: ignore[arg-type]
+        for one in ended:
+            _run_callback(one.on_end, Outcome(kind, value))  # type: ignore[arg-type]
 
     def _others(self, ticket: Ticket) -> list[Ticket]:
         """Return the waiting jobs with the same key. The caller holds the lock."""
         return [one for one in self._waiting if one.key is not None and one.key == ticket.key]
 
-    def _served(self, ticket: Ticket | None, kind: str) -> list[Ticket]:
-        """Remove and return the waiting jobs that this ended job also answers. The caller holds the lock."""
-        others = [] if ticket is None or kind == "stopped" else self._others(ticket)
+    def _ended(self, ticket: Ticket | None, kind: str) -> list[Ticket]:
+        """Return the job that has ended, if any, and the waiting jobs that it also answers, which no longer
+        wait. The caller holds the lock."""
+        if ticket is None:
+            return []
+        others = [] if kind == "stopped" else self._others(ticket)
         self._waiting = [one for one in self._waiting if one not in others]
-        return others
+        self._note_use(ticket, *others)
+        return [ticket, *others]
+
+    def _note_use(self, *ended: Ticket) -> None:
+        """Start the idle time when these jobs end, unless all are ahead. The caller holds the lock."""
+        if not all(one.ahead for one in ended):
+            self._last_used_s = time.monotonic()
 
     def _bury(self, slot: _Slot) -> None:
         with self._lock:
@@ -329,10 +339,9 @@ class ComputePool:
                 slot.connection.close()
             stopped = self._closed or (ticket is not None and ticket.stopping)
             outcome = Outcome("stopped") if stopped else Outcome("error", DIED)
-            others = self._served(ticket, outcome.kind)
-        if ticket is not None:
-            for one in (ticket, *others):
-                _run_callback(one.on_end, outcome)
+            ended = self._ended(ticket, outcome.kind)
+        for one in ended:
+            _run_callback(one.on_end, outcome)
 
 
 def _send(slot: _Slot, message: tuple[str, Any]) -> None:

@@ -165,8 +165,9 @@ class Connection:
                 self.send(messages.CommandTriggerMessage(command))
         current = _CURRENT.search(content)
         if current is not None and self.steps:
-            self.current = self.steps[int(current[1]) - 1]
-            self.shown_s[self.current] = time.monotonic()
+            step = self.steps[int(current[1]) - 1]
+            self.shown_s[step] = time.monotonic()
+            self.current = step  # last, as another thread waits for it and then reads the time
             self._marks = {self.steps[int(number) - 1]: mark for number, mark in _MARK.findall(content)}
             self._note_surface()
         if OLD in content:

@@ -67,8 +67,8 @@ class Visitor:
         started_s = time.monotonic()
         try:
             with contextlib.closing(Connection(self._url)) as page:
-                self._stay(page, started_s)
                 self.diary.notices = page.notices
+                self._stay(page, started_s)
         except (TimeoutError, OSError, WebSocketException) as error:
             self.diary.lost = f"{type(error).__name__}: {error}"
 

@@ -1,6 +1,7 @@
 """Largest and smallest values of settings, by the unit at the end of their names.
 
-Beyond them, powers and times leave the range of floating-point numbers, or of 64-bit nanoseconds.
+Beyond them, powers and times, also that of a packet at 1 bit/s, leave the range of floating-point numbers, or
+of 64-bit nanoseconds, and sizes of images, colour and depth together, that of 32-bit integers.
 """
 
 from __future__ import annotations
@@ -11,7 +12,17 @@ from typing import Any
 
 from packetmesh.errors import InputError
 
-_MOST = {"db": 300.0, "dbm": 300.0, "s": 1e9, "m": 1e9, "hz": 1e15, "bps": 1e15, "gain": 1e9, "loss": 1e30}
+_MOST = {
+    "db": 300.0,
+    "dbm": 300.0,
+    "s": 1e9,
+    "m": 1e9,
+    "hz": 1e15,
+    "bps": 1e15,
+    "bytes": 1e9,
+    "gain": 1e9,
+    "loss": 1e30,
+}
 """Largest absolute value, by the last word of a name."""
 _LEAST = {"s": 1e-9, "m": 1e-9, "hz": 1.0, "bps": 1.0, "gain": 1e-9}
 """Smallest value above 0; times are simulated in nanoseconds."""
@@ -22,6 +33,10 @@ _MOST_BY_NAME = {
     "reference_m": 1e6,
     "nakagami_m": 1e9,
     "failures_per_h": 1e9,
+    "bytes_by_node": 1e9,
+    "payload_bytes": 1e6,
+    "datagram_bytes": 1e6,
+    "headers_bytes": 1e6,
     "count": MOST_NODES,
     "vehicles": MOST_NODES,
     "access_points": MOST_NODES,
@@ -42,7 +57,7 @@ def check_limits(part: Any, name: str) -> None:
         for number in value if isinstance(value, tuple) else (value,):
             if isinstance(number, int | float) and abs(number) > most:
                 hint = f"at most {most:g}" if number > 0 else f"at least {-most:g}"
-                raise InputError(f"{name}.{field.name} is {number:g}; try {hint}")
+                raise InputError(f"{name}.{field.name} is {number}; try {hint}")
         least = _LEAST_BY_NAME.get(field.name, _LEAST.get(word, 0.0))
         if isinstance(value, float) and 0.0 < value < least:
-            raise InputError(f"{name}.{field.name} is {value:g}; try at least {least:g}")
+            raise InputError(f"{name}.{field.name} is {value}; try at least {least:g}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import simpy
 
-from network_sim.config import NodesConfig
+from network_sim.config import GUARD_S, NodesConfig
 from network_sim.fixed.images import Book, Fragments, Image
 from network_sim.fixed.routing import Routes
 from network_sim.types import NS_PER_S, Cause, Delivery, Packet, PacketKind, to_ns
@@ -25,8 +25,7 @@ PAUSE_NS = NS_PER_S // 50
 """Mean pause after the second unacknowledged packet in a row, doubled with each further one; without it,
 hidden nodes collide for ever."""
 MAX_DOUBLINGS = 8
-GUARD_NS = NS_PER_S // 20
-"""Time before the nodes fall asleep in which no transmission begins."""
+GUARD_NS = to_ns(GUARD_S)
 
 
 @dataclass(slots=True)

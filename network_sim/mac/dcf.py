@@ -350,14 +350,6 @@ class Dcf:
             return None
         return cts
 
-    def _start_reply(
-        self, packet: Packet, sender: int, receiver: int, begins_ns: int, rest_ns: int, to: Transmission
-    ) -> Transmission:
-        """Put an acknowledgement or a CTS on the air, in reply to a frame that ends now."""
-        return self._start_frame(
-            _ACK, packet, sender, receiver, ACK_BYTES, begins_ns, self._reply_ns, rest_ns, to
-        )
-
     def _start_frame(
         self,
         kind: EventKind,

@@ -84,22 +84,21 @@ def elapsed_s(trace: NetworkTrace) -> float:
 
 def _outcomes(trace: NetworkTrace) -> Rows:
     """Yield delivery ratios and delays of images and of their packets."""
-    yield from _outcome("image", trace.counters.images, "taken")
-    yield from _outcome("packet", trace.counters.packets, "first queued")
+    yield from _outcome("image", trace.counters.images, "taken", "from capture")
+    yield from _outcome("packet", trace.counters.packets, "queued", "from entering the first buffer")
 
 
-def _outcome(noun: str, outcomes: Outcomes, began: str) -> Rows:
+def _outcome(noun: str, outcomes: Outcomes, began: str, since: str) -> Rows:
     if outcomes.created:
         share = outcomes.arrived / outcomes.created
         still = "those still on their way at the end count as not arrived"
-        yield f"{noun}_delivery_ratio", share, "1", f"{noun}s that arrived, of all that were {began}; {still}"
+        yield f"{noun}_delivery_ratio", share, "1", f"Share of the {noun}s {began} that arrived; {still}"
     delays = outcomes.delays
-    took = f"from when the {noun} was {began} until it arrived"
-    yield f"{noun}_delay_mean", delays.mean_s, "s", f"Mean time {took}"
-    yield f"{noun}_delay_deviation", delays.deviation_s, "s", f"Standard deviation of the time {took}"
-    for name, percent in (("median", 50.0), ("p95", 95.0)):
-        definition = f"Time within which {percent:g} % of those that arrived did, {took}, to 1.2 %"
-        yield f"{noun}_delay_{name}", delays.percentile_s(percent), "s", definition
+    took = f"time {since} to arrival, of the {noun}s that arrived"
+    yield f"{noun}_delay_mean", delays.mean_s, "s", f"Mean {took}"
+    yield f"{noun}_delay_deviation", delays.deviation_s, "s", f"Standard deviation of the {took}"
+    for name, percent, what in (("median", 50.0, "Median"), ("p95", 95.0, "95th percentile of the")):
+        yield f"{noun}_delay_{name}", delays.percentile_s(percent), "s", f"{what} {took}, exact to 1.2 %"
 
 
 def _rates(trace: NetworkTrace) -> Rows:
@@ -117,9 +116,9 @@ def _losses(trace: NetworkTrace) -> Rows:
     """Yield numbers of failed attempts, packets and images by cause; zeros too, for averages over runs."""
     delivered = _count(trace, EventKind.DELIVER)
     for kind, name, what in (
-        (EventKind.LOSS, "attempts_lost", "Attempts to send that failed, others may have followed"),
+        (EventKind.LOSS, "attempts_lost", "Failed attempts to send a packet, retries included"),
         (EventKind.DROP, "packets_dropped", "Packets that were given up"),
-        (EventKind.EXPIRE, "images_expired", "Images that were given up or thrown away"),
+        (EventKind.EXPIRE, "images_expired", "Images that cameras gave up or dropped from a full buffer"),
     ):
         yield name, _count(trace, kind), "1", f"{what}, for any cause"
         counts = _after(trace, trace.counters.count)[:, kind].sum(axis=(0, 1))
@@ -173,7 +172,8 @@ def _energy(trace: NetworkTrace) -> Rows:
     if arrived := _count(trace, EventKind.ARRIVE):
         yield "energy_per_image", total_j.sum() / arrived, "J", "Energy of all camera nodes per arrived image"
     least_s = energy.lifetimes_s(times, trace.config.energy).min()
-    yield "lifetime", least_s, "s", "Until the first camera node's battery is empty, if all goes on like this"
+    until = "Time until the first camera node's battery is empty, at the mean power of this run"
+    yield "lifetime", least_s, "s", until
 
 
 def _overheads(trace: NetworkTrace) -> Rows:
@@ -189,12 +189,12 @@ def _coverage(trace: NetworkTrace) -> Rows:
     if sights is None:
         return
     covered = int((sights.covered_ns != NEVER_NS).sum())
-    windows = f"Pairs of a road cell and a span of {trace.config.scheme.validity_s:g} s"
-    share = covered / len(sights.cell)
-    yield "coverage", share, "1", f"{windows} of which an image arrived, of all that cameras saw"
+    span = f"span of {trace.config.scheme.validity_s:g} s"
+    pairs = f"Pairs of a road cell and a {span} of which an image arrived"
+    yield "coverage", covered / len(sights.cell), "1", f"{pairs}, of all that cameras saw"
     if sights.arrived:
-        share = 1.0 - covered / sights.arrived
-        yield "redundancy", share, "1", f"Arrived images beyond the first of its kind. {windows} are a kind"
+        again = f"Share of the arrived images whose road cell and {span} are those of an earlier arrival"
+        yield "redundancy", 1.0 - covered / sights.arrived, "1", again
 
 
 def _after(trace: NetworkTrace, sums: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -33,6 +33,7 @@ from packetmesh.settings_help import describe
         ("nodes.header_bytes=116", "no room"),
         ("nodes.duty_cycle=0", "nodes.duty_cycle"),
         ("nodes.duty_cycle=1.1", "between 0.0 and 1"),
+        ("nodes.duty_cycle=0.004", "try nodes.duty_period_s=25"),
         ("nodes.deadline_s=0", "nodes.deadline_s"),
         ("uplink.rate_bps=0", "uplink.rate_bps"),
         ("uplink.loss=2", "uplink.loss"),
@@ -103,7 +104,7 @@ def test_nodes_stand_where_they_are_put_and_the_sink_comes_last():
         (["nodes.places_m=0,0,1,1,2,2,3,here"], "nodes.places_m=here is not a number"),
         (["nodes.bytes_by_node=5,6"], "nodes.bytes_by_node has 2 numbers; try 3"),
         (["nodes.bytes_by_node=5,0,6"], "nodes.bytes_by_node is 0"),
-        (["nodes.bytes_by_node=5,1.5,6"], "nodes.bytes_by_node=1.5 is not a number"),
+        (["nodes.bytes_by_node=5,1.5,6"], "nodes.bytes_by_node=1.5 is not a whole number"),
     ],
 )
 def test_places_and_sizes_agree_with_the_number_of_nodes(changes, names):

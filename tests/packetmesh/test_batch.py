@@ -32,6 +32,7 @@ def test_every_task_is_done_once():
 
 def test_no_task_gives_nothing():
     assert list(run_batch(abs, [])) == []
+    assert list(run_batch(abs, [], killed=killed)) == []
 
 
 @pytest.mark.parametrize(("tasks", "processes"), [(1, None), (3, 1)])
@@ -93,6 +94,10 @@ def test_a_killed_process_fails_only_the_task_that_killed_it():
     tasks = [KILLED if index in (1, 5) else str(index) for index in range(9)]
     answers = dict(run_batch(eval, tasks, processes=2, killed=killed))
     assert answers == {index: "killed" if index in (1, 5) else index for index in range(9)}
+
+
+def test_a_killed_process_spares_the_caller_of_a_single_task():
+    assert list(run_batch(eval, [KILLED], killed=killed)) == [(0, "killed")]
 
 
 def test_a_process_that_starts_when_another_is_killed_ends_with_it(monkeypatch, tmp_path):

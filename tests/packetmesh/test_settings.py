@@ -54,15 +54,17 @@ def test_a_config_has_no_differences_from_itself():
         ("depth.alignmnt=median", "depth.alignmnt"),
         ("depth.alignment=nonsense", "affine_inverse"),
         ("depth=median", "depth.NAME"),
-        ("depth.alignment.mode=median", "depth.alignment"),
+        ("depth.alignment.mode=median", "'depth.alignment' is a single setting; try depth.alignment=VALUE"),
         ("depth.crop=7", "true, false"),
         ("depth.input_width_px=320", "only one is set, to 320"),
-        ("depth.input_width_px=wide", "not a number"),
+        ("depth.input_width_px=wide", "not a whole number"),
         ("depth.normalisation=half", "imagenet, unit, bytes"),
         ("node_registration.gate_m=nan", "not finite"),
         ("node_registration.gate_m=-1", "-1.0"),
         ("node_registration.max_iterations=0", "at least 1"),
-        ("node_registration.max_iterations=2.5", "not a number"),
+        ("node_registration.max_iterations=2.5", "is not a whole number in digits; try"),
+        ("node_registration.max_iterations=1e2", "is not a whole number in digits; try"),
+        ("node_registration.gate_m=wide", "is not a number"),
         ("node_registration.sigma_decay=1", "between 0.5 and 0.95"),
         ("surface.radii_m=0.1,-0.2", "-0.2"),
         ("surface.radius_rule=manual", "radii_m"),
@@ -74,6 +76,11 @@ def test_a_wrong_setting_is_one_sentence_that_names_it(setting, names):
         with_settings(DEFAULT, [setting])
     assert names in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_a_setting_does_not_hide_a_wrong_one_below_it():
+    with pytest.raises(InputError, match=r"'surface\.max_points' is a single setting"):
+        with_settings(DEFAULT, ["surface.max_points=5000", "surface.max_points.foo=3"])
 
 
 def test_a_written_config_file_is_a_preset(tmp_path):

@@ -26,7 +26,7 @@ def test_every_setting_of_the_network_is_explained_in_one_line():
 def test_a_doc_is_the_string_under_its_field():
     docs = {row.key: row.doc for row in describe(NetworkConfig())}
     assert docs["radio.tx_power_dbm"] == "Transmitted power."
-    assert docs["mac.rts"].startswith("Ask for the channel")
+    assert docs["mac.rts"].startswith("Reserve the channel")
 
 
 @pytest.mark.parametrize(

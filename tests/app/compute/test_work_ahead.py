@@ -13,7 +13,7 @@ from test_pool import Inbox, wait_for
 
 from app.compute import ahead
 from app.compute.ahead import LikelyJob, WorkAhead
-from app.compute.pool import ComputePool, Outcome
+from app.compute.pool import DIED, ComputePool, Outcome
 from app.compute.shared import kept
 from app.compute.store import Store
 
@@ -86,6 +86,33 @@ def test_a_request_for_what_is_computed_ahead_gets_that(pool, tmp_path):
     assert other.end() == Outcome("result", 2)
     (tmp_path / "go").touch()
     assert asked.end() == likely.end() == Outcome("result", "ahead")
+
+
+def test_idle_time_begins_when_a_request_ends_however_it_ends(pool, monkeypatch, tmp_path):
+    """Withdrawn, answered by work ahead, or killed with its process."""
+    assert both_ready(pool)
+    clock_s = 0.0
+    monkeypatch.setattr("app.compute.pool.time", SimpleNamespace(monotonic=lambda: clock_s))
+    monkeypatch.setattr(pool, "_last_used_s", clock_s)
+    likely, asked = Inbox(), Inbox()
+    pool.submit(
+        "ahead", jobs.report_and_note, str(tmp_path), "ahead", key="same", ahead=True, **likely.callbacks()
+    )
+    wait_for(tmp_path / "ahead")
+    ticket = pool.submit("person", jobs.count, 1, key="same", **asked.callbacks())
+    clock_s = 7.0
+    pool.stop(ticket)
+    assert asked.end() == Outcome("stopped")
+    assert pool.idle_s() == 0.0
+    pool.submit("person", jobs.count, 1, key="same", **asked.callbacks())
+    clock_s = 9.0
+    (tmp_path / "go").touch()
+    assert asked.end() == Outcome("result", "ahead")
+    assert pool.idle_s() == 0.0
+    clock_s = 12.0
+    pool.submit("person", jobs.crash, **asked.callbacks())
+    assert asked.end() == Outcome("error", DIED)
+    assert pool.idle_s() == 0.0
 
 
 def test_work_ahead_leaves_a_process_free_and_waits_while_anything_is_asked_for(pool, tmp_path):

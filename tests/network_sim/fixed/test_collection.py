@@ -164,6 +164,11 @@ def test_nobody_sends_while_asleep():
     assert set(down.t_ns % (2 * NS_PER_S)) == {to_ns(0.6)}
 
 
+def test_nodes_awake_for_the_shortest_time_that_is_allowed_deliver_their_images():
+    trace = run("nodes.duty_cycle=0.5", "nodes.duty_period_s=0.1", "nodes.image_bytes=2000")
+    assert image_balance(trace).received == 3
+
+
 UPLINK = ["uplink.rate_bps=1000000", "uplink.loss=0.2", "nodes.image_bytes=4000", "mac.kind=ideal"]
 
 
