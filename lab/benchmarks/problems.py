@@ -128,7 +128,7 @@ def solve(problem: Problem) -> list[dict[str, Any]]:
     known["error_before"] = scaled_displacement(problem.T_moved, source.points_m)
     started = time.perf_counter()
     try:
-        pair = prepared_pair(moved, target, RegistrationConfig(seed=0), units_known=True)
+        pair = prepared_pair(moved, target, RegistrationConfig(seed=0), metres_per_unit=(1.0, 1.0))
         place = find_place(pair, RegistrationConfig(seed=0), None)
         ours = settled_answer(DEFAULT_METHOD, place)
     except PacketMeshError as error:

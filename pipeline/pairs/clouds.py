@@ -35,7 +35,7 @@ def read_pair(
     files = (source, target)
     if len(columns) > 2:
         raise InputError(
-            f"--columns has {len(columns)} texts for two clouds; try one such as x,y,z,_, or two"
+            f"--columns is given {len(columns)} times; give it once for both clouds, or once for each"
         )
     if len(columns) == 1 and not any(map(takes_columns, files)):
         raise InputError("Both clouds name their columns themselves; try it without --columns")

@@ -47,7 +47,9 @@ def find_place(pair: Pair, config: RegistrationConfig, gate_m: float | None) -> 
     Raises:
         ReconstructionError: no start pose leads to a registration.
     """
-    judge = Judge(Surface(pair.source, config.seed), Surface(pair.target, config.seed))
+    judge = Judge(
+        Surface(pair.source, config.seed, name="source"), Surface(pair.target, config.seed, name="target")
+    )
     starts = [by_surfaces(pair.source, pair.target)]
     if config.start == "given":
         starts.insert(0, Start("given", lambda: [pair.T_init]))
@@ -119,7 +121,10 @@ def _other_clouds(place: Place, T: FloatArray) -> tuple[str, ...]:
         )
     factor = better_scale(pair.source, pair.target, T, 2.0 * gates_m[-1], place.judge, place.judge(T), config)
     if factor is not None:
-        return (f"scaled by {factor:.4g} the source fits; try --metres-per-unit {factor:.4g} 1, or --scale",)
+        return (
+            f"the source fits if scaled by {factor:.4g}; try --scale, or multiply its metres per unit by "
+            f"{factor:.4g}",
+        )
     return ()
 
 

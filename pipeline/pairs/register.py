@@ -14,9 +14,10 @@ from packetmesh.errors import InputError, PacketMeshError, ReconstructionError
 from pipeline.config import Metric, RegistrationConfig
 from pipeline.kernels.geometry import apply
 from pipeline.kernels.point_sets import distinct_rows, middle_extent_m
-from pipeline.pairs.units import check_units
+from pipeline.pairs.units import check_units, unit_advice
 from pipeline.registration import average_hausdorff_m, point_error_m, register_timed
 from pipeline.registration.finding.evidence import Evidence
+from pipeline.registration.finding.poses import length
 from pipeline.registration.finding.starts import Way
 from pipeline.registration.finding.verdict import Verdict
 from pipeline.registration.methods import METHODS
@@ -136,8 +137,19 @@ def config_for(
     )
 
 
-def prepared_cloud(cloud: PointCloud, name: str, voxel_m: float | None) -> PointCloud:
+def prepared_cloud(
+    cloud: PointCloud,
+    name: Literal["source", "target"],
+    voxel_m: float | None,
+    metres_per_unit: tuple[float, float] | None = None,
+) -> PointCloud:
     """Remove repeated points, strays and bad normals, then average over voxels of edge ``voxel_m`` if given.
+
+    Args:
+        cloud: any cloud, in metres.
+        name: which of the two clouds it is, for messages.
+        voxel_m: edge of the voxels; None keeps all points.
+        metres_per_unit: the metres per unit of source and target that the user has given.
 
     Raises:
         InputError: there are fewer than six distinct points, or the size is implausible in metres.
@@ -153,11 +165,11 @@ def prepared_cloud(cloud: PointCloud, name: str, voxel_m: float | None) -> Point
         cloud = cloud.select(first)
     extent_m = middle_extent_m(cloud.points_m)
     if not SMALLEST_M <= extent_m <= LARGEST_M:
-        unit, metres = ("millimetres", "0.001") if extent_m > LARGEST_M else ("kilometres", "1000")
+        unit, metres = ("millimetres", 0.001) if extent_m > LARGEST_M else ("kilometres", 1000.0)
+        advice = unit_advice({"source": metres, "target": metres}, metres_per_unit)
         raise InputError(
-            f"The {name} cloud is {extent_m:.3g} m across, as if its numbers were {unit}, and clouds from "
-            f"{SMALLEST_M:g} to {LARGEST_M:g} m can be registered; try --metres-per-unit with the units of "
-            f"source and target, {metres} {metres} if both are in {unit}"
+            f"The {name} cloud is {length(extent_m)} across, as if its numbers were {unit}, and clouds from "
+            f"{SMALLEST_M:g} to {LARGEST_M:g} m can be registered; {advice} if both are in {unit}"
         )
     cloud = _without_strays(cloud, name, _MOST_EXTENTS * extent_m)
     cloud = without_bad_normals(cloud, name)
@@ -170,10 +182,10 @@ def _without_strays(cloud: PointCloud, name: str, farthest_m: float) -> PointClo
     if near.all():
         return cloud
     _log.warning(
-        "%d points of the %s cloud are left out: they are more than %.3g m from the others",
+        "%d points of the %s cloud are left out: they are more than %s from the others",
         (~near).sum(),
         name,
-        farthest_m,
+        length(farthest_m),
     )
     return cloud.select(near)
 
@@ -185,7 +197,7 @@ def prepared_pair(
     voxel_m: float | None = None,
     T_init: FloatArray | None = None,
     T_true: FloatArray | None = None,
-    units_known: bool = False,
+    metres_per_unit: tuple[float, float] | None = None,
 ) -> Pair:
     """Check and thin two clouds.
 
@@ -196,16 +208,16 @@ def prepared_pair(
         voxel_m: edge of the cubes over which points are averaged, metres; None keeps all points.
         T_init: (4, 4) start pose T_target_source; None is the identity.
         T_true: (4, 4) true pose, if it is known.
-        units_known: whether the user has given the units of both clouds.
+        metres_per_unit: the metres per unit of source and target that the user has given, with which they
+            were converted to metres.
 
     Raises:
         InputError: points cannot be used, or the clouds have different units.
         ReconstructionError: the target's shape leaves a motion open.
     """
-    check_units(source, target, units_known, config.with_scale)
-    source, target = (
-        prepared_cloud(cloud, name, voxel_m) for cloud, name in ((source, "source"), (target, "target"))
-    )
+    check_units(source, target, metres_per_unit, config.with_scale)
+    source = prepared_cloud(source, "source", voxel_m, metres_per_unit)
+    target = prepared_cloud(target, "target", voxel_m, metres_per_unit)
     _check_shape(target, config.seed)
     return Pair(source, target, np.eye(4) if T_init is None else T_init, T_true)
 

@@ -54,13 +54,19 @@ def size_ratio(source_m: FloatArray, target_m: FloatArray) -> SizeRatio:
     return SizeRatio(factor, float(np.abs(ratios / factor - 1.0).max()))
 
 
-def check_units(source: PointCloud, target: PointCloud, known: bool, with_scale: bool) -> None:
+def check_units(
+    source: PointCloud,
+    target: PointCloud,
+    metres_per_unit: tuple[float, float] | None,
+    with_scale: bool,
+) -> None:
     """Check that two clouds seem to be in the same unit.
 
     Args:
         source: the cloud that moves, in metres.
         target: the cloud that stays, in metres.
-        known: whether the user has given the units; then only a factor of about a thousand is refused.
+        metres_per_unit: the metres per unit of both that the user has given; then only a factor of about a
+            thousand is refused.
         with_scale: whether a scale is estimated; then only large factors are refused.
 
     Raises:
@@ -70,8 +76,8 @@ def check_units(source: PointCloud, target: PointCloud, known: bool, with_scale:
     larger, smaller = ("source", "target") if found.factor > 1.0 else ("target", "source")
     factor = max(found.factor, 1.0 / found.factor)
     if _KILO[0] < factor < _KILO[1]:
-        raise _thousand(larger, factor, target if larger == "source" else source)
-    if known or not _differs(found.deviation, factor, with_scale):
+        raise _thousand(larger, factor, target if larger == "source" else source, metres_per_unit)
+    if metres_per_unit is not None or not _differs(found.deviation, factor, with_scale):
         if _NOTED_FACTOR < factor <= _LEAST_FACTOR and found.deviation <= _SAME and not with_scale:
             _log.warning(
                 "The %s cloud is %.3f times as large as the other and of about the same shape; if both "
@@ -88,7 +94,7 @@ def check_units(source: PointCloud, target: PointCloud, known: bool, with_scale:
         what, metres = "in another unit", float(f"{1.0 / factor:.4g}")
     raise InputError(
         f"The {larger} cloud is {factor:.3g} times as large as the {smaller} and of about the same shape, as "
-        f"if it were {what}; try --metres-per-unit {_pair(larger, metres)}, or 1 1 if both are in metres"
+        f"if it were {what}; {unit_advice({larger: metres}, None)}, or 1 1 if both are in metres"
     )
 
 
@@ -110,7 +116,9 @@ def _differs(deviation: float, factor: float, with_scale: bool) -> bool:
     return alike and factor > _LEAST_FACTOR and not with_scale
 
 
-def _thousand(larger: str, factor: float, other: PointCloud) -> InputError:
+def _thousand(
+    larger: str, factor: float, other: PointCloud, metres_per_unit: tuple[float, float] | None
+) -> InputError:
     """Return the error for a factor of about 1000: the larger cloud in millimetres or the smaller in km."""
     size_m = 2.0 * float(_distances_m(other.points_m)[-1])
     kilometres = size_m < _USUAL_M[0] and _USUAL_M[0] <= factor * size_m <= _USUAL_M[1]
@@ -118,14 +126,23 @@ def _thousand(larger: str, factor: float, other: PointCloud) -> InputError:
         smaller = "target" if larger == "source" else "source"
         return InputError(
             f"The {larger} cloud is {factor:.0f} times as large as the other, as if the {smaller} were in "
-            f"kilometres and the other in metres; try --metres-per-unit {_pair(smaller, 1000)}"
+            f"kilometres and the other in metres; {unit_advice({smaller: 1000.0}, metres_per_unit)}"
         )
     return InputError(
         f"The {larger} cloud is {factor:.0f} times as large as the other, as if it were in millimetres and "
-        f"the other in metres; try --metres-per-unit {_pair(larger, 0.001)}"
+        f"the other in metres; {unit_advice({larger: 0.001}, metres_per_unit)}"
     )
 
 
-def _pair(cloud: str, metres: float) -> str:
-    """Return the two numbers of the option for a cloud whose unit is ``metres`` long."""
-    return f"{metres:g} 1" if cloud == "source" else f"1 {metres:g}"
+def unit_advice(factors: dict[str, float], metres_per_unit: tuple[float, float] | None) -> str:
+    """Return the advice to change the units of clouds that were converted to metres.
+
+    Args:
+        factors: by what the converted ``source``, ``target`` or both must be multiplied.
+        metres_per_unit: the metres per unit that the user gave for this; without them the units in the files'
+            headers were used.
+    """
+    source, target = metres_per_unit or (1.0, 1.0)
+    numbers = f"{factors.get('source', 1.0) * source:.6g} {factors.get('target', 1.0) * target:.6g}"
+    header = " (times the unit in a file's header, if it has one)" if metres_per_unit is None else ""
+    return f"try --metres-per-unit {numbers}{header}"

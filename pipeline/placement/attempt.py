@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from packetmesh.errors import ReconstructionError
+from packetmesh.errors import InputError, ReconstructionError
 from pipeline.config import RegistrationConfig
 from pipeline.placement.agreement import NOTHING_SHARED, Agreement
 from pipeline.placement.samples import NodeSample, both_ways
@@ -137,6 +137,8 @@ def attempt_found(
 ) -> Attempt:
     """Search for the pose of a node relative to another; if it is sure, register the nodes there.
 
+    An attempt with a node of fewer than three measured points fails.
+
     Args:
         source, target: the two nodes.
         link: their numbers.
@@ -144,7 +146,11 @@ def attempt_found(
         start: way to find start poses.
         views: the nodes' surfaces.
     """
-    clouds, judge = (views.cloud(link[0]), views.cloud(link[1])), views.judge(*link)
+    try:
+        judge = views.judge(*link)
+    except InputError as error:
+        return _failed(link, False, np.eye(4), str(error))
+    clouds = views.cloud(link[0]), views.cloud(link[1])
     try:
         found = search(*clouds, [start], judge, config)
     except ReconstructionError as error:
@@ -157,7 +163,8 @@ def attempt_found(
     if isinstance(result, str):
         return _doubted(source, target, link, found, result)
     if not same(result.T_target_source, T_found, *clouds):
-        return _doubted(source, target, link, found, "the registration leaves the pose that was found")
+        reason = "the final registration moved away from the pose that the search found"
+        return _doubted(source, target, link, found, reason)
     agreement = both_ways(source, target, result.T_target_source)
     score = found.candidate.evidence.score
     edge = _edge(source, target, link, result, odds(score), not less(agreement, FOUND_AGREEMENT))

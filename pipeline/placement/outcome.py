@@ -13,7 +13,7 @@ from pipeline.placement.agreement import NOTHING_SHARED, Agreement
 from pipeline.types import FloatArray, RegistrationResult, Rig
 
 Item = TypeVar("Item")
-APART = "No two nodes stand beside each other: the surface is of one node only"
+APART = "No two nodes could be placed relative to each other: the surface is of one node only"
 """Message for a rig whose placement failed."""
 
 

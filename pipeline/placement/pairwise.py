@@ -34,11 +34,12 @@ def place_nodes(
 
     Nodes with known poses are registered to those earlier ones with the largest common view; the others are
     searched for (``UnknownPoses``). Registrations that contradict the measurements or their loops are
-    rejected; the others give the poses by least squares. Only the largest group of connected nodes is placed,
-    where nodes with known poses count as connected; its first node with a known pose keeps it. A node of the
-    group with a known pose that no good registration reaches is placed relative to the earlier node with the
-    largest common view; if the measurements refute that too, by the given poses. A node outside the group is
-    excluded, and so is one whose measurements contradict the others' at its final pose.
+    rejected; the others give the poses by least squares. Only one group of connected nodes is placed: that of
+    the nodes with known poses, which count as connected; or the largest one if no pose is known, or only that
+    of a node that joins no other. Its first node with a known pose keeps it. A node of the group with a known
+    pose that no good registration reaches is placed relative to the earlier node with the largest common
+    view; if the measurements refute that too, by the given poses. A node outside the group is excluded, and
+    so is one whose measurements contradict the others' at its final pose.
 
     Args:
         frames: the nodes' images with their given poses.
@@ -63,7 +64,7 @@ def place_nodes(
     to_world = adjoint(poses[reference])
     agreements = dict(_agreements(samples, poses, group))
     names = [node.name for node in nodes]
-    verdicts = verdicts_of(names, group, agreements, tried)
+    verdicts = verdicts_of(names, known, group, agreements, tried)
     return Placement(
         tuple(_registrations(names, tried, graph)),
         tuple(poses),
@@ -125,13 +126,16 @@ def _registrations(
 
 
 def _reference(known: Sequence[bool], edges: Sequence[PoseEdge]) -> tuple[int, list[int]]:
-    """Return the node whose pose is kept, and its group: the largest set of connected nodes.
+    """Return the node whose pose is kept, and the group of connected nodes that is placed.
 
-    Nodes with known poses count as connected.
+    Nodes with known poses count as connected. Of groups of several nodes theirs is placed, so that the poses
+    are in their frame; without it the largest.
     """
+    posed = [index for index, one in enumerate(known) if one]
     links = [(edge.source, edge.target) for edge in edges if edge.agrees]
-    links += pairwise(index for index, one in enumerate(known) if one)
-    group = max(Groups(len(known), links).sets(), key=lambda group: (len(group), -min(group)))
+    groups = Groups(len(known), [*links, *pairwise(posed)]).sets()
+    several = [group for group in groups if len(group) > 1] or groups
+    group = max(several, key=lambda group: (not group.isdisjoint(posed), len(group), -min(group)))
     return min(group, key=lambda index: (not known[index], index)), sorted(group)
 
 

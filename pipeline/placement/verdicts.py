@@ -19,6 +19,7 @@ from pipeline.placement.outcome import NodeVerdict
 
 def verdicts_of(
     names: Sequence[str],
+    known: Sequence[bool],
     group: Sequence[int],
     agreements: dict[tuple[int, int], Agreement],
     tried: Sequence[Attempt],
@@ -30,6 +31,7 @@ def verdicts_of(
 
     Args:
         names: names of all nodes.
+        known: whether each node's pose is known.
         group: numbers of the nodes that are placed relative to each other.
         agreements: agreement of each pair (source, target) of the group at the final poses.
         tried: all registrations, which give the reason for a node outside the group.
@@ -55,16 +57,19 @@ def verdicts_of(
     for index, name in enumerate(names):
         found, sentence = beside(placed, index), ""
         if index not in group:
-            sentence = _lost(names, index, tried)
+            sentence = _lost(names, known, index, group, tried)
         elif index not in placed:
             sentence = _contradiction(name, found)
         elif index not in sure:
             sentence = (
-                f"{name} fits the others badly: of what they both measured, "
-                f"{found.within_2pct_share:.0%} is within 2 %; check its pose and its calibration"
+                f"{name} agrees badly with the others: only {found.within_2pct_share:.0%} of the commonly "
+                "measured points are within 2 %; check its pose and its calibration"
             )
         elif not found.shared and len(placed) > 1:
-            sentence = f"{name} stands by its given pose alone: no other camera measured what it sees"
+            sentence = (
+                f"{name} has a pose that no other placed camera confirms: each measured less than "
+                f"{100.0 * LEAST_OVERLAP:.0f} % of what it sees"
+            )
         verdicts.append(NodeVerdict(name, index in placed, found, sentence))
     return verdicts
 
@@ -78,29 +83,35 @@ def _contradiction(name: str, found: Agreement) -> str:
     )
 
 
-def _lost(names: Sequence[str], index: int, tried: Sequence[Attempt]) -> str:
-    """Return the warning about a node outside the group, with the reason of its best attempt."""
-    mine = [trial for trial in tried if index in (trial.source, trial.target)]
+def _lost(
+    names: Sequence[str], known: Sequence[bool], index: int, group: Sequence[int], tried: Sequence[Attempt]
+) -> str:
+    """Return the warning about a node outside the group, with the reason of its best attempt to join it."""
+    mine = [trial for trial in tried if index in trial.link and not set(group).isdisjoint(trial.link)]
     best = max(mine, key=lambda trial: (trial.score, trial.agreement.shared), default=None)
     why = ""
     if best is not None:
         other = names[best.target if best.source == index else best.source]
         why = f" ({_why_not(best, other)})"
+    if known[index]:
+        return (
+            f"{names[index]} is left out: no pose of the others relative to it was found{why}, so they are "
+            "not in the frame of its given pose; try to give one of their poses, or images that share more "
+            "of the place"
+        )
     return (
-        f"{names[index]} is left out: its pose is not known, and it fits nowhere beside the others{why}; "
-        "try to give its pose, or images that share more of the place"
+        f"{names[index]} is left out: its pose is not known, and no pose relative to the others was "
+        f"found{why}; try to give its pose, or images that share more of the place"
     )
 
 
 def _why_not(best: Attempt, other: str) -> str:
     """Return why the best attempt to place a node relative to another is not used."""
     if best.verdict is None:
-        return f"beside {other}: {best.result.stop_reason.partition(';')[0].rstrip('.')}"
+        return f"relative to {other}: {best.result.stop_reason.partition(';')[0].rstrip('.')}"
     if not best.verdict.sure:
-        return f"beside {other}, where it fits best, {' and '.join(best.verdict.reasons)}"
+        return f"best pose relative to {other}: {' and '.join(best.verdict.reasons)}"
     if best.edge is None:
-        return f"beside {other}: {best.result.stop_reason}"
-    return (
-        f"of what it and {other} both measured where it fits best, "
-        f"{best.agreement.within_2pct_share:.0%} is within 2 %"
-    )
+        return f"best pose relative to {other}: {best.result.stop_reason}"
+    share = best.agreement.within_2pct_share
+    return f"best pose relative to {other}: only {share:.0%} of the commonly measured points are within 2 %"

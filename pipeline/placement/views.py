@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
 from pipeline.acquisition import back_project
@@ -10,7 +10,7 @@ from pipeline.registration.colour import LiftedFeatures, lifted_features, match_
 from pipeline.registration.finding.evidence import Judge
 from pipeline.registration.finding.starts import Start, by_colour, by_surfaces
 from pipeline.registration.finding.surface import Surface
-from pipeline.types import PointCloud, RgbdFrame
+from pipeline.types import FloatArray, PointCloud, RgbdFrame
 
 KEPT_SURFACES = 32
 """Number of surfaces kept for further pairs, those used last; each takes 8 MB, and 0.14 s to prepare."""
@@ -30,13 +30,18 @@ class Views:
         self.features = lru_cache(None)(self._features)
 
     def _surface(self, node: int) -> Surface:
-        return Surface(back_project(self._frames[node]), self._seed, from_camera=True)
+        frame = self._frames[node]
+        return Surface(back_project(frame), self._seed, from_camera=True, name=frame.name)
 
     def _features(self, node: int) -> LiftedFeatures:
         return lifted_features(self._frames[node])
 
     def judge(self, source: int, target: int) -> Judge:
-        """Return the judge of relative poses of two nodes."""
+        """Return the judge of relative poses of two nodes.
+
+        Raises:
+            InputError: one has fewer than three points with depth.
+        """
         return Judge(self.surface(source), self.surface(target))
 
     def cloud(self, node: int) -> PointCloud:
@@ -54,4 +59,8 @@ class Views:
 
     def by_surfaces(self, source: int, target: int) -> Start:
         """Return the starts that features of two nodes' surfaces give."""
-        return by_surfaces(self.cloud(source), self.cloud(target), from_cameras=True)
+
+        def poses() -> Iterable[FloatArray]:
+            return by_surfaces(self.cloud(source), self.cloud(target), from_cameras=True).poses()
+
+        return Start("surfaces", poses)

@@ -14,6 +14,7 @@ from pipeline.kernels.open3d_runtime import o3d
 from pipeline.kernels.point_sets import middle_extent_m
 from pipeline.registration.consensus import WITHIN_SD, Motion, PointPairs, Scale, consensus
 from pipeline.registration.finding.viewpoint import range_image
+from pipeline.registration.neighbourhood import facing_origin
 from pipeline.types import FloatArray, IntArray, PointCloud
 
 VOXELS_ACROSS = 50
@@ -189,12 +190,17 @@ def _refuse_few(moving: Any, fixed: Any, voxel_m: float) -> None:
 
 
 def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[Any, Any]:
-    """Return the thinned cloud with normals, and its features."""
+    """Return the thinned cloud with normals, and its features.
+
+    FPFH depends on the normals' signs: where the cloud was seen from its origin, given ones are turned there.
+    """
     points = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points_m))
     given = cloud.normals
     if given is not None and not (np.isfinite(given).all() and given.any(axis=1).all()):
         given = None
     if given is not None:
+        if range_image(cloud.points_m) is not None:
+            given = facing_origin(given, cloud.points_m)
         points.normals = o3d.utility.Vector3dVector(given)
     points = points.voxel_down_sample(voxel_m)
     if given is None:

@@ -21,9 +21,11 @@ class KernelCorrelation(CeicpA):
 
     The fixed point of the weighted fit is where -sum_ij exp(-|p_j - T q_i|^2 / 2 sigma^2) is stationary:
     Tsin, Kanade, "A correlation-based approach to robust point set registration", ECCV 2004. CEICP-A
-    takes only the nearest point, and its weights fall off more slowly with the distance. Normals do not
-    change the weights here.
+    takes only the nearest point, and its weights fall off more slowly with the distance. The source's normals
+    are not used here.
     """
+
+    facing = False
 
     @classmethod
     def starting(

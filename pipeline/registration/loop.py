@@ -15,6 +15,7 @@ from pipeline.config import RegistrationConfig
 from pipeline.kernels.geometry import apply, rotation_angle_rad
 from pipeline.kernels.kdtree import compiled
 from pipeline.registration.anderson import Acceleration
+from pipeline.registration.finding.poses import length
 from pipeline.registration.global_start import global_start
 from pipeline.registration.matching import Matcher, Matches, Matching
 from pipeline.registration.methods import METHODS, MethodStart
@@ -180,7 +181,9 @@ def _moved_until_still(
     center_m = source.points_m.mean(axis=0, keepdims=True)
     for index in range(config.max_iterations):
         try:
-            method, matching, kept, effective = _weigh(method, matcher, T, first=index == 0)
+            method, matching, kept, effective = _weigh(
+                method, matcher, T, config.gate_m if not index else None
+            )
             if acceleration is not None and (fallback := acceleration.fallback(kept)) is not None:
                 T = fallback
                 method, matching, kept, effective = _weigh(method, matcher, T)
@@ -219,10 +222,12 @@ def _moved_until_still(
 
 
 def _weigh(
-    method: PairWeighting, matcher: Matches, T: FloatArray, first: bool = False
+    method: PairWeighting, matcher: Matches, T: FloatArray, start_gate_m: float | None = None
 ) -> tuple[PairWeighting, Matching, PairWeights, float]:
     """Match and weigh the pairs at a pose; returns the method (widened if it keeps too few pairs), the
     matched pairs, the weighed pairs, and the effective number of pairs 1 / sum w^2.
+
+    ``start_gate_m`` is the configured gate at the start pose, where it is an error if no pair is kept.
     """
 
     def match(state: PairWeighting) -> Matching:
@@ -233,17 +238,32 @@ def _weigh(
     if len(kept.rows) < MIN_PAIRS and (wider := method.widened()) is not None:
         method, matching = wider, match(wider)
         kept = method.weigh(matching)
-    if first and not len(kept.rows):
-        raise ReconstructionError(
-            f"No point of the source lies within {method.gate_m:.2f} m of the target: the start poses are "
-            "too far apart or the clouds do not overlap; give a closer start pose or raise gate_m."
-        )
+    if start_gate_m is not None and not len(kept.rows):
+        raise _no_pair(method, matching, start_gate_m)
     if len(kept.rows) < MIN_PAIRS:
         raise DegenerateError(f"only {len(kept.rows)} pairs are close enough")
     effective = 1.0 / float(np.einsum("m,m->", kept.weights, kept.weights))
     if effective < MIN_EFFECTIVE_PAIRS:
         raise DegenerateError(f"only {effective:.1f} pairs carry all the weight")
     return method, matching, kept, effective
+
+
+def _no_pair(method: PairWeighting, matching: Matching, start_gate_m: float) -> ReconstructionError:
+    """Return the error for a start pose at which no pair is kept."""
+    if math.isinf(method.gate_m):
+        return ReconstructionError(
+            "No pair of points counts at the start pose: the clouds are too far apart or do not overlap; "
+            "give a closer start pose."
+        )
+    if (matching.distances_m <= method.gate_m).any():
+        return ReconstructionError(
+            "No pair of near points has similar normals at the start pose: the source is turned too far or "
+            "the normals are wrong; give a closer start pose, or try the point metric."
+        )
+    return ReconstructionError(
+        f"No pair of points is within the gate of {length(start_gate_m)} at the start pose: the clouds are "
+        "too far apart or do not overlap; give a closer start pose or raise gate_m."
+    )
 
 
 @compiled

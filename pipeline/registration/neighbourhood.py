@@ -92,6 +92,11 @@ def _facing(normals: FloatArray, points: FloatArray) -> FloatArray:
     return normals
 
 
+def facing_origin(normals: FloatArray, points_m: FloatArray) -> FloatArray:
+    """Return (N, 3) normals of (N, 3) points, those flipped that point away from a camera at the origin."""
+    return _facing(np.array(normals, np.float64, order="C"), np.ascontiguousarray(points_m, np.float64))
+
+
 def pca_normals(
     points_m: FloatArray, known: FloatArray | None = None, tree: KdTree | None = None
 ) -> FloatArray:

@@ -72,7 +72,7 @@ def _slides(axes: FloatArray, held: np.ndarray) -> str:
     if open_count == 3:
         return "sliding anywhere"
     if open_count == 2:
-        return f"sliding across {_named(axes[:, held][:, 0])}"
+        return f"sliding in any direction perpendicular to {_named(axes[:, held][:, 0])}"
     return f"sliding along {_named(axes[:, ~held][:, 0])}" if open_count else ""
 
 
@@ -81,7 +81,7 @@ def _turns(axes: FloatArray, held: np.ndarray) -> str:
     if open_count == 3:
         return "turning about any axis"
     if open_count == 2:
-        return f"turning about any axis across {_named(axes[:, held][:, 0])}"
+        return f"turning about any axis perpendicular to {_named(axes[:, held][:, 0])}"
     return f"turning about {_named(axes[:, ~held][:, 0])}" if open_count else ""
 
 

@@ -179,22 +179,27 @@ def _small_vgicp(problem: Problem, staged: bool) -> Outcome:
 def _in_stages(
     problem: Problem, staged: bool, align: Callable[[FloatArray, float, dict[str, Any]], Any]
 ) -> Outcome:
-    """Run small_gicp with the gate T_d, or in stages with T_d, T_d / 2, 0.1 m and 0.06 m."""
+    """Run small_gicp with the gate T_d, or in stages with T_d, T_d / 2, 0.1 m and 0.06 m.
+
+    It counts its iterations from zero, so ``result.iterations`` is the number of the last one.
+    """
     gates_m = {problem.gate_m}
     if staged:
         gates_m |= {0.5 * problem.gate_m, *(m for m in STAGES_M if m < problem.gate_m)}
     T, iterations, reason = problem.T_init, 0, "max_iterations"
     for gate_m in sorted(gates_m, reverse=True):
+        if iterations == problem.max_iterations:
+            return T, iterations, "max_iterations"
         limits = {
             "num_threads": _threads(),
-            "max_iterations": max(1, problem.max_iterations - iterations),
+            "max_iterations": problem.max_iterations - iterations,
             "rotation_epsilon": MOTION_TOLERANCE,
             "translation_epsilon": MOTION_TOLERANCE,
         }
         result = align(T, gate_m, limits)
         if not result.num_inliers:
             return T, iterations, _NO_PAIRS
-        T, iterations = result.T_target_source, iterations + result.iterations
+        T, iterations = result.T_target_source, iterations + result.iterations + 1
         reason = "converged" if result.converged else "max_iterations"
     return T, iterations, reason
 

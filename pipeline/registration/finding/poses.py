@@ -39,5 +39,7 @@ def compared_points_m(cloud: PointCloud) -> FloatArray:
 
 
 def length(metres: float) -> str:
-    """Return a length as text with its unit."""
-    return f"{metres:.3g} m" if metres >= 1.0 else f"{100.0 * metres:.2g} cm"
+    """Return a length as text: metres with three digits or whole ones, or centimetres with two digits."""
+    if metres >= 999.5:
+        return f"{metres:.0f} m"
+    return f"{metres:.3g} m" if metres >= 0.995 else f"{100.0 * metres:.2g} cm"

@@ -106,6 +106,6 @@ def _with_more_points(answers: Sequence[Found], checks: Checks) -> Iterator[Foun
 
 
 def _rank(found: Found) -> tuple[bool, int, bool, float]:
-    """Return the rank of an answer, larger if better: settled, by its doubts, by a given start, by its score."""
+    """Return the rank of an answer, larger if better: settled, few doubts, from a given start, its score."""
     few_doubts = -len(found.verdict.reasons)
     return found.settled, few_doubts, found.way == "given", found.candidate.evidence.score

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.kernels.geometry import apply
 from pipeline.kernels.kdtree import KdTree, tree_of
 from pipeline.registration.finding.viewpoint import RangeImage, range_image
-from pipeline.registration.neighbourhood import pca_normals
+from pipeline.registration.neighbourhood import facing_origin, pca_normals
 from pipeline.registration.sample import draw
 from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud
 
@@ -49,18 +49,29 @@ class Judgement(NamedTuple):
 class Surface:
     """A sampled cloud with all that is needed to judge another's points."""
 
-    def __init__(self, cloud: PointCloud, seed: int = 0, from_camera: bool = False) -> None:
+    def __init__(
+        self, cloud: PointCloud, seed: int = 0, from_camera: bool = False, name: str = "compared"
+    ) -> None:
         """Sample the cloud; normals it lacks, and its noise, are estimated from its points.
 
         Args:
             cloud: any cloud.
             seed: seed of the sample.
             from_camera: whether a camera at the origin is known to have measured it; see ``range_image``.
+            name: name of the cloud in error messages.
+
+        Raises:
+            InputError: as for ``draw``.
         """
-        sample = draw(cloud, REFERENCE_POINTS, seed, "cloud").cloud
+        sample = draw(cloud, REFERENCE_POINTS, seed, name).cloud
         self.points_m = sample.points_m
         self.tree: KdTree = tree_of(self.points_m)
+        self.view: RangeImage | None = range_image(cloud.points_m, from_camera)
+        """Free space if the cloud was seen from its origin, else None."""
         self.normals = pca_normals(self.points_m, sample.normals, self.tree)
+        """(N, 3) unit normals; towards the origin if the cloud was seen from there."""
+        if self.view is not None:
+            self.normals = facing_origin(self.normals, self.points_m)
         distances_m, rows = self.tree.nearest(self.points_m, min(len(sample), 1 + NOISE_NEIGHBOURS))
         self.spacing_m: FloatArray = distances_m[:, 1 : 1 + SPACING_NEIGHBOURS].mean(axis=1)
         arms_m = self.points_m[rows] - self.points_m[:, None]
@@ -72,8 +83,6 @@ class Surface:
         count = min(len(sample), JUDGED_POINTS)
         self.asked: IntArray = np.sort(np.random.default_rng(seed).choice(len(sample), count, replace=False))
         """(n,) rows of the points that the other cloud judges."""
-        self.view: RangeImage | None = range_image(cloud.points_m, from_camera)
-        """Free space if the cloud was seen from its origin, else None."""
         self.middle_m: FloatArray = np.median(self.points_m, axis=0)
 
     def judge(self, other: Surface, T: FloatArray) -> Judgement:

@@ -74,7 +74,8 @@ def _reasons(evidence: Evidence, tried: bool) -> tuple[str, ...]:
         reasons.append(f"the clouds share only {evidence.overlap_share:.0%} of their points")
     if evidence.through_share > MOST_THROUGH:
         reasons.append(
-            f"{evidence.through_share:.1%} of the shared points lie where the other camera saw through"
+            f"{evidence.through_share:.1%} of the shared points lie in space that the other camera saw to be "
+            "empty"
         )
     if evidence.on_share < _least_on(evidence):
         reasons.append(f"only {evidence.on_share:.0%} of the shared points lie on the other cloud's surface")
@@ -85,9 +86,9 @@ def _reasons(evidence: Evidence, tried: bool) -> tuple[str, ...]:
     if evidence.color_correlation < LEAST_CORRELATION:  # NaN without colours
         reasons.append(f"the colours there do not match (correlation {evidence.color_correlation:.2f})")
     if evidence.open_motions:
-        reasons.append(f"{evidence.open_motions} changes nothing where the clouds meet")
+        reasons.append(f"the overlap does not determine {evidence.open_motions}")
     elif evidence.stiffness < LEAST_STIFFNESS and not tried:
-        reasons.append("the surfaces where the clouds meet hardly hold the pose in one direction")
+        reasons.append("the surfaces where the clouds meet hardly determine the pose in one direction")
     return tuple(reasons)
 
 

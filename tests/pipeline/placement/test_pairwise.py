@@ -127,3 +127,14 @@ def test_a_nodes_points_are_seen_from_its_camera_even_in_clutter():
     frame = RgbdFrame("node_00", np.zeros((120, 160, 3), np.uint8), DepthMap(z_m), camera, np.eye(4))
     assert Surface(back_project(frame)).view is None
     assert Views([frame], 0).surface(0).view is not None
+
+
+def test_a_node_that_measured_two_points_is_left_out_and_the_others_are_placed(six):
+    """Its fused cloud is whole, as with inferred depth."""
+    _, frames, works = six
+    hidden_m = np.full_like(frames[2].depth.z_m, np.nan)
+    hidden_m[100, [100, 200]] = 2.0
+    blind = replace(frames[2], depth=DepthMap(hidden_m), pose_known=False)
+    placement = place_nodes([*frames[:2], blind], works[:3], CONFIG, "fused")
+    assert placement.placed([0, 1, 2]) == [0, 1]
+    assert "relative to node_01: The node_02 cloud has 2 points" in placement.sentences[0]

@@ -41,7 +41,7 @@ def test_a_stranger_with_a_plausible_pose_is_doubted(room):
     first, second, third = room.frames
     stranger = replace(load_demo("office").frames[0], name="stranger", T_world_camera=third.T_world_camera)
     (sentence,) = placed(first, second, stranger).sentences
-    assert sentence.startswith("stranger fits the others badly")
+    assert sentence.startswith("stranger agrees badly with the others")
 
 
 def test_a_given_pose_beyond_the_gate_is_corrected_by_a_wider_one(room):
@@ -61,7 +61,7 @@ def test_views_of_walls_alone_do_not_place_a_node(normals):
     """Bare walls agree wherever one slides along them."""
     placement = placed(walls("one", normals, 0.0), walls("other", normals, 0.05))
     assert placement.placed(["one", "other"]) == ["one"]
-    assert "hardly hold the pose in one direction" in placement.sentences[0]
+    assert "hardly determine the pose in one direction" in placement.sentences[0]
 
 
 def walls(name: str, normals, turn_rad: float) -> RgbdFrame:

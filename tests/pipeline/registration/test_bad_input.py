@@ -38,11 +38,28 @@ def test_a_start_pose_that_is_none(corner, T):
         iterate_registration(corner, corner, CONFIG, T)
 
 
-@pytest.mark.parametrize(("method", "reach"), [("ceicp-n", "0.30"), ("ceicp-a", "0.60")])
-def test_clouds_without_overlap(corner, method, reach):
-    config = replace(CONFIG, method=method)
-    with pytest.raises(ReconstructionError, match=f"within {reach} m of the target.*do not overlap"):
+@pytest.mark.parametrize("method", ["ceicp-n", "ceicp-a"])
+@pytest.mark.parametrize(("gate_m", "gate"), [(0.3, "30 cm"), (0.001, "0.1 cm"), (2.5, "2.5 m")])
+def test_clouds_without_overlap(corner, method, gate_m, gate):
+    config = replace(CONFIG, method=method, gate_m=gate_m)
+    with pytest.raises(ReconstructionError, match=f"within the gate of {gate} at the start.*do not overlap"):
         register(corner, corner, config, FAR)
+
+
+def test_clouds_without_overlap_for_a_method_without_a_gate(corner):
+    away = rigid(np.eye(3), [0.0, 0.0, 3000.0])
+    with pytest.raises(
+        ReconstructionError, match="No pair of points counts at the start pose: the clouds are"
+    ):
+        register(corner, corner, replace(CONFIG, method="ceicp-ml"), away)
+
+
+def test_near_points_whose_normals_differ_are_not_said_to_be_far():
+    rng = np.random.default_rng(0)
+    points_m = np.column_stack([rng.uniform(-1.0, 1.0, (500, 2)), np.full(500, 2.0)])
+    up, across = (PointCloud(points_m, normals=np.tile(normal, (500, 1))) for normal in np.eye(3)[[2, 0]])
+    with pytest.raises(ReconstructionError, match="No pair of near points has similar normals at the start"):
+        register(up, across, CONFIG)
 
 
 def test_too_few_pairs_keep_the_start_pose(corner):
@@ -64,7 +81,9 @@ def test_a_lone_wall_lets_the_source_slide():
     rng = np.random.default_rng(0)
     wall = PointCloud(np.column_stack([rng.uniform(-1, 1, (500, 2)), np.full(500, 2.0)]))
     result = register(wall, wall, CONFIG, rigid(np.eye(3), [0.0, 0.0, 0.1]))
-    assert result.stop_reason.startswith("degenerate: sliding across z and turning about z changes no")
+    assert result.stop_reason.startswith(
+        "degenerate: sliding in any direction perpendicular to z and turning about z changes no"
+    )
     assert register(wall, wall, replace(CONFIG, metric="point")).converged
 
 

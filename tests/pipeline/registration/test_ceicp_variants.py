@@ -1,5 +1,6 @@
 """CEICP-R, CEICP-ML and kernel correlation against what SPEC 4.4 says of them."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -148,3 +149,14 @@ def test_kernel_correlation_finds_ten_partners_each(corner):
         iterate_registration(cloud, cloud, RegistrationConfig("kernel-correlation", "point", gate_m=3.0))
     )
     assert (np.bincount(step.pairs[:, 0]) == 10).all()
+
+
+def test_kernel_correlation_measures_to_the_planes_of_the_target_alone(corner, motion):
+    """As all methods do whose weights do not depend on the normals."""
+    source, rng = corner.transformed(inverse(motion)), np.random.default_rng(0)
+    config = RegistrationConfig("kernel-correlation", "plane", max_iterations=3)
+    bare, given = (
+        register(replace(source, normals=normals), corner, config)
+        for normals in (None, rng.normal(size=(len(source), 3)))
+    )
+    assert given.T_target_source.tobytes() == bare.T_target_source.tobytes()

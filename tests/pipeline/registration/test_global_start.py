@@ -9,8 +9,11 @@ from pipeline.config import RegistrationConfig
 from pipeline.kernels.geometry import inverse, rigid, rotation_exp
 from pipeline.registration import global_start as starts
 from pipeline.registration import iterate_registration, point_error_m, register
+from pipeline.registration.finding.viewpoint import range_image
 from pipeline.registration.global_start import global_start, global_starts
+from pipeline.registration.neighbourhood import pca_normals
 from pipeline.types import PointCloud
+from tests.pipeline.registration.finding.places import scan
 from tests.pipeline.registration.rooms import seen_by
 
 FAR = rigid(rotation_exp(np.radians(70.0) * np.array([0.36, 0.48, 0.8])), [1.0, -0.9, 0.67])
@@ -48,6 +51,27 @@ def test_the_same_clouds_give_the_same_bits(pair):
     source, target, _ = pair
     first, second = (global_start(source, target) for _ in range(2))
     assert first.tobytes() == second.tobytes()
+
+
+def with_normals(points_m: np.ndarray, sign: float):
+    """The thinned cloud and its features, with estimated normals or their opposites as the given ones."""
+    normals = sign * pca_normals(points_m)
+    return starts._with_features(PointCloud(points_m, normals=normals), 0.2)
+
+
+def test_given_normals_of_a_view_are_turned_to_its_camera():
+    points_m = scan((1.0, 1.2, 1.3), 0).points_m
+    (facing, features), (_, others) = with_normals(points_m, 1.0), with_normals(points_m, -1.0)
+    np.testing.assert_array_equal(others.data, features.data)
+    assert np.mean(np.einsum("ni,ni->n", facing.points, facing.normals) < 0.0) > 0.999
+
+
+def test_given_normals_keep_their_signs_where_no_camera_stood_at_the_origin():
+    points_m = np.add(scan((1.0, 1.2, 1.3), 0).points_m, [3.0, -4.0, 2.0])
+    assert range_image(points_m) is None
+    np.testing.assert_array_equal(
+        np.negative(with_normals(points_m, -1.0)[0].normals), with_normals(points_m, 1.0)[0].normals
+    )
 
 
 def test_clouds_that_have_nothing_in_common_are_refused(pair):

@@ -17,7 +17,11 @@ FLOOR, WALL, FRONT = (np.stack(face, axis=1) for face in ((A, B, ZERO), (ZERO, A
 X, Y, Z = np.eye(3)
 
 SHAPES = {
-    "plane": (FLOOR, np.tile(Z, (2000, 1)), "sliding across z and turning about z"),
+    "plane": (
+        FLOOR,
+        np.tile(Z, (2000, 1)),
+        "sliding in any direction perpendicular to z and turning about z",
+    ),
     "corridor": (np.concatenate([FLOOR, WALL]), np.repeat([Z, X], 2000, axis=0), "sliding along y"),
     "sphere": (BALL, BALL, "turning about any axis"),
     "pipe": (PIPE, PIPE * [1, 1, 0], "sliding along z and turning about z"),
@@ -40,7 +44,10 @@ def test_half_a_pipe_turns_about_its_axis_wherever_its_points_are():
 
 def test_a_plane_with_noise_is_still_a_plane():
     points_m = FLOOR + RNG.normal(scale=0.001, size=FLOOR.shape)
-    assert open_motions(points_m, pca_normals(points_m + 2.0 * Z)) == "sliding across z and turning about z"
+    assert (
+        open_motions(points_m, pca_normals(points_m + 2.0 * Z))
+        == "sliding in any direction perpendicular to z and turning about z"
+    )
 
 
 def test_an_oblique_direction_is_given_by_its_coordinates():

@@ -249,7 +249,7 @@ def test_the_start_pose_does_not_matter_nearby():
 def test_views_that_do_not_meet_are_refused(shift_m):
     """Behind the camera, behind all walls, and beside the image."""
     source, target = _two_views(np.eye(4))
-    with pytest.raises(ReconstructionError, match="No point of the source lies within"):
+    with pytest.raises(ReconstructionError, match="No pair of points is within the gate"):
         register_organised(source, target, CONFIG, rigid(np.eye(3), np.array(shift_m)))
 
 

@@ -67,6 +67,23 @@ def test_a_peer_goes_on_from_the_start_pose_that_it_is_given(name, two_looks, mo
     assert point_error_m(result.T_target_source @ away, motion, source.points_m) < WORST_M[name]
 
 
+@pytest.mark.parametrize("name", [name for name in available_peers() if not name.startswith("open3d")])
+@pytest.mark.parametrize("most", [1, 2])
+def test_a_peer_uses_up_its_iterations_in_all_its_stages_together(name, most, two_looks):
+    """From 10 cm off, none converges in two."""
+    result = run_peer(name, *two_looks, GATE_M, max_iterations=most)
+    assert (result.iterations, result.stop_reason) == (most, "max_iterations")
+
+
+def test_one_iteration_moves_the_source_once(two_looks):
+    """Two stages of one iteration each would come nearer to the truth than one iteration."""
+    _skip_unless_installed("small-gicp-staged")
+    staged, plain = (
+        run_peer(name, *two_looks, GATE_M, max_iterations=1) for name in ("small-gicp-staged", "small-gicp")
+    )
+    np.testing.assert_allclose(staged.T_target_source, plain.T_target_source, atol=1e-9)
+
+
 @pytest.mark.parametrize("name", [name for name in available_peers() if name != "cpd"])
 def test_clouds_apart_are_degenerate_and_keep_the_start(name, two_looks):
     source, target = two_looks

@@ -71,6 +71,18 @@ def test_views_at_the_truth_see_no_point_in_free_space(views):
     assert truth.overlap_share > 0.8
 
 
+@pytest.mark.parametrize("signs", [(-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)])
+def test_given_normals_of_a_view_may_point_away_from_its_camera(views, signs):
+    judge, T_true = views
+    given = (
+        Surface(PointCloud(one.points_m, normals=sign * one.normals))
+        for one, sign in zip((judge.source, judge.target), signs, strict=True)
+    )
+    found, truth = Judge(*given)(T_true), judge(T_true)
+    assert (found.judged, found.on, found.through) == (truth.judged, truth.on, truth.through)
+    assert found.height_ratio == truth.height_ratio
+
+
 def test_a_view_pulled_into_the_room_is_in_free_space(views):
     """Both ways: in one direction the near wall comes into the room, in the other the far one."""
     judge, T_true = views

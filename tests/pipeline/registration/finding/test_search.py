@@ -264,7 +264,7 @@ def surface(name: str, seed: int) -> np.ndarray:
 @pytest.mark.parametrize(
     ("name", "says"),
     [
-        ("plane", "sliding across z and turning about z"),
+        ("plane", "sliding in any direction perpendicular to z and turning about z"),
         ("corridor", ""),
         ("sphere", "turning about any axis"),
     ],
