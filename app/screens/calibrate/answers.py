@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+from functools import partial
 from typing import TYPE_CHECKING
 
 from app.compute.records import Picture
@@ -13,7 +14,10 @@ if TYPE_CHECKING:
 
 
 class Answers:
-    """The newest verdict and pictures of the depth error; the depth job starts after the verdict."""
+    """The newest verdict and pictures of the depth error; the depth job starts after the verdict.
+
+    Each is kept with the key of the calibration that it is about, and counts only for that calibration.
+    """
 
     def __init__(
         self,
@@ -29,52 +33,65 @@ class Answers:
             on_depth: called when the depth job has ended.
         """
         self._session, self._on_trust, self._on_depth = session, on_trust, on_depth
-        self._trust: TrustView | None = None
-        self._off: DepthErrorView | None = None
+        self._shown: Hashable = None
+        """Key of the calibration that is shown; None if it is not that of the current settings."""
+        self._trust: tuple[Hashable, TrustView] | None = None
+        self._off: tuple[Hashable, DepthErrorView] | None = None
         self._requested_trust: tuple[Hashable, ...] = ()
         self._requested_depth: tuple[Hashable, ...] = ()
         self._judging = False
 
-    def trust_in(self, camera: CameraView) -> TrustView | None:
-        """Return the newest verdict if it is about a camera of this name, else None.
+    def follow(self) -> None:
+        """Take the calibration that the session has just received as the one that is shown."""
+        session = self._session
+        other = session.results.shows_other("calibrate", session.spec)
+        self._shown = None if other else session.spec.key("calibrate")
 
-        The camera's views or lens may have changed since.
-        """
-        return self._trust if self._trust is not None and self._trust.request.camera == camera.name else None
+    def trust_in(self, camera: CameraView) -> TrustView | None:
+        """Return the newest verdict if it is about this camera of the shown calibration, else None."""
+        key, trust = self._trust or (None, None)
+        return trust if trust and (key, trust.request.camera) == (self._shown, camera.name) else None
 
     def pictures_of(self, camera: CameraView, view: str) -> dict[str, Picture]:
         """Return the computed maps of a camera and depth errors of a view, by ``labels.PictureName``."""
-        trust, off = self.trust_in(camera), self._off
+        trust, (key, off) = self.trust_in(camera), self._off or (None, None)
         pictures = {} if trust is None else dict(trust.pictures)
-        if off is not None and (off.camera, off.view) == (camera.name, view):
+        if off and (key, off.camera, off.view) == (self._shown, camera.name, view):
             pictures |= off.pictures
         return pictures
 
     def ask(self, request: TrustRequest, view: str, depth: bool) -> None:
         """Request the verdict, and after it the depth pictures, unless requested before.
 
-        While a verdict is computed, nothing is requested: ``on_trust`` has to ask again.
+        Nothing is requested while a verdict is computed (``on_trust`` has to ask again), or while the shown
+        calibration is not that of the current settings, which the jobs use.
 
         Args:
             request: the verdict to compute.
             view: the view that is shown.
             depth: whether its depth pictures are needed.
         """
-        if self._judging:
-            return
         key = self._session.spec.key("calibrate")
-        if self._requested_trust != (key, request):
-            self._requested_trust, self._judging = (key, request), True
-            self._session.quick_job("calibrate.trust_job:trust_job", request, on_end=self._judged)
-        elif depth and self._requested_depth != (key, request.camera, view):
-            self._requested_depth = (key, request.camera, view)
+        if self._judging or self._shown != key:
+            return
+        trust, off = (key, request), (key, request.camera, view)
+        if self._requested_trust != trust:
+            self._requested_trust, self._judging = trust, True
+            ended = partial(self._judged, trust)
+            self._session.quick_job("calibrate.trust_job:trust_job", request, on_end=ended)
+        elif depth and self._trust is not None and self._requested_depth != off:
+            self._requested_depth = off
             job = "calibrate.depth_job:depth_job"
-            self._session.quick_job(job, request.camera, view, on_end=self._compared)
+            self._session.quick_job(job, request.camera, view, on_end=partial(self._compared, off))
 
-    def _judged(self, view: TrustView | None) -> None:
-        self._judging, self._trust = False, view
+    def _judged(self, requested: tuple[Hashable, ...], view: TrustView | None) -> None:
+        self._judging, self._trust = False, None if view is None else (requested[0], view)
         self._on_trust(view)
+        if view is None and self._requested_trust == requested:
+            self._requested_trust = ()  # after the call, which must not repeat what has just failed
 
-    def _compared(self, view: DepthErrorView | None) -> None:
-        self._off = view
+    def _compared(self, requested: tuple[Hashable, ...], view: DepthErrorView | None) -> None:
+        self._off = None if view is None else (requested[0], view)
         self._on_depth()
+        if view is None and self._requested_depth == requested:
+            self._requested_depth = ()

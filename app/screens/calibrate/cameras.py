@@ -283,8 +283,8 @@ def _node(views: BoardViews, name: str) -> NodeShots:
 def _bias(node: NodeShots, cameras: CamerasFound) -> DepthFound | str:
     if node.name not in cameras.reports:
         camera = cameras.view.camera(node.name)
-        reason = "" if camera is None else camera.reason
-        return f"{node.name} has no lens yet, and the depth bias cannot be estimated without one; {reason}"
+        reason = f"; {camera.reason}" if camera is not None and camera.reason else ""
+        return f"{node.name} has no lens yet, and the depth bias cannot be estimated without one{reason}"
     report = node_with_depth(node, cameras.reports)
     if report.depth is not None:
         note = " ".join((*report.depth_notes, report.depth.note)).strip()

@@ -32,8 +32,8 @@ def depth_job(store: Store, spec: Spec, name: str, view: str) -> Generator[Progr
     known = yield from finished(cameras_of(store, views))
     camera = known.view.camera(name)
     fitted = None if camera is None else camera.fitted(view)
-    path = depth_file(views, name, view)
-    if camera is None or camera.calibration is None or path is None or fitted is None:
+    path = None if fitted is None else depth_file(views, name, view)
+    if camera is None or camera.calibration is None or fitted is None or path is None:
         return DepthErrorView(name, view, {})
     depth = read_depth(path)
     found = yield from bias_of(store, views, known, name)

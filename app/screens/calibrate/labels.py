@@ -18,6 +18,10 @@ NOTHING = Markdown(
 need calibration, or use your own photographs."""
 )
 
+NO_RIG = Markdown(
+    "The cameras have no common poses: only the one that is chosen above is drawn, around the board."
+)
+
 PictureName = Literal[
     "photo", "straightened", "uncertainty", "halves", "coverage", "next", "off-before", "off-after"
 ]

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from app.dock.plots import PlotDock
-from app.screens.calibrate.noise_view import CLOSE, NoiseRequest, NoiseView
-from app.screens.calibrate.scatter import noise_sheet
+from app.screens.calibrate.noise_view import CLOSE, NoiseView
+from app.screens.calibrate.scatter import MORE, noise_sheet
 from app.web.markup import Markdown
 from app.window.ui import Ui
 
@@ -18,7 +18,7 @@ TEXT = Markdown(
 scatter is shown at the lower edge of the window. Table 4.1 of the thesis has one value for each noise
 level."""
 )
-THIS, OTHER = "this lens", "a lens of another kind"
+THIS, OTHER = "this lens", f"this lens with {MORE}"
 READY = Markdown("Drag the slider to start.")
 STOPPED = Markdown("Stopped. Drag the slider to start again.")
 REST_S = 0.25
@@ -28,18 +28,23 @@ REST_S = 0.25
 class NoiseFolder:
     """A slider and a sentence; the growing scatter of the trials is in the dock."""
 
-    def __init__(self, ui: Ui, on_replay: Callable[[float, bool], None], on_stop: Callable[[], None]) -> None:
+    def __init__(
+        self, ui: Ui, on_replay: Callable[[int, float, bool], None], on_stop: Callable[[], None]
+    ) -> None:
         """Add the folder.
 
         Args:
             ui: panel to add it to.
-            on_replay: called with the noise in px, and whether another lens projects the points.
+            on_replay: called with the number of the replay, which its results have to name, the noise in
+                px, and whether a lens with more distortion projects the points.
             on_stop: called to stop the running replay.
         """
         self._on_replay, self._on_stop = on_replay, on_stop
         self._view: NoiseView | None = None
-        self._running: tuple[float, bool] | None = None
-        """Arguments of ``on_replay`` for the running replay."""
+        self._replay = 0
+        """Number of the last replay; late results of earlier ones are ignored."""
+        self._running = False
+        """Whether the last replay has yet to end."""
         gui = ui.gui
         self._resting = ui.debounce(REST_S, self._rested)
         self._folder = gui.add_folder("What if the points were noisier?", expand_by_default=False)
@@ -57,8 +62,8 @@ class NoiseFolder:
             self._through = gui.add_dropdown(
                 "Seen through",
                 [THIS, OTHER],
-                hint="Lens that projects the points: the estimated one, or one with distortions (p1, p2, "
-                "k3) that the lens model *thesis* does not have.",
+                hint="Lens that projects the points: the estimated one, or the same with more distortion, "
+                "which the lens model *thesis* cannot describe; not for a fisheye.",
             )
             ui.when_changed(self._through, self._moved)
             ui.buttons(
@@ -80,9 +85,10 @@ class NoiseFolder:
 
     def forget(self) -> None:
         """Remove the replay, which belongs to another camera or other views."""
-        if self._running is not None:
+        if self._running:
             self._on_stop()
-        self._view = self._running = None
+        self._view, self._running = None, False
+        self._replay += 1
         self._dock.load(None)
         self._status.content = READY
 
@@ -90,40 +96,36 @@ class NoiseFolder:
         """Stop the replay and keep its trials."""
         self._on_stop()
 
-    def load(self, view: NoiseView) -> None:
-        """Show the trials so far; late ones of another replay are ignored."""
-        if not isinstance(view, NoiseView) or setting_of(view.request) != self._running or not view.trials:
+    def load(self, replay: int, view: NoiseView) -> None:
+        """Show the trials of a replay so far."""
+        if replay != self._replay or not view.trials:
             return
         self._view = view
         self._dock.load(noise_sheet(view))
         self._status.content = noise_line(view)
 
-    def ended(self, view: NoiseView | None, request: NoiseRequest) -> None:
+    def ended(self, replay: int, view: NoiseView | None) -> None:
         """Handle the end of a replay; ``view`` is None if it was stopped or failed."""
-        if setting_of(request) != self._running:
+        if replay != self._replay:
             return
         if view is not None:
-            self.load(view)
+            self.load(replay, view)
         elif self._view is None:
             self._status.content = STOPPED
-        self._running = None
+        self._running = False
 
     def _moved(self) -> None:
         """Stop the running replay at once; start when the slider is at rest."""
-        if self._running is not None:
+        if self._running:
             self._on_stop()
         self._resting.restart()
 
     def _rested(self) -> None:
-        self._running, self._view = (float(self._sigma.value), self._through.value == OTHER), None
+        self._replay += 1
+        self._running, self._view = True, None
         self._status.content = Markdown("Waiting for the first trials …")
         self._dock.begin()
-        self._on_replay(*self._running)
-
-
-def setting_of(request: NoiseRequest) -> tuple[float, bool]:
-    """Return the part of a request that the controls set."""
-    return request.sigma_px, request.other_lens
+        self._on_replay(self._replay, float(self._sigma.value), self._through.value == OTHER)
 
 
 def noise_line(view: NoiseView) -> Markdown:

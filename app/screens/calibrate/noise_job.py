@@ -26,7 +26,7 @@ HALVED = 8
 AT_M = 2.0
 """Range of that comparison, metres."""
 OTHER = np.array([0.0, 0.0, 0.003, -0.002, 0.3])
-"""Extra k1, k2, p1, p2 and k3 of another lens, as of a cheap lens that is mounted askew."""
+"""Extra k1, k2, p1, p2 and k3 of the other lens, as of a cheap lens that is mounted askew."""
 
 
 @dataclass(slots=True)
@@ -61,7 +61,7 @@ def noise_job(
         Partial results; the job can be stopped at each of them.
 
     Raises:
-        InputError: the camera has no calibration.
+        InputError: the camera has no calibration, or more distortion is requested for a fisheye.
     """
     assert spec.views is not None
     known = (yield from finished(cameras_of(store, spec.views))).view
@@ -69,6 +69,8 @@ def noise_job(
     if camera is None or camera.calibration is None:
         raise InputError(f"There is no calibration of {request.camera} to repeat; add views first")
     true = camera.calibration
+    if request.other_lens and true.lens == "fisheye":
+        raise InputError("A fisheye has no p1, p2 and k3 to add; choose 'this lens' under Seen through")
     exact = _seen(true, request.other_lens)
     empty = NoiseView(request, true.names, np.array([true.parameters[name] for name in true.names]))
     trials, reported_s = _Trials(), time.monotonic()
@@ -83,9 +85,9 @@ def noise_job(
 
 
 def _seen(true: Calibration, other_lens: bool) -> list[View]:
-    """Return the views without noise, through the lens or, unless it is a fisheye, with more distortion."""
+    """Return the views without noise, through the lens or through the same with more distortion."""
     optics = true.optics
-    if other_lens and true.lens != "fisheye":
+    if other_lens:
         more = np.zeros(max(len(OTHER), true.distortion.size))
         more[: len(OTHER)] = OTHER
         more[: true.distortion.size] += true.distortion

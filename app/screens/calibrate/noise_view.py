@@ -24,7 +24,7 @@ class NoiseRequest:
     """Standard deviation of the noise of each coordinate."""
     other_lens: bool = False
     """Whether the points are projected through a lens with more distortion (p1, p2, k3) than the estimated
-    one; a fisheye stays as it is."""
+    one, which must not be a fisheye."""
     trials: int = TRIALS
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from app.window.tables import number, table, term
 from app.window.ui import Ui
 from pipeline.calibration.correlation import DISTANCE, Correlations, Pair
 from pipeline.calibration.estimate import Calibration, rms_px
+from pipeline.calibration.lens import FREE
 
 UNITS = {"fx": "px", "fy": "px", "cx": "px", "cy": "px"}
 MEANING = {
@@ -38,7 +39,17 @@ MEANING = {
     "k3": "Radial distortion, term with the sixth power of the distance.",
     "p1": "Tangential distortion of a lens that is tilted against the sensor, vertical.",
     "p2": "Tangential distortion, horizontal.",
+    **dict.fromkeys(("k4", "k5", "k6"), "Term in the denominator of the rational model."),
 }
+FISHEYE = {
+    f"k{index}": f"Distortion of a fisheye, term with the {power} power of the angle from the axis."
+    for index, power in enumerate(("third", "fifth", "seventh", "ninth"), start=1)
+}
+
+
+def meanings(names: Sequence[str]) -> Mapping[str, str]:
+    """Return the meanings of the parameters of the lens model that has these, by name."""
+    return MEANING | FISHEYE if tuple(names) == FREE["fisheye"] else MEANING
 
 
 def unseen_rms_px(camera: CameraView) -> float | None:
@@ -59,8 +70,9 @@ def summary_table(cameras: Sequence[CameraView], names: Sequence[str] = ()) -> M
         row("RMS error", RMS, [number(None if one is None else one.rms_px, 3, "px") for one in found]),
         row("Held-out RMS", HELD_OUT, [number(unseen_rms_px(camera), 3, "px") for camera in cameras]),
     ]
+    meaning = meanings(next((one.names for one in found if one is not None), ()))
     rows += [
-        row(f"{name} ± 95 %", MEANING[name], [within(one, name) for one in found]) for name in ("fx", "k1")
+        row(f"{name} ± 95 %", meaning[name], [within(one, name) for one in found]) for name in ("fx", "k1")
     ]
     if any(camera.warp for camera in cameras):
         rows.append(row("Board bent by", BENT, [bend(camera) for camera in cameras]))
@@ -93,16 +105,15 @@ def parameter_table(camera: CameraView) -> Markup:
     found = camera.calibration
     if found is None:
         return Markup("")
-    rows = []
+    rows, meaning = [], meanings(found.names)
     for name, error in found.standard_errors.items():
         digits, unit = (3, ", px") if name in UNITS else (5, "")
         low, high = found.intervals[name]
-        meaning = MEANING.get(name, "Term in the denominator of the rational model.")
         values = [f"{found.parameters[name]:.{digits}f}", f"{error:.{digits}f}"]
         values.append(f"{low:.{digits}f} to {high:.{digits}f}")
         if camera.truth:
             values.append(number(camera.truth.get(name), digits))
-        rows.append((f"{name}{unit}", meaning, *values))
+        rows.append((f"{name}{unit}", meaning[name], *values))
     truth = (("truth", TRUTH),) if camera.truth else ()
     return table(rows, ("value", ("std. error", STANDARD_ERROR), ("95 % interval", INTERVAL), *truth))
 

@@ -14,7 +14,7 @@ from app.lesson.on_screen import ScreenLessons
 from app.screens.calibrate.answers import Answers
 from app.screens.calibrate.depth import DepthFolder
 from app.screens.calibrate.draw import BELOW, BoardsDrawing, place_of, stand_before
-from app.screens.calibrate.labels import AROUND, DEPTH, NOTHING, TEXT
+from app.screens.calibrate.labels import AROUND, DEPTH, NO_RIG, NOTHING, TEXT
 from app.screens.calibrate.lens_folder import LensFolder
 from app.screens.calibrate.lesson import KIND, SHIPPED, CalibrateLook, left_out, numbers
 from app.screens.calibrate.noise import NoiseFolder
@@ -25,14 +25,14 @@ from app.screens.calibrate.request import calibrate_command, inner, several, vie
 from app.screens.calibrate.rig import RigFolder
 from app.screens.calibrate.trust import TrustFolder, verdict_html
 from app.screens.calibrate.uploads import UploadFolder
-from app.screens.calibrate.use import WRITING, UseRow
+from app.screens.calibrate.use import UseRow
 from app.screens.calibrate.view import CalibrationView, CameraView, RigView, TrustView
 from app.web.markup import Markdown, Markup
 from app.window.in_address import STOP, Awaited
 from app.window.panel import Panel
 from packetmesh.errors import InputError
 from pipeline.io.demos import DEMO_SCENES, board_views_of
-from pipeline.sources import Calibrated, Demo, Recorded
+from pipeline.sources import Calibrated, Demo
 
 
 class CalibratePanel(Panel):
@@ -45,14 +45,13 @@ class CalibratePanel(Panel):
 
     def build(self) -> None:
         """Add verdict, camera, bars, views, pictures and drawing; the other numbers are in folders."""
-        gui, ui = self.gui, self.ui
-        self._source = inner(self.session.spec.source)
+        gui, ui, session = self.gui, self.ui, self.session
+        self._source = inner(session.spec.source)
         self._here = self._had_views = self._undrawn = False
         self._view: CalibrationView | None = None
         self._whole: dict[str, CameraView] = {}
         """Every camera before a view of it was dropped."""
-        self._uses = 0
-        self._answers = Answers(self.session, self._judged, self._show_view)
+        self._answers = Answers(session, self._judged, self._show_view)
         self._framed: tuple[Hashable, ...] = ()
         self._look: CalibrateLook | None = None
         self._came: SceneView | None = None
@@ -67,7 +66,7 @@ class CalibratePanel(Panel):
         scenes = {DEMO_SCENES[name].title: partial(self._open_scene, name) for name in with_boards()}
         self._open = ui.buttons("Open", scenes, "Scene with photographs of a board.", visible=False)
         self._verdict = gui.add_html(Markup(""))
-        self._use = UseRow(ui, self._use_it, self._as_before)
+        self._use = UseRow(ui, session)
         self._cameras = gui.add_dropdown(
             "Camera", ["node_00"], hint="Camera whose views are shown.", visible=False
         )
@@ -81,6 +80,7 @@ class CalibratePanel(Panel):
             "In space", list(AROUND), hint="Object that is fixed in the 3-D scene."
         )
         ui.when_changed(self._around, self._draw)
+        self._no_rig = gui.add_markdown(NO_RIG, visible=False)
         self._numbers = gui.add_html(Markup(""))
         self._build_folders()
         self._drawing = BoardsDrawing(self.scene, lambda name: ui.post(self._pick, name))
@@ -145,11 +145,17 @@ class CalibratePanel(Panel):
             self._view, self._whole = None, {}
         if moved:
             self._source = inner(spec.source)
-            self._use.forget()
+            self._judge.set(None)
+        self._use.follow(spec)
         if moved or taken:
             self.ui.post(self._use_own, None)
         if not self.session.results.fresh("calibrate", spec):
             self._noise.forget()
+
+    def on_action(self, action: str) -> None:
+        """Ask again for a cancelled verdict on *Retry*."""
+        if action == "Retry":
+            self._request_answers()
 
     def on_partial(self, view: Any) -> None:
         """Show the cameras computed so far."""
@@ -161,12 +167,13 @@ class CalibratePanel(Panel):
         if step == "scene":
             self._uploads.cameras([node.name for node in view.nodes])
             self._judge.at_range([0.5 * (node.nearest_m + node.farthest_m) for node in view.nodes])
+            self._request_answers()
             if not isinstance(self.session.spec.source, Calibrated):
                 self._came = view
             if self._view is None or AROUND[self._around.value] == "rig":
                 self._draw()
         if step == "surface" and self.session.results.fresh("surface", self.session.spec):
-            self._use.surface(view.after, isinstance(self.session.spec.source, Calibrated))
+            self._use.surface(view.after)
         if step == "calibrate":
             self._take(view, all_there=True)
             self._show_look()
@@ -180,6 +187,7 @@ class CalibratePanel(Panel):
 
     def _take(self, view: CalibrationView, all_there: bool) -> None:
         self._view = view
+        self._answers.follow()
         if view.cameras:
             self._camera.offer(tuple(camera.name for camera in view.cameras), all_there)
         self._whole |= {camera.name: camera for camera in view.cameras if not camera.dropped}
@@ -213,8 +221,7 @@ class CalibratePanel(Panel):
 
     def _show_numbers(self, camera: CameraView | None) -> None:
         if camera is None or self._view is None:
-            self._verdict.content = self._numbers.content = Markup("")
-            self._judge.load(None)
+            self._numbers.content = Markup("")
             self._parameters.load(None)
             self._lens.load(None)
             self._depth.load("")
@@ -230,13 +237,21 @@ class CalibratePanel(Panel):
         self._lessons.refresh()
 
     def _show_view(self) -> None:
-        """Show the chosen view, and the maps of its pixels."""
+        """Show the chosen view, the maps of its pixels and the verdict; ask for what is not computed yet.
+
+        While a camera with a lens is judged, the verdict before stays.
+        """
         camera = self._shown()
+        trust = None if camera is None else self._answers.trust_in(camera)
         self._photographs.load(camera)
-        if camera is not None:
-            trust = self._answers.trust_in(camera)
-            self._parameters.relate(None if trust is None else trust.together)
-            self._request_answers()
+        self._parameters.relate(None if trust is None else trust.together)
+        if trust is not None or camera is None or camera.calibration is None:
+            self._show_verdict(trust)
+        self._request_answers()
+
+    def _show_verdict(self, view: TrustView | None) -> None:
+        self._verdict.content = verdict_html(view)
+        self._judge.load(view)
 
     def _pick(self, name: str) -> None:
         """Show another view."""
@@ -273,11 +288,11 @@ class CalibratePanel(Panel):
 
     def _judged(self, view: TrustView | None) -> None:
         with self.ui.atomic():
-            self._verdict.content = verdict_html(view)
-            self._judge.load(view)
+            if view is None:
+                self._show_verdict(None)
             self._show_view()
 
-    def _replay(self, sigma_px: float, other_lens: bool) -> None:
+    def _replay(self, replay: int, sigma_px: float, other_lens: bool) -> None:
         camera = self._shown()
         if camera is None or camera.calibration is None:
             raise InputError("There is no calibration to repeat; add photographs first.")
@@ -285,38 +300,9 @@ class CalibratePanel(Panel):
         self.session.side_job(
             "calibrate.noise_job:noise_job",
             request,
-            on_partial=self._noise.load,
-            on_end=lambda view: self._noise.ended(view, request),
+            on_partial=partial(self._noise.load, replay),
+            on_end=partial(self._noise.ended, replay),
         )
-
-    # The chain.
-
-    def _use_it(self) -> None:
-        """Write the shown calibration to a new folder, and let the chain use it.
-
-        Raises:
-            InputError: the scene is a recording.
-        """
-        if isinstance(self._source, Recorded):
-            raise InputError(
-                "A recording keeps its own camera; on the command line --recording takes other --intrinsics."
-            )
-        self._uses += 1
-        self._use.show_status(WRITING)
-        folder = str(self.session.new_folder() / f"calibration_{self._uses:02d}")
-        self.session.quick_job("calibrate.use_job:use_job", folder, on_end=self._written)
-
-    def _written(self, folder: str | None) -> None:
-        if folder is None:
-            self._use.show_status("")
-            return
-        source: Any = self._source
-        self._use.used(folder)
-        self.session.want(replace(self.session.spec, source=Calibrated(source, folder)))
-
-    def _as_before(self) -> None:
-        self._use.used(None)
-        self.session.want(replace(self.session.spec, source=self._source))
 
     @property
     def command(self) -> str:
@@ -336,7 +322,7 @@ class CalibratePanel(Panel):
                 self._whole = {}
             self._noise.forget()
         if not look.used and isinstance(self.session.spec.source, Calibrated):
-            self._as_before()
+            self._use.put_back()
         self._look = look
         views = self.session.spec.views
         if views is not None:
@@ -357,7 +343,7 @@ class CalibratePanel(Panel):
         if look.noise_px is not None:
             self._noise.set(look.noise_px, look.other_lens)
         if look.used and not isinstance(self.session.spec.source, Calibrated):
-            self._use_it()
+            self._use.use()
 
     def _lesson_numbers(self) -> Numbers:
         """Return the numbers of the camera that is shown; empty while it is computed."""
@@ -377,11 +363,13 @@ class CalibratePanel(Panel):
         camera, view, around = self._shown(), self._view, AROUND[self._around.value]
         scene = self.session.results.view("scene")
         with self.ui.atomic():
+            self._no_rig.visible = False
             if view is None or camera is None or camera.calibration is None:
                 self._drawing.draw_scene(scene)
             elif around == "rig" and isinstance(view.rig, RigView):
                 self._drawing.draw_rig(view, view.rig, scene, self._came, self._photographs.chosen)
             else:
+                self._no_rig.visible = around == "rig"
                 self._drawing.draw_camera(camera, view.board, around, self._photographs.chosen)
         self.session.frame_view()
 

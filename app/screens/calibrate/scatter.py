@@ -12,7 +12,7 @@ from app.dock.plots import Sheet
 from app.drawing.colors import BRAND, DELIVERED, INFERRED, LOSS, NEUTRAL, css
 from app.drawing.plots import styled_figure
 from app.screens.calibrate.noise_view import CLOSE, INSIDE_95, NoiseView
-from app.screens.calibrate.numbers import MEANING, UNITS
+from app.screens.calibrate.numbers import UNITS, meanings
 from app.web.markup import Markup
 from app.window.tables import number, term
 from pipeline.calibration.thesis_table import TABLE_4_1
@@ -23,8 +23,12 @@ TEXT_PX, TICK_PX, DOT_PX = 17, 15, 8
 REACH = 3.5
 """Least extent of the plot to each side of the truth, in standard errors."""
 INK = "#111"
+MORE = "more distortion (p1, p2, k3)"
+"""Difference of the lens through which the points can be projected instead of the estimated one."""
 ERROR = "Root mean square difference of the trials from the truth."
-PREDICTED = "Mean of the standard errors that the trials report; close to the error if they are reliable."
+PREDICTED = (
+    "Root mean square of the standard errors that the trials report; close to the error if they are reliable."
+)
 THESIS = (
     "Error of the thesis's value at the nearest noise level of Table 4.1: for f and c as the same share "
     "of this camera's value, for k1 and k2 as the same difference."
@@ -35,7 +39,7 @@ def noise_sheet(view: NoiseView) -> Sheet:
     """Return the dock's sheet of the trials so far."""
     cell = nearest_cell(view.request.sigma_px, view.names)
     request = view.request
-    lens = ", through a lens of another kind" if request.other_lens else ""
+    lens = f", through this lens with {MORE}" if request.other_lens else ""
     return Sheet(
         f"{request.camera}, {request.sigma_px:.2f} px of noise{lens}: {view.trials} of {request.trials} "
         "trials",
@@ -71,6 +75,7 @@ def errors_html(view: NoiseView, cell: Cell | None) -> Markup:
     heads = [term("error", ERROR), term("predicted", PREDICTED)]
     heads += [] if cell is None else [term("thesis", THESIS)]
     lines = [Markup("").join(Markup('<th style="{}">{}</th>').format(pad, head) for head in ("", *heads))]
+    meaning = meanings(view.names)
     for name in view.names:
         digits, unit = (2, "px") if name in UNITS else (4, "")
         values = [number(view.rmse(name), digits, unit), number(view.predicted(name), digits, unit)]
@@ -81,9 +86,7 @@ def errors_html(view: NoiseView, cell: Cell | None) -> Markup:
             else ["–" if off is None else f"{off:+.{digits}f} {unit}".strip().replace("-", "−")]
         )
         cells = Markup("").join(Markup('<td style="{}">{}</td>').format(pad, one) for one in values)
-        lines.append(
-            Markup('<td style="{}">{}</td>{}').format(pad, term(name, MEANING.get(name, name)), cells)
-        )
+        lines.append(Markup('<td style="{}">{}</td>{}').format(pad, term(name, meaning[name]), cells))
     return Markup('<table style="border-collapse: collapse">{}</table>').format(
         Markup("").join(Markup("<tr>{}</tr>").format(line) for line in lines)
     )

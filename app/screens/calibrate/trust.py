@@ -27,6 +27,9 @@ class TrustFolder:
         """Add the folder; ``on_change`` is called when the camera is to be judged again."""
         self._view: TrustView | None = None
         self._own_m = OWN_M
+        """The scene's own range."""
+        self._chosen_m: float | None = None
+        """Range set by hand or by a stop; None is the scene's own."""
         self._resting = ui.debounce(REST_S, on_change)
         gui = ui.gui
         with gui.add_folder("Good enough for what?", expand_by_default=False):
@@ -57,8 +60,8 @@ class TrustFolder:
             self._plot = gui.add_plotly(
                 go.Figure(), aspect=0.75, config={"displayModeBar": False}, visible=False
             )
-        for handle in (self._range, self._accuracy):
-            ui.when_changed(handle, self._resting.restart)
+        ui.when_changed(self._range, self._picked_range)
+        ui.when_changed(self._accuracy, self._resting.restart)
         ui.when_changed(self._curve, self._draw)
 
     def request(self, camera: str) -> TrustRequest:
@@ -66,16 +69,23 @@ class TrustFolder:
         return TrustRequest(camera, float(self._range.value), self._accuracy.value / 1000.0)
 
     def at_range(self, ranges_m: Sequence[float]) -> None:
-        """Make the mean of these distances, rounded to 0.1 m, the scene's own range, and set it."""
+        """Make the mean of these distances, rounded to 0.1 m, the scene's own range."""
         self._own_m = round(sum(ranges_m) / len(ranges_m), 1)
-        self.set(None)
+        self.set(self._chosen_m)
 
     def set(self, range_m: float | None) -> None:
-        """Set the range; None takes the scene's own."""
+        """Set the range; None takes the scene's own, also that of a later scene."""
+        self._chosen_m = range_m
         self._range.value = self._own_m if range_m is None else range_m
+
+    def _picked_range(self) -> None:
+        self._chosen_m = float(self._range.value)
+        self._resting.restart()
 
     def load(self, view: TrustView | None) -> None:
         """Show the result; None clears it."""
+        if view is self._view:
+            return
         self._view = view
         self._table.content = Markup("") if view is None else trust_table(view)
         self._draw()

@@ -136,7 +136,8 @@ def keep_photographs(file: viser.UploadedFile, folder: Path, node: str) -> list[
         Paths of the kept files below ``folder``.
 
     Raises:
-        InputError: the upload is too large, an unreadable ZIP, holds no photograph, or makes too many files.
+        InputError: the upload is too large, an unreadable ZIP, holds no photograph or two of the same place,
+            or makes too many files.
     """
     if len(file.content) > UPLOAD_LIMIT_BYTES:
         raise InputError(
@@ -163,11 +164,16 @@ def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
         inside = [one for one in archive.infolist() if one.filename.lower().endswith((*ENDINGS, BOARD_FILE))]
         if sum(one.file_size for one in inside) > UNPACKED_LIMIT_BYTES:
             raise InputError(f"{file.name} unpacks to more than {UNPACKED_LIMIT_BYTES >> 20} MB; {INSTEAD}.")
-        found = {
-            _place(one.filename, node): unpacked(archive, one)
-            for one in inside
-            if not _path(one.filename).name.startswith(".")
-        }
+        found = dict[str, bytes]()
+        for one in inside:
+            if _path(one.filename).name.startswith("."):
+                continue
+            place, content = _place(one.filename, node), unpacked(archive, one)
+            if found.setdefault(place, content) != content:
+                raise InputError(
+                    f"{file.name} has several files for {place}, one of them {one.filename}; give each "
+                    "photograph its own name, and each camera its own folder: node_00, node_01 and so on."
+                )
     if not set(found) - {BOARD_FILE}:
         raise InputError(f"{file.name} holds no PNG or JPEG; try a ZIP of photographs.")
     return found

@@ -148,8 +148,8 @@ class CalibrationView:
     """By camera: the bias of its depth, or why it is unknown; only those computed so far."""
 
     def camera(self, name: str) -> CameraView | None:
-        """Return the camera of this name, or the first."""
-        return next((one for one in self.cameras if one.name == name), next(iter(self.cameras), None))
+        """Return the camera of this name; None if there is none."""
+        return next((one for one in self.cameras if one.name == name), None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -93,7 +93,9 @@ class ExportPanel(Panel):
                 Markdown("`{}` in its folder is {}.").format(FILES[spec.shown], SURFACES[spec.shown]),
             ),
             Offers(
-                "Clouds", "Points of all nodes in the world frame, over which the ball rolls; PLY.", clouds
+                "Clouds",
+                "Points of all nodes in the world frame, as PLY; Fused gives the surface after fusion.",
+                clouds,
             ),
             Offers("Numbers", "All metrics and settings as JSON, or the whole run as a ZIP.", numbers),
         )

@@ -20,8 +20,8 @@ from packetmesh.settings import differences
 
 REASONS = {
     Cause.COLLISION: (
-        "Two cameras sent at the same time. This happens on every shared channel, even with "
-        "the loss slider at 0; WLAN sends such frames again."
+        "Two nodes sent at the same time. This happens on every shared channel, even with the loss slider "
+        "at 0. Radios with acknowledgements send such frames again."
     ),
     Cause.NOISE: "The signal was too weak for all bits to be read.",
     Cause.RANGE: "The receiver was too far away, or behind a wall.",
@@ -32,16 +32,16 @@ REASONS = {
 BYTES_MB = 1e-6
 MOST_CHANGES = 4
 """Most changes that are named one by one."""
+END = "The last moment: no more bytes arrive after it."
 
 
-def moment_table(view: DeliveryView, now: MomentView | None, now_ns: int) -> Markup:
-    """Return a table of the main numbers in HTML: of the moment ``now``, which the clock at ``now_ns`` shows,
-    of the last moment, and without losses.
+def moment_table(view: DeliveryView, now: MomentView | None) -> Markup:
+    """Return a table of the main numbers in HTML: of the moment ``now`` that the clock shows, of the last
+    moment, and without losses.
     """
     end = view.moment_at(view.times_ns[-1])
     done = end is not None and end.t_ns == view.times_ns[-1]
-    end_ns = max(view.run.end_ns, view.times_ns[-1])
-    columns = (_head(view, now, now_ns), f"end, {time_text(end_ns)}", "no loss")
+    columns = (_head(now), (f"end, {time_text(view.times_ns[-1])}", END), "no loss")
     last, best = end if done else None, view.lossless
     rows: list[Row] = [
         (
@@ -93,12 +93,10 @@ def moment_table(view: DeliveryView, now: MomentView | None, now_ns: int) -> Mar
     return table(rows, columns)
 
 
-def _head(view: DeliveryView, now: MomentView | None, now_ns: int) -> Head:
-    """Return the head of the clock's column; after the last moment no more bytes arrive."""
+def _head(now: MomentView | None) -> Head:
+    """Return the head of the clock's column."""
     if now is None:
         return "nothing yet"
-    if now.t_ns == view.times_ns[-1]:
-        return f"at {time_text(now_ns)}"
     return f"by {time_text(now.t_ns)}", "The last moment before the clock at which the surface is rebuilt."
 
 
@@ -136,7 +134,7 @@ def more_rows(view: DeliveryView, now: MomentView | None) -> Markup:
     ]
     energy = (
         "Radios alone",
-        "Energy of all nodes' radios until the clock's time.",
+        "Energy of all nodes' radios until the last moment before the clock.",
         number(now.radio_j, 2, "J"),
         "",
         "",
@@ -149,8 +147,8 @@ def summary(view: DeliveryView) -> Markdown:
     """Return a sentence on the computed part of the delivery."""
     computed, planned = len(view.moments), len(view.times_ns)
     sentence = Markdown("{} nodes sent {:.2f} MB in {:,} packets; simulated in {:.1f} s.").format(
-        len([node for node in view.nodes if node.row >= 0]),
-        view.total_bytes * BYTES_MB,
+        len(view.senders),
+        sum(node.total_bytes for node in view.senders) * BYTES_MB,
         view.run.packets,
         view.run.elapsed_s,
     )
@@ -238,7 +236,8 @@ def legend(view: DeliveryView) -> Sequence[tuple[str, Number]]:
         if np.any((pieces.what == What.AIR) & (pieces.carries == kind))
     ]
     if np.any(pieces.what == What.ACK):
-        flying.append(("acknowledgement on the air", ANSWER))
+        answers = "acknowledgement, RTS or CTS" if view.run.config.mac.rts else "acknowledgement"
+        flying.append((f"{answers} on the air", ANSWER))
     most = "an empty battery" if view.sent.network.energy.battery_j else "the most of any node"
     return [*some, *flying, ("lost here", LOSS), (f"ball: energy used, from none to {most}", EMPTY)]
 

@@ -109,6 +109,11 @@ class DeliveryView:
     """None while it is computed, or if there is no surface without losses either."""
 
     @property
+    def senders(self) -> tuple[CameraNode, ...]:
+        """The nodes that are not down."""
+        return tuple(node for node in self.nodes if node.row >= 0)
+
+    @property
     def total_bytes(self) -> int:
         """Size of all nodes' images, including those of failed nodes."""
         return sum(node.total_bytes for node in self.nodes)

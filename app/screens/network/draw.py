@@ -283,8 +283,8 @@ def road_legend(views: Sequence[NetworkView]) -> Markup:
     roads = "Roads, each way" if all(scheme.directed_cells for scheme in schemes) else "Roads"
     spans = Markup(" and ").join(dict.fromkeys(f"{scheme.validity_s:g}" for scheme in schemes))
     return Markup(
-        "<div style='padding: 0 0.8em 0.8em; font-size: 12px'>{}: share of the {} s intervals seen by a "
-        "camera so far from which an image has arrived: 0 % <span style='display: inline-block; width: "
+        "<div style='padding: 0 0.8em 0.8em; font-size: 12px'>{}: of the {} s intervals in which a camera "
+        "saw them, the share with an image that has arrived: 0 % <span style='display: inline-block; width: "
         "7em; height: 0.8em; background: linear-gradient(to right, {})'></span> 100 %; grey: not seen "
         "yet</div>"
     ).format(roads, spans, stops)

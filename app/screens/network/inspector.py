@@ -25,6 +25,8 @@ class Inspector:
         self._frames: Sequence[Frames] = ()
         self._view: DeliveryView | None = None
         self._drawing: DeliveryDrawing | None = None
+        self._picked: tuple[int, int, DeliveryDrawing | None] = -1, -1, None
+        """Lane, index and drawing of the frame that is described."""
         with ui.gui.add_folder("Packet"):
             self._text = ui.gui.add_markdown(PICK)
 
@@ -42,10 +44,12 @@ class Inspector:
             drawing: drawing in which pixels and points are highlighted.
         """
         self._frames, self._view, self._drawing = frames, view, drawing
+        self._picked = -1, -1, drawing
         self._text.content = PICK
 
     def pick(self, lane: int, item: int) -> None:
         """Describe a frame and highlight what it carried; a negative ``item`` is none."""
+        picked = self._picked = lane, item, self._drawing
         if self._drawing is not None:
             self._drawing.light(None)
         if item < 0 or lane >= len(self._frames):
@@ -63,7 +67,8 @@ class Inspector:
             first, count = frames.bytes_of(item)
 
             def came(packet: PacketView | None) -> None:
-                self._light(story, packet)
+                if picked == self._picked:
+                    self._light(story, packet)
 
             self._session.quick_job("network.delivery_job:packet_job", source, first, count, on_end=came)
 

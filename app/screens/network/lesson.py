@@ -191,7 +191,8 @@ def _frame_numbers(view: DeliveryView, frames: Frames) -> dict[str, str]:
         return {}
     first = images[0]
     payload = frames.bytes_of(first)[1]
-    packets = sum(-(-node.total_bytes // payload) for node in view.nodes)
+    packets = sum(-(-node.total_bytes // payload) for node in view.senders)
+    sent_bytes = sum(node.total_bytes for node in view.senders)
     frame_ns = int(air.end_ns[first] - air.start_ns[first])
     collisions = int(np.count_nonzero(air.cause[images] == Cause.COLLISION))
     crossings = {(frames.camera_of(item), int(air.node[item])) for item in images}
@@ -203,7 +204,7 @@ def _frame_numbers(view: DeliveryView, frames: Frames) -> dict[str, str]:
         "packets_tenfold": f"{round(packets / digit) * digit * 10:,}",
         "frame_time": time_text(frame_ns),
         "least": time_text(packets * frame_ns),
-        "bytes_time": time_text(round(8e9 * view.total_bytes / view.run.config.mac.rate_bps)),
+        "bytes_time": time_text(round(8e9 * sent_bytes / view.run.config.mac.rate_bps)),
         "relayed": str(len({camera for camera, sender in crossings if sender != camera})),
         "crossings": str(len(crossings)),
         "tries": f"{len(images):,}",

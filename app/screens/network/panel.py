@@ -213,6 +213,7 @@ class NetworkPanel(Panel):
             spec = replace(session.spec, networks=tuple(runs.values()), sent=None)
         else:
             spec = replace(session.spec, networks=(), sent=setup.sent())
+        setup.show_idle()
         there = session.results.fresh("network", spec)
         if not there:
             self._status.content = RUNNING
@@ -380,5 +381,5 @@ class NetworkPanel(Panel):
             if drawing.show_moment(moment, most_j(view)):
                 self._hand.restart()
             self._measures.follow(view, moment)
-            self._table.content = moment_table(view, moment, self._dock.now_ns)
+            self._table.content = moment_table(view, moment)
             self._others.content = more_rows(view, moment) + metric_tables((view.run,))[1]

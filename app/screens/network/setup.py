@@ -30,6 +30,7 @@ CODING_NAMES = {title: name for name, title in CODINGS.items()}
 NOTHING = "nothing"
 FIRST = next(iter(NETWORKS))
 MOMENTS = 20
+BURST_FRAMES = NetworkLook().burst_frames
 OF_NODES = ("off", "wall", "moved")
 FREE = Markdown(
     """Settings that `packetmesh simulate --describe` lists, separated by spaces, for example
@@ -68,7 +69,7 @@ class NetworkSetup:
             1,
             50,
             1,
-            8,
+            BURST_FRAMES,
             hint="Mean number of frames lost in a row.",
         )
         self._retransmit = gui.add_checkbox(
@@ -118,9 +119,8 @@ class NetworkSetup:
             MOMENTS,
             hint="Number of times at which the surface is rebuilt, after equal shares of the bytes.",
         )
-        for handle in (self._access, self._shadowing):
-            ui.when_changed(handle, self._changed)
-        ui.when_changed(self._moments, self._on_change)
+        for handle in (self._access, self._shadowing, self._moments):
+            ui.when_changed(handle, self._on_change)
         gui.add_markdown(FREE)
         self._text = gui.add_text("Setting key=value", "", hint="For example nodes.deadline_s=4")
         self._beside_text = gui.add_text(
@@ -146,7 +146,7 @@ class NetworkSetup:
         """Restore the first settings."""
         self._preset.value = NETWORKS[FIRST].title
         self._coding.value = next(iter(CODING_NAMES))
-        self._moments.value = MOMENTS
+        self._moments.value, self._burst.value = MOMENTS, BURST_FRAMES
         self.what_if.forget()
         self._load()
         self._own |= self._values()
@@ -329,17 +329,12 @@ class NetworkSetup:
         self._own |= {name: shown(self._handles()[name]) for name in loaded}
 
     def _use_text(self) -> None:
-        """Take the free settings; if they are wrong, the previous ones stay. Name those without effect."""
+        """Take the free settings; if they are wrong, the previous ones stay."""
         self._read_text()
-        self._changed()
-
-    def _changed(self) -> None:
-        """Name the settings without effect, and report the change."""
-        self._show_idle()
         self._on_change()
 
-    def _show_idle(self) -> None:
-        """Show why some of the given settings change nothing."""
+    def show_idle(self) -> None:
+        """Show why some of the given settings change nothing; nothing if all of them count."""
         given = [key_of(change) for change in (*self._extra, *self._beside_extra)]
         if self._shadowing.value and not self.street:
             given.append("radio.shadowing_db")

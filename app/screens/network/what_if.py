@@ -61,8 +61,8 @@ class WhatIf:
         self._walled = gui.add_dropdown(
             "Wall at",
             [NOBODY],
-            hint="Puts a wall between this node and the sink; it has no effect on serial lines and "
-            "recorded links.",
+            hint="Puts a wall between this node and the sink, which also blocks nodes straight behind; it "
+            "has no effect on serial lines and recorded links.",
         )
         self._wall_db = gui.add_slider(
             "Wall loss (dB)",

@@ -7,6 +7,7 @@ import json
 import re
 import shlex
 import zipfile
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -17,7 +18,7 @@ import viser
 from app.compute.state import Spec
 from app.compute.store import Store
 from app.screens.calibrate import panel
-from app.screens.calibrate.labels import AROUND, COVERAGE, DEPTH, HALVES, NEXT, UNCERTAINTY
+from app.screens.calibrate.labels import AROUND, COVERAGE, DEPTH, HALVES, NEXT, NO_RIG, UNCERTAINTY
 from app.screens.calibrate.lesson import left_out
 from app.screens.calibrate.noise import OTHER, READY
 from app.screens.calibrate.noise_view import NoiseRequest
@@ -210,6 +211,28 @@ def test_the_verdict_follows_the_accuracy(screen):
     assert "✗ FAIL" in gui.text()
 
 
+def test_without_a_lens_there_is_no_verdict_until_the_lens_is_back(screen):
+    gui, spec = screen.gui, screen.spec
+    gui.set("Accuracy (mm)", 20.0)
+    few = tuple(("node_00", str(moment)) for moment in range(2, MOMENTS))
+    screen.want(replace(spec, views=replace(spec.views, dropped=few)))
+    assert calibration(screen).camera("node_00").calibration is None
+    assert "✓ PASS" not in gui.text()
+    assert "Noise, 95 %" not in gui.text("Good enough for what?")
+    screen.want(spec)
+    assert "✓ PASS" in gui.text()
+    assert "Noise, 95 %" in gui.text("Good enough for what?")
+
+
+def test_a_cancelled_verdict_comes_on_retry(screen):
+    gui, screen.refuse = screen.gui, "Cancelled."
+    gui.set("Accuracy (mm)", 20.0)
+    assert "✓ PASS" not in gui.text()
+    screen.refuse = ""
+    screen.panel.on_action("Retry")
+    assert "✓ PASS" in gui.text()
+
+
 @pytest.mark.parametrize("pair", [UNCERTAINTY, HALVES, COVERAGE, NEXT, DEPTH])
 def test_every_comparison_has_its_pictures(screen, pair):
     gui = screen.gui
@@ -227,6 +250,7 @@ def test_boards_and_cameras_stand_in_space(screen, around, inside):
     sheets = [name for name in names if name.startswith("/calibrate/board-") and name.count("/") == 2]
     expected = {"camera": (1, MOMENTS), "board": (MOMENTS, 1), "rig": (3, MOMENTS)}[AROUND[around]]
     assert (len(frusta), len(sheets)) == expected
+    assert NO_RIG not in screen.gui.text()
 
 
 def test_noise_is_replayed_and_another_lens_misses_the_truth(screen):
@@ -328,6 +352,8 @@ def one_camera(server, store, rig, boards, tmp_path):
 def test_the_board_of_one_camera_may_be_bent(server, store, rig, boards, tmp_path):
     bench = one_camera(server, store, rig, boards, tmp_path)
     gui = bench.gui
+    gui.set("In space", next(name for name, key in AROUND.items() if key == "rig"))
+    assert NO_RIG in gui.text()
     assert not gui.find(BENT).disabled
     assert "Board bent by" not in gui.text()
     assert "--board-warp" not in bench.panel.command

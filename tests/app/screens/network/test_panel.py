@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -18,10 +19,12 @@ from app.lesson.reading import read_lesson
 from app.screens.network import setup
 from app.screens.network.delivery_draw import EMPTY, FULL
 from app.screens.network.delivery_numbers import legend, moment_table
-from app.screens.network.delivery_view import DeliveryView
+from app.screens.network.delivery_view import DeliveryView, PacketView
 from app.screens.network.draw import STREET, ground_of
+from app.screens.network.inspector import Inspector
 from app.screens.network.labels import ANSWER, NETWORKS, ORIGIN, PICK
-from app.screens.network.lesson import CROSSING, KIND, LOST_PACKET
+from app.screens.network.lesson import CROSSING, KIND, LOST_PACKET, numbers
+from app.screens.network.packets import Frames
 from app.screens.network.panel import NetworkPanel
 from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import What
@@ -153,17 +156,21 @@ def test_more_and_more_arrives(screen):
     assert moments[-1].no_hit_share < moments[0].no_hit_share
 
 
-def test_the_table_shows_the_clock_and_says_why_frames_were_lost(screen):
+def test_the_table_says_until_when_it_counts_and_why_frames_were_lost(screen):
+    """The radios also use energy after the last arrival, until which the columns count."""
     view = screen.view
     screen.dock.seek(view.run.end_ns)
-    html = moment_table(view, view.moments[-1], view.run.end_ns)
-    at_end = time_text(view.run.end_ns)
-    assert f">at {at_end}<" in html
-    assert f">end, {at_end}<" in html
+    html = moment_table(view, view.moments[-1])
+    last = time_text(view.moments[-1].t_ns)
+    assert last != time_text(view.run.end_ns)
+    assert f">by {last}<" in html
+    assert f">end, {last}<" in html
     why = re.findall(r">· ([\w ]+)</button></td><td[^>]*>([\d,]+)</td>", html)
     assert sum(int(count.replace(",", "")) for _, count in why) == view.moments[-1].packets_lost
-    assert ">by " in moment_table(view, view.moments[0], view.times_ns[0])
+    assert f">by {time_text(view.times_ns[0])}<" in moment_table(view, view.moments[0])
     assert ("acknowledgement on the air", ANSWER) in legend(view)
+    cleared = replace(view.run, config=with_settings(view.run.config, ("mac.rts=true",)))
+    assert ("acknowledgement, RTS or CTS on the air", ANSWER) in legend(replace(view, run=cleared))
 
 
 def test_the_more_a_node_has_used_the_nearer_is_its_ball_to_orange(screen):
@@ -218,6 +225,29 @@ def test_picking_a_frame_tells_of_it_and_lights_its_pixels(screen):
     assert "lit" not in screen.names()
 
 
+def test_the_answer_on_a_frame_that_is_no_longer_picked_is_ignored(screen):
+    view, asked, lit = screen.view, [], []
+    ui, drawing = ui_of(), SimpleNamespace(light=lit.append)
+    session = SimpleNamespace(quick_job=lambda *_, on_end: asked.append(on_end))
+    inspector, frames = Inspector(ui, session), Frames(view.run)
+    pixels = np.ones((1, 1), bool)
+    packet = PacketView(0, pixels, pixels, np.zeros((1, 1, 3)), np.zeros((0, 3)))
+    item = next(item for item in range(len(frames.pieces)) if frames.carries_image(item))
+    for leave in (
+        lambda: inspector.pick(0, -1),
+        lambda: inspector.load([frames], view, SimpleNamespace(light=lit.append)),
+    ):
+        inspector.load([frames], view, drawing)
+        inspector.pick(0, item)
+        leave()
+        asked.pop()(packet)
+        assert packet not in lit
+        assert ui.gui.text() == PICK
+    inspector.pick(0, item)
+    asked.pop()(packet)
+    assert lit[-1] is packet
+
+
 def test_the_command_delivers_the_same(screen):
     words = shlex.split(screen.panel.command)
     assert words[:6] == ["packetmesh", "deliver", *screen.spec.source.arguments(), "--preset", "office"]
@@ -233,6 +263,11 @@ def test_a_node_switched_off_is_not_heard_and_the_difference_is_told(screen):
     assert view.moments[-1].nodes[1].delivered_bytes == 0
     assert [node.row for node in view.nodes] == [0, -1, 1]
     assert view.run.names[:2] == ("node_00", "node_02")
+    streams = [view.nodes[row].total_bytes for row in (0, 2)]
+    assert f"2 nodes sent {1e-6 * sum(streams):.2f} MB" in screen.gui.text()
+    told = numbers("", view, Frames(view.run))
+    assert told["packets"] == f"{view.run.packets:,}"
+    assert told["bytes_time"] == time_text(round(8e9 * sum(streams) / view.run.config.mac.rate_bps))
     screen.dock.seek(view.moments[-1].t_ns)
     assert screen.clouds() == {"cloud-node_00", "cloud-node_02"}
     assert "node_01 off" in screen.gui.text()
@@ -350,11 +385,41 @@ def test_every_stop_of_the_lessons_asks_for_a_network_that_there_is(path):
     assert len(set(asked)) >= 7
 
 
-def test_a_setting_that_changes_nothing_is_named_until_it_counts(screen):
-    screen.use("scheme.k=3")
-    assert "scheme.k changes nothing here: scenario is collection" in screen.gui.text()
-    screen.use("")
+@pytest.mark.parametrize(
+    ("setting", "leave"),
+    [
+        ("scheme.k=3", lambda screen: screen.use("")),
+        ("scheme.k=3", lambda screen: screen.panel.on_action("Reset")),
+        ("scheme.k=3", lambda screen: screen.gui.set("Preset", NETWORKS["greenhouse"].title)),
+        ("loss.burst_packets=3", lambda screen: screen.gui.set("Lose packets (%)", 10.0)),
+    ],
+)
+def test_a_setting_that_changes_nothing_is_named_until_it_counts_or_goes(screen, setting, leave):
+    screen.refuse = "not yet"
+    screen.use(setting)
+    assert f"{setting.partition('=')[0]} changes nothing here: " in screen.gui.text()
+    leave(screen)
     assert "changes nothing" not in screen.gui.text()
+    screen.refuse = ""
+    screen.panel.on_action("Reset")
+
+
+def test_bursts_are_put_back_and_in_the_address_as_all_other_controls():
+    ui = ui_of()
+    setup = NetworkSetup(ui, lambda: None)
+    setup.add_what_if("/what-if")
+    setup.add_advanced()
+    ui.gui.set("in bursts of (frames)", 20)
+    setup.take_place("")
+    assert ui.gui.find("in bursts of (frames)").value == 8
+    assert setup.place() == ""
+    ui.gui.set("Lose packets (%)", 10.0)
+    ui.gui.set("in bursts of (frames)", 20)
+    sent, place = setup.sent(), setup.place()
+    setup.reset()
+    setup.take_place(place)
+    assert setup.sent() == sent
+    assert sent.network.loss.burst_packets == 20.0
 
 
 def test_a_wrong_key_names_the_nearest_and_keeps_what_was(screen):
