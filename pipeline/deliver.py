@@ -17,7 +17,7 @@ from packetmesh.batch import process_pool
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import drain
 from pipeline.config import PRESETS, PipelineConfig
-from pipeline.delivery.moments import Moment, Rebuilder, spec_of
+from pipeline.delivery.moments import Moment, Rebuilder, lossless_spec, spec_of
 from pipeline.delivery.sending import DeliverySpec, Sending, frames_at_sink, received_at, send
 from pipeline.delivery.sink import heard
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
@@ -36,7 +36,7 @@ class Delivery:
     last: Reconstruction | None
     """Reconstruction of all that arrived; None if that was too little."""
     lossless: Reconstruction
-    """Reconstruction of the images before coding."""
+    """Reconstruction of the images before coding; of a walk it is without the map, which is not sent."""
 
 
 def deliver(
@@ -95,7 +95,7 @@ def iterate_delivery(
     for moment in _moments(sending, processes):
         moments.append(moment)
         yield moment
-    lossless = drain(iterate_reconstruction(spec.spec, cache))
+    lossless = drain(iterate_reconstruction(lossless_spec(sending), cache))
     return Delivery(sending, tuple(moments), _last(sending, lossless), lossless)
 
 

@@ -6,7 +6,7 @@ This module neither computes nor imports large libraries, so that a program that
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Self
 
@@ -108,6 +108,12 @@ SIDE_BY_SIDE: frozenset[tuple[StageName, StageName]] = frozenset({("after", "bef
 network parallel to the outlier filter would save less than .1 s and take 0.2 GB more with three nodes
 (``packetmesh bench --only chain``).
 """
+
+
+def whole_s(timings_s: Mapping[str, float]) -> float:
+    """Return the time of all stages together, of those that run in parallel that of the longer one."""
+    hidden_s = (min(timings_s.get(stage, 0.0) for stage in pair) for pair in SIDE_BY_SIDE)
+    return sum(timings_s.values()) - sum(hidden_s)
 
 
 def key(spec: Spec, stage: StageName) -> tuple[Hashable, ...]:

@@ -163,9 +163,8 @@ class RigTruth:
     """Ground truth of a rendered scene."""
 
     vertices_m: FloatArray
-    """(V, 3) world frame."""
     triangles: IntArray
-    """(F, 3)."""
+    """(V, 3) vertices in the world frame, and (F, 3) rows of them."""
     T_world_camera: tuple[FloatArray, ...]
     """True pose of every node."""
     depth: tuple[DepthMap, ...]
@@ -288,6 +287,8 @@ class Walk:
     """Pose of the colour camera by tracking alone; equal to ``T_world_camera`` at the first keyframe."""
     notes: tuple[str, ...] = ()
     """Assumptions and doubts, one sentence each."""
+    resumed_s: float = 0.0
+    """Time that interrupted runs had spent on the tracking that this one continued."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -378,9 +379,8 @@ class Surface(ShownInNotebooks):
     """A triangle mesh, grown from a point cloud or read from a file."""
 
     vertices_m: FloatArray
-    """(V, 3)."""
     triangles: IntArray
-    """(F, 3) int32, counter-clockwise seen from outside."""
+    """(V, 3) vertices, and (F, 3) int32 rows of them, counter-clockwise seen from outside."""
     colors: ByteArray | None = None
     """(V, 3) RGB."""
     radii_m: tuple[float, ...] = ()

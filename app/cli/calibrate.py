@@ -49,7 +49,7 @@ def calibrate(
         out: Folder for intrinsics.json, which the other commands read, report.html with pictures of all
             results, metrics.json, and the camera in the formats of OpenCV, ROS, COLMAP, Kalibr, MATLAB and
             Open3D, as far as they support its lens.
-        pattern: Pattern on the board. This option and the next three default to the values of a board.json
+        pattern: Pattern on the board. This option and the next five default to the values of a board.json
             in the folder of the images, or else to 11 x 9 circles at 35 mm.
         columns: Circles, inner corners or AprilTags in a row.
         rows: Number of rows.

@@ -56,10 +56,11 @@ def deliver(
     from pipeline.deliver import iterate_delivery
     from pipeline.delivery.sending import DeliverySpec
     from pipeline.folders.delivery import delivery_metrics, summary, write_delivery_folder
-    from pipeline.folders.run import clear_run_folder
+    from pipeline.folders.run import clear_run_folder, keep_images
     from pipeline.spec import Spec
     from pipeline.stages import RunCache, compute
 
+    keep_images(out, named)
     source, imported = drain(iterate_imported(named, out), say_progress)
     if link_trace is not None:
         network = _with_link(network, link_trace, of_network)
@@ -78,7 +79,7 @@ def deliver(
     page = write_hand_out(delivery, out)
     write_delivery_folder(delivery, metrics, preset, out)
     say(f"100%  {summary(delivery)}; see {page}")
-    for note in (*imported_notes(report), *delivery.lossless.rig.notes):
+    for note in (*imported_notes(report), *delivery.sending.rig.notes):
         say(note)
     if json:
         print_json(metrics)

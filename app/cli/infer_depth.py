@@ -68,6 +68,7 @@ def infer_depth(
         wrong_use("--completion fills the holes of measured depth: add --fill and --sensor DEPTH")
     from packetmesh.files import writable_folder
     from pipeline.depth import DepthNetwork, Overrides
+    from pipeline.folders.inputs import keep_inputs
 
     stems = [photo.stem for photo in photos]
     twice = next((stem for stem in stems if stems.count(stem) > 1), None)
@@ -76,6 +77,8 @@ def infer_depth(
             f"Two photographs are called {twice}, so their depth files would have the same name; try them "
             "one by one"
         )
+    written = [path for stem in stems for path in _files(out, stem)]
+    keep_inputs(written, [*photos, *filter(None, (sensor, model, completion))])
     network = DepthNetwork(model, preset, Overrides(kind, size_px, normalisation, channels))
     writable_folder(out)
     report = {"model": str(network.model_path), "kind": network.convention.kind, "provider": network.provider}
@@ -162,6 +165,11 @@ def _fill_holes(
     return depth, {"share": float(holes.mean()), "mean_confidence": confidence}
 
 
+def _files(out: Path, stem: str) -> tuple[Path, Path]:
+    """Return the files of a photograph's depth and of its preview."""
+    return out / f"{stem}_depth.png", out / f"{stem}_preview.png"
+
+
 def _write_depth(depth: DepthMap, kind: ModelKind, out: Path, stem: str) -> dict[str, Any]:
     """Write the depth image and its preview; return a record of their content."""
     import numpy as np
@@ -169,7 +177,7 @@ def _write_depth(depth: DepthMap, kind: ModelKind, out: Path, stem: str) -> dict
     from pipeline.io.images import write_color, write_depth_mm
     from pipeline.types import DepthMap
 
-    image, preview = out / f"{stem}_depth.png", out / f"{stem}_preview.png"
+    image, preview = _files(out, stem)
     known = depth.z_m[depth.valid]
     record: dict[str, Any] = {"depth": str(image), "preview": str(preview), "known": depth.coverage}
     if depth.kind == "metric":

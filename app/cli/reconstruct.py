@@ -41,7 +41,7 @@ def reconstruct(
         set: Settings to change, for example `--set depth.alignment=median surface.max_points=20000`.
         baseline: Also compute the surface by another method from the same points: surface_poisson.ply and
             .glb, or surface_alpha.ply and .glb.
-        json: Print the metrics as one JSON object.
+        json: Print the metrics as one JSON object; with `--rigs`, the table as a list of objects.
     """
     if rigs is not None and baseline is not None:
         wrong_use("--baseline is for one rig: leave out --rigs")
@@ -114,13 +114,16 @@ def _many(
 
     from app.cli.runs import HEADINGS, RigTask, iterate_rigs, rigs_in, rigs_row
     from packetmesh.files import writable_folder
+    from pipeline.folders.run import keep_images
+    from pipeline.sources import RigFolder
 
-    found = rigs_in(rigs)
-    writable_folder(out)
     tasks = [
         RigTask(path.name, str(path.resolve()), str(out.resolve() / path.name), preset, config, depth_scale)
-        for path in found
+        for path in rigs_in(rigs)
     ]
+    for task in tasks:
+        keep_images(Path(task.out), RigFolder(task.path))
+    writable_folder(out)
     outcomes = drain(iterate_rigs(tasks, out, scheduler), say_progress)
     if json:
         print_json([asdict(outcome) for outcome in outcomes])

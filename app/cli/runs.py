@@ -24,18 +24,29 @@ from packetmesh.progress import Progress, drain, part
 from packetmesh.settings import settings
 from pipeline.config import Baseline, PipelineConfig
 from pipeline.folders.keyframes import iterate_keyframes
-from pipeline.folders.run import METRICS, clear_run_folder, metrics_of, write_baseline, write_run_folder
+from pipeline.folders.run import (
+    IMPORTED,
+    METRICS,
+    PICTURE,
+    REPORT,
+    TASK,
+    clear_run_folder,
+    keep_images,
+    metrics_of,
+    write_baseline,
+    write_run_folder,
+)
 from pipeline.importing import ImportReport, is_recording, iterate_import
 from pipeline.io.rigs import is_rig
 from pipeline.placement.outcome import APART
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
+from pipeline.recording.checkpoint import files_digest
 from pipeline.recording.walk import LEAST_FRAMES
 from pipeline.sources import Calibrated, FileSource, Recorded, RigFolder
-from pipeline.spec import Spec
+from pipeline.spec import Spec, whole_s
 from pipeline.stages import RunCache, cameras_of, compute, dressed, run
 from pipeline.surface.pictures import mesh_picture
 
-REPORT, PICTURE, TASK, IMPORTED = "report.html", "picture.jpg", "task.json", "imported"
 PICTURE_WIDTH_PX = 360
 State = Literal["done", "kept", "failed"]
 
@@ -59,7 +70,7 @@ class RigOutcome:
 
     name: str
     state: State
-    """``kept``: the folder has a complete earlier run of the same path with the same settings."""
+    """``kept``: the folder has a complete earlier run of the same files with the same settings."""
     sentence: str
     """The error, or notes on the import, nodes without a place and doubtful images; empty without any."""
     nodes: int = 0
@@ -85,6 +96,7 @@ def iterate_run(
     Raises:
         PacketMeshError: images, settings or a folder that cannot be used.
     """
+    keep_images(out, source)
     rig, report = yield from iterate_imported(source, out)
     spec, cache = Spec(rig, preset, config), RunCache()
     loading = run(spec, cache, ["rig"])
@@ -173,7 +185,7 @@ def iterate_rigs(
     """
     outcomes: dict[int, RigOutcome] = {}
     try:
-        for index, outcome in run_batch(reconstruct_one, tasks, scheduler, killed=_killed_outcome):
+        for index, outcome in run_batch(reconstruct_one, tasks, scheduler, killed=_stopped_outcome):
             outcomes[index] = outcome
             summary = outcome.sentence or f"{outcome.no_hit_after:.1%} of the rays are without a surface"
             yield Progress(f"{outcome.name} {outcome.state}: {summary}", len(outcomes) / len(tasks))
@@ -184,8 +196,9 @@ def iterate_rigs(
     return done
 
 
-def _killed_outcome(task: RigTask) -> RigOutcome:
-    return RigOutcome(task.name, "failed", "Its process was killed, perhaps for lack of memory")
+def _stopped_outcome(task: RigTask) -> RigOutcome:
+    sentence = "It was stopped, probably for lack of memory; try a smaller surface.max_points"
+    return RigOutcome(task.name, "failed", sentence)
 
 
 def reconstruct_one(task: RigTask) -> RigOutcome:
@@ -197,18 +210,21 @@ def reconstruct_one(task: RigTask) -> RigOutcome:
     log = out.with_name(f"{out.name}.log")
     log.unlink(missing_ok=True)
     try:
-        kept = _kept_outcome(task)
+        record = _record(task)
+        kept = _kept_outcome(task, record)
         if kept is not None:
             return kept
         (out / TASK).unlink(missing_ok=True)
         result, metrics = drain(iterate_run(_source_of(task), task.preset, task.config, out))
         _write_picture(result, out)
-        write_json(out / TASK, _record(task))
+        write_json(out / TASK, record)
         return _outcome(task, "done", finite(metrics))
     except PacketMeshError as error:
         return RigOutcome(task.name, "failed", str(error))
     except OSError as error:
         return RigOutcome(task.name, "failed", f"{error.filename or task.path}: {error.strerror or error}")
+    except MemoryError:
+        return _stopped_outcome(task)
     except Exception as error:  # one rig must not stop the others
         with suppress(OSError):
             log.write_text(traceback.format_exc(), encoding="utf-8")
@@ -230,14 +246,19 @@ def _source_of(task: RigTask) -> FileSource:
 
 def _record(task: RigTask) -> dict[str, Any]:
     """Return the inputs of a run. They are written as the run's last file, which marks it as complete."""
-    return {"path": task.path, "depth_scale": task.depth_scale, "settings": settings(task.config)}
+    return {
+        "path": task.path,
+        "files": files_digest(Path(task.path)),
+        "depth_scale": task.depth_scale,
+        "settings": settings(task.config),
+    }
 
 
-def _kept_outcome(task: RigTask) -> RigOutcome | None:
+def _kept_outcome(task: RigTask, record: dict[str, Any]) -> RigOutcome | None:
     """Return the outcome of an earlier run with the same inputs; None if there is no complete one."""
     try:
         written = json.loads((Path(task.out) / TASK).read_text(encoding="utf-8"))
-        if written != json.loads(json.dumps(_record(task))):
+        if written != json.loads(json.dumps(record)):
             return None
         return _outcome(task, "kept", json.loads((Path(task.out) / METRICS).read_text(encoding="utf-8")))
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
@@ -253,7 +274,7 @@ def _outcome(task: RigTask, state: State, metrics: dict[str, Any]) -> RigOutcome
         measured["within_2pct_before"],
         measured["within_2pct_after"],
         measured["agreement_between_nodes"],
-        sum(metrics["timings_s"].values()),
+        whole_s(metrics["timings_s"]),
     )
     sentences = [*metrics.get("import", {"notes": ()})["notes"]]
     for node in metrics["nodes"]:

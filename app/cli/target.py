@@ -39,7 +39,8 @@ def target(
     board = write_target(board, out, pixel_mm)
     say(f"{out}: {board.title}")
     if pixel_mm is not None:
-        say(f"Show it without scaling, and calibrate with --spacing-mm {1000.0 * board.spacing_m:.6g}")
+        gap = f" --tag-spacing {board.tag_spacing:.6g}" if board.pattern == "aprilgrid" else ""
+        say(f"Show it without scaling, and calibrate with --spacing-mm {1000.0 * board.spacing_m:.6g}{gap}")
     if board.pattern == "chessboard" and board.ambiguous:
         say(
             "The board looks the same upside down; for several cameras add one column, so that they "

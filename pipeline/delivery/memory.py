@@ -7,20 +7,33 @@ from collections.abc import Callable, Generator, Hashable, Sequence
 from typing import TypeVar
 
 from packetmesh.progress import Progress
-from pipeline.types import RgbdFrame
+from pipeline.config import PipelineConfig
+from pipeline.types import RgbdFrame, Rig
 
 Result = TypeVar("Result")
 COLOR_ONLY, DEPTH_ONLY = ("inferred",), ("outliers",)
-"""Stages that use only colour, or only depth. Placement by sensor clouds also counts as using only depth,
-although the search for unknown poses, and ``hicp``, use colours."""
+"""Stages that use only colour, or only depth."""
+
+
+def places_by_depth(config: PipelineConfig, rig: Rig) -> bool:
+    """Return whether the nodes' poses depend on depth alone: sensor clouds are registered by distances only,
+    from given poses. The search for unknown poses uses colours, and ``hicp`` weighs them.
+    """
+    registration = config.node_registration
+    return (
+        config.fusion.align_nodes_with == "sensor"
+        and registration.start == "given"
+        and registration.method != "hicp"
+        and all(frame.pose_known for frame in rig.frames)
+    )
 
 
 class Memory:
     """Cache with the newest result of each stage of one delivery, whose settings never change."""
 
-    def __init__(self, places_by_sensor: bool) -> None:
-        """Create an empty cache; ``places_by_sensor`` is True if sensor clouds are registered."""
-        self._places_by_sensor = places_by_sensor
+    def __init__(self, placed_by_depth: bool) -> None:
+        """Create an empty cache; ``placed_by_depth`` is True if colours do not change the nodes' poses."""
+        self._depth_only = (*DEPTH_ONLY, "placement") if placed_by_depth else DEPTH_ONLY
         self._color: Hashable = None
         self._depth: Hashable = None
         self._kept: dict[Hashable, tuple[Hashable, object]] = {}
@@ -50,7 +63,7 @@ class Memory:
     def _images(self, stage: Hashable) -> Hashable:
         if stage in COLOR_ONLY:
             return self._color
-        if stage in DEPTH_ONLY or (stage == "placement" and self._places_by_sensor):
+        if stage in self._depth_only:
             return self._depth
         return self._color, self._depth
 

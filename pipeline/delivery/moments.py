@@ -9,7 +9,7 @@ from network_sim.types import to_s
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import Progress
 from pipeline.delivery.coding import Received
-from pipeline.delivery.memory import Memory
+from pipeline.delivery.memory import Memory, places_by_depth
 from pipeline.delivery.sending import Sending, arrived_bytes, frames_at_sink, received_at
 from pipeline.delivery.sink import heard
 from pipeline.placement.outcome import whole_placement
@@ -55,7 +55,8 @@ class Moment:
     T_world_camera: dict[str, FloatArray]
     """(4, 4) registered poses of the nodes that have been received and placed by then."""
     surface: SurfaceResult | None
-    """Surface measured by the rays of all cameras, received or not; None if nothing can be reconstructed."""
+    """Surface measured by the rays and the depth of all cameras, received or not; None if nothing can be
+    reconstructed."""
     truth: dict[str, float] | None
     """Comparison of the surface with the truth, if both exist."""
 
@@ -70,7 +71,7 @@ class Rebuilder:
 
     def __init__(self, sending: Sending) -> None:
         self.sending = sending
-        self._memory = Memory(sending.spec.spec.config.fusion.align_nodes_with == "sensor")
+        self._memory = Memory(places_by_depth(sending.spec.spec.config, sending.rig))
         self._yardstick = yardstick_of_rig(sending.rig)
         self._rebuilt = NOTHING
 
@@ -129,15 +130,21 @@ def _rebuilt(
         results = yield from run(spec, memory, REBUILD)
     except ReconstructionError:  # a few points may have no surface yet
         return NOTHING
-    placement, surface = results["placement"].value, results["after"].value
+    placement = results["placement"].value
     everyone = whole_placement(sending.rig, present, placement)
-    if len(placement.placed(present)) < len(frames):
-        surface = with_rays(surface, sending.rig, everyone)
+    surface = with_rays(results["after"].value, sending.rig, everyone)
     poses = {
         frames[index].name: pose
         for index, pose in placement.placed(list(zip(present, placement.T_world_camera, strict=True)))
     }
     return surface, compared(sending.rig, everyone, surface, yardstick), poses
+
+
+def lossless_spec(sending: Sending) -> Spec:
+    """Return the spec of the chain for the images before coding; of a walk, only its keyframes are sent."""
+    if sending.rig.walk is None:
+        return sending.spec.spec
+    return spec_of(sending, sending.rig.frames, range(len(sending.rig.frames)))
 
 
 def spec_of(sending: Sending, frames: Sequence[RgbdFrame], present: Sequence[int]) -> Spec:

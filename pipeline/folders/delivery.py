@@ -12,6 +12,7 @@ from pipeline.deliver import Delivery
 from pipeline.delivery.moments import Moment, NodeArrival
 from pipeline.folders.run import (
     METRICS,
+    MOMENTS,
     config_of,
     metrics_of,
     surface_metrics,
@@ -52,7 +53,7 @@ def write_delivery_folder(delivery: Delivery, metrics: dict[str, Any], preset: s
         | {"coding": spec.coding, "moments": spec.moments, "network": preset}
         | {"network_settings": settings(delivery.sending.trace.config)}
     )
-    _write_table(delivery.moments, folder / "moments.csv")
+    _write_table(delivery.moments, folder / MOMENTS)
     if delivery.last is not None:
         record = metrics_of(delivery.last) | {"delivery": metrics}
         write_run_folder(delivery.last, record, folder, config)

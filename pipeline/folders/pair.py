@@ -17,6 +17,10 @@ from pipeline.io.poses import write_pose
 from pipeline.pairs.register import DEFAULT_METHOD, Answer
 from pipeline.types import PointCloud
 
+CONFIG, STEPS, POSE, CLOUD, METRICS = (
+    "config.json", "steps.csv", "transform.txt", "aligned.ply", "metrics.json",
+)  # fmt: skip
+FILES = (CONFIG, STEPS, POSE, CLOUD, METRICS)
 _STEP_COLUMNS = (
     "index", "sigma_m", "gate_m", "objective", "rmse_m", "mean_distance_m", "effective_pairs", "entropy_nat",
     "rotation_step_rad", "translation_step_m",
@@ -94,13 +98,13 @@ def write_register_folder(
     pose = chosen_answer(answers).T_target_source
     assert pose is not None
     write_json(
-        folder / "config.json",
+        folder / CONFIG,
         command | {"settings": settings(replace(PipelineConfig(), node_registration=config))},
     )
-    _write_steps(folder / "steps.csv", answers)
-    write_pose(folder / "transform.txt", pose)
-    write_cloud(folder / "aligned.ply", source.transformed(pose))
-    write_json(folder / "metrics.json", answer_metrics(answers, with_truth))
+    _write_steps(folder / STEPS, answers)
+    write_pose(folder / POSE, pose)
+    write_cloud(folder / CLOUD, source.transformed(pose))
+    write_json(folder / METRICS, answer_metrics(answers, with_truth))
 
 
 def _write_steps(path: Path, answers: Iterable[Answer]) -> None:

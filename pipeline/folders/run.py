@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -12,17 +12,23 @@ from packetmesh.errors import InputError
 from packetmesh.files import delete_unfinished, file_trouble, write_json
 from packetmesh.memory import peak_memory_bytes
 from packetmesh.settings import settings
+from pipeline.config import Baseline
+from pipeline.folders.inputs import keep_inputs
+from pipeline.folders.keyframes import FOLDER as KEYFRAMES
 from pipeline.folders.keyframes import delete_keyframes
 from pipeline.folders.walk import FILES as WALK_FILES
 from pipeline.folders.walk import walk_metrics, write_trajectory
+from pipeline.importing import is_recording
 from pipeline.io.clouds import write_cloud
 from pipeline.io.meshes import write_mesh
+from pipeline.io.rigs import is_rig
 from pipeline.io.textures import Texture
 from pipeline.measuring.surface import MEASURING, measured_surface, write_measured
 from pipeline.merging import MergedClouds
 from pipeline.placement.agreement import Agreement
 from pipeline.placement.outcome import NodeRegistration, NodeVerdict
 from pipeline.reconstruct import Reconstruction
+from pipeline.sources import FileSource
 from pipeline.spec import Spec
 from pipeline.stages import dressed
 from pipeline.types import PointCloud, PointSource, RgbdFrame, SurfaceResult
@@ -30,18 +36,46 @@ from pipeline.types import PointCloud, PointSource, RgbdFrame, SurfaceResult
 METRICS = "metrics.json"
 CLOUD_FILES = ("sensor.ply", "inferred.ply", "fused.ply")
 MESH_FILES = ("surface_before.ply", "surface_after.ply", "surface.glb")
+BASELINE_FILES = tuple(
+    f"surface_{name}{suffix}" for name in get_args(Baseline) for suffix in (".ply", ".glb")
+)
+REPORT, PICTURE, TASK = "report.html", "picture.jpg", "task.json"
+"""Report of one rig; of one of many rigs also a picture of its surface, and the record of its inputs."""
+MOMENTS = "moments.csv"
+DELIVERY_FILES = (MOMENTS, "delivery.html", "delivery.gif")
+FILES = (
+    METRICS, TASK, "config.json", "poses.json", *WALK_FILES, *CLOUD_FILES, *MESH_FILES, MEASURING,
+    *BASELINE_FILES, REPORT, PICTURE, *DELIVERY_FILES,
+)  # fmt: skip
+"""All files that ``reconstruct`` and ``deliver`` write into a run folder."""
+IMPORTED = "imported"
+"""Folder of a run with the rig that was imported from its recording."""
+CLEARED = (*FILES, KEYFRAMES, IMPORTED)
+"""What a run deletes of an earlier one; the imported rig only if it imports one itself."""
+
+
+def keep_images(folder: Path, source: FileSource) -> None:
+    """Check that neither ``clear_run_folder`` nor an import would delete images in a run folder.
+
+    Raises:
+        InputError: the folder is a rig or a recording, or the source is in a part of it that is cleared.
+    """
+    if is_rig(folder) or is_recording(folder):
+        raise InputError(
+            f"{folder} is a rig or a recording, and the results would replace some of its files; try another "
+            "place for --out"
+        )
+    keep_inputs([folder / name for name in CLEARED], source.paths)
 
 
 def clear_run_folder(folder: Path) -> None:
-    """Delete the files of an earlier run, complete or interrupted, the metrics first.
-
-    These are the files of ``write_run_folder`` and the keyframes; reports, baselines and moments.csv stay.
+    """Delete the files and keyframes of an earlier run, complete or interrupted, the metrics first.
 
     Raises:
         InputError: the folder cannot be written.
     """
     try:
-        for name in (METRICS, "config.json", "poses.json", *WALK_FILES, *CLOUD_FILES, *MESH_FILES, MEASURING):
+        for name in FILES:
             (folder / name).unlink(missing_ok=True)
         delete_keyframes(folder)
         delete_unfinished(folder)

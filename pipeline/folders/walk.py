@@ -46,7 +46,7 @@ def walk_metrics(walk: Walk, elapsed_s: float) -> dict[str, Any]:
 
     Args:
         walk: the recording.
-        elapsed_s: time from opening the recording to the finished map.
+        elapsed_s: time from opening the recording to the finished map, without interrupted runs.
     """
     frames = len(walk.times_s)
     return {
@@ -57,7 +57,7 @@ def walk_metrics(walk: Walk, elapsed_s: float) -> dict[str, Any]:
         "path_m": path_m(walk.T_world_camera),
         "voxel_m": walk.voxel_m,
         "map_points": len(walk.map),
-        "frames_per_s": frames / elapsed_s,
+        "frames_per_s": frames / (walk.resumed_s + elapsed_s),
     }
 
 

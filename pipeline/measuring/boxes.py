@@ -36,15 +36,15 @@ LARGEST_SHARE = 0.5
 
 
 def box_of_planes(surface: MeasuredSurface, planes: tuple[Plane, Plane, Plane]) -> Measure:
-    """Return width, depth and height of the box of which three faces are given.
+    """Return width, depth and height of the box of which three faces are given, all seen from outside it or,
+    as the walls of a room, from inside.
 
     Each length is from a face to the last vertices of the other two. These end about half a spacing before
     the true edge, so half a spacing is added to the length, and is also its standard deviation. The
-    covariance of the nodes' poses is left out. The faces must be seen from outside the box: their normals
-    point away from it, unlike those of a room's walls.
+    covariance of the nodes' poses is left out.
 
     Raises:
-        InputError: the planes are not square to each other.
+        InputError: the planes are not square to each other, or not all seen from the same side of a box.
     """
     normals = np.stack([plane.normal for plane in planes])
     cosines = np.abs((normals @ normals.T)[np.triu_indices(3, 1)])
@@ -55,17 +55,22 @@ def box_of_planes(surface: MeasuredSurface, planes: tuple[Plane, Plane, Plane]) 
             "mark three faces that meet at one corner"
         )
     left, _, right = np.linalg.svd(normals)
-    axes = left @ right
+    inward = -left @ right
     corner_m = np.linalg.solve(normals, [plane.normal @ plane.point_m for plane in planes])
+    others = [np.concatenate([other.rows for other in planes if other is not plane]) for plane in planes]
+    deep_m = [(surface.vertices_m[rows] - corner_m) @ axis for rows, axis in zip(others, inward, strict=True)]
+    outside = {bool(np.median(one_m) > 0.0) for one_m in deep_m}
+    if len(outside) == 2:
+        raise InputError(
+            "The three planes are no faces of one box: some are seen from outside it, others from inside; "
+            "mark three sides of a thing, or two walls and the floor of a room"
+        )
+    side = 1.0 if outside == {True} else -1.0
     ragged_m = 0.5 * lookup_of(surface).spacing_m
-    lengths_m, sds_m = [], []
-    for k, plane in enumerate(planes):
-        others = np.concatenate([other.rows for j, other in enumerate(planes) if j != k])
-        deep_m = (corner_m - surface.vertices_m[others]) @ axes[k]
-        lengths_m.append(float(np.percentile(deep_m, EXTENT[1])) + ragged_m)
-        sds_m.append(np.hypot(np.sqrt(plane.covariance[0, 0]), ragged_m))
-    guesses_m = [_guess_half_m(plane.range_m, plane.confidence) * plane.guessed for plane in planes]
-    return _box(surface, corner_m, -axes, np.array(lengths_m), np.array(sds_m), np.array(guesses_m))
+    lengths_m = np.array([np.percentile(side * one_m, EXTENT[1]) for one_m in deep_m]) + ragged_m
+    sds_m = np.array([np.hypot(np.sqrt(plane.covariance[0, 0]), ragged_m) for plane in planes])
+    guesses_m = np.array([_guess_half_m(plane.range_m, plane.confidence) * plane.guessed for plane in planes])
+    return _box(surface, corner_m, side * inward, lengths_m, sds_m, guesses_m)
 
 
 def box_of_part(surface: MeasuredSurface, point_m: FloatArray) -> Measure:
@@ -127,7 +132,8 @@ def _support(surface: MeasuredSurface, seed: int, where: str) -> Plane:
             if plane.normal[2] > np.cos(np.radians(LEVEL_DEG)):
                 return plane
     raise InputError(
-        f"No level plane is below the point {where} m, so its height is open; mark three faces of it instead"
+        f"No level plane is below the point {where} m, so its height is unknown; mark three faces of it "
+        "instead"
     )
 
 

@@ -28,11 +28,12 @@ def scale_of(frames: Sequence[RgbdFrame]) -> tuple[float, str]:
     """Return the relative standard deviation of all lengths together, and a sentence on where it is from."""
     known = [frame.scale_sd for frame in frames if frame.scale_sd is not None]
     if known and len(known) == len(frames):
-        return max(known), f"The calibration leaves lengths open by {100.0 * max(known):.2g} %"
+        sd = max(known)
+        return sd, f"By the calibration, lengths have a standard deviation of {100.0 * sd:.2g} %"
     some = "not all nodes have" if known else "no node has"
     return ASSUMED_SCALE_SD, (
-        f"Lengths are taken to be right within {100.0 * ASSUMED_SCALE_SD:g} % (one standard deviation), "
-        f"because {some} a calibration that says how exact it is"
+        f"Lengths are assumed to have a standard deviation of {100.0 * ASSUMED_SCALE_SD:g} %, "
+        f"because {some} a calibration of known accuracy"
     )
 
 

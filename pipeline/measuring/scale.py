@@ -62,7 +62,7 @@ def with_scale(
     verb = "agrees with" if agrees else "does not agree with"
     sentence = (
         f"The true length {true_m:.4g} m {verb} the measured {one.value:.4g} m ({low_m:.4g} to "
-        f"{high_m:.4g}); scaled by {factor:.4f}, it is met"
+        f"{high_m:.4g}); scaled by {factor:.4f}, the surface has the true length"
     )
     to_scaled = np.diag([1.0, 1.0, 1.0, factor, factor, factor])
     scaled = replace(
@@ -72,6 +72,7 @@ def with_scale(
         ranges_m=None if surface.ranges_m is None else surface.ranges_m * factor,
         pose_covariances=to_scaled @ surface.pose_covariances @ to_scaled,
         scale_sd=own,
-        scale_source=f"A true length of {true_m:.4g} m sets the scale, within {100.0 * own:.2g} %",
+        scale_source=f"A true length of {true_m:.4g} m sets the scale, with a standard deviation of "
+        f"{100.0 * own:.2g} %",
     )
     return scaled, ScaleCheck(factor, agrees, sentence)

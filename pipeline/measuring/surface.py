@@ -163,7 +163,7 @@ def measured_cloud(cloud: PointCloud, scale_sd: float = poses.ASSUMED_SCALE_SD) 
         np.full(count, -1),
         np.zeros((1, 6, 6)),
         scale_sd,
-        f"Lengths are taken to be right within {100.0 * scale_sd:g} % (one standard deviation)",
+        f"Lengths are assumed to have a standard deviation of {100.0 * scale_sd:g} %",
     )
 
 

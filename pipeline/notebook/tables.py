@@ -11,6 +11,7 @@ from markupsafe import Markup
 from pipeline.kernels.geometry import rotation_angle_rad
 from pipeline.notebook.pictures import cloud_picture, png_of, seen_picture, small_photograph, surface_picture
 from pipeline.reconstruct import Reconstruction
+from pipeline.spec import whole_s
 from pipeline.surface.radii import spacing
 from pipeline.types import (
     ByteArray,
@@ -118,12 +119,13 @@ def _reconstruction(result: Reconstruction) -> str:
         ("Rays without a surface before fusion", _percent(before.no_hit_ray_share)),
         ("Rays without a surface after fusion", _percent(after.no_hit_ray_share)),
         ("Rays on inferred parts", _percent(after.guessed_ray_share)),
-        ("Hole boundaries", f"{after.boundary_length_m:.1f} m"),
+        ("Boundary (holes and outer rims)", f"{after.boundary_length_m:.1f} m"),
     ]
     if result.truth_after is not None and "f_score_5cm" in result.truth_after:
         rows.append(("F-score at 5 cm", _percent(result.truth_after["f_score_5cm"])))
-    rows.append(("Time", f"{sum(result.timings_s.values()):.1f} s"))
-    frame, T = result.rig.frames[0], result.placement.T_world_camera[0]
+    rows.append(("Time of all stages", f"{whole_s(result.timings_s):.1f} s"))
+    placement = result.placement
+    frame, T = placement.placed(list(zip(result.rig.frames, placement.T_world_camera, strict=True)))[0]
     figures = [
         (f"{name} fusion, seen by {frame.name}; magenta: the ray misses", seen_picture(surface, frame, T))
         for name, surface in (("before", result.before), ("after", result.after))
@@ -149,7 +151,10 @@ def _quality_rows(quality: SurfaceQuality) -> Rows:
         ("Rays without a surface", _percent(quality.no_hit_ray_share)),
         ("Area", f"{quality.area_m2:.2f} m²"),
         ("Pieces", f"{quality.components:,}"),
-        ("Hole boundaries", f"{quality.boundary_length_m:.1f} m in {_count(quality.boundary_loops, 'loop')}"),
+        (
+            "Boundary (holes and outer rims)",
+            f"{quality.boundary_length_m:.1f} m in {_count(quality.boundary_loops, 'loop')}",
+        ),
     ]
 
 

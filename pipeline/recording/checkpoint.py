@@ -5,9 +5,10 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
+import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from pipeline.importing.recorded_bag import BagRecording
 from pipeline.recording.recording import Recording
 from pipeline.types import FloatArray
 
-VERSION = 2
+VERSION = 3
 """Number to increase when tracking changes, so that older states are not read."""
 EVERY_S = 10.0
 """Least time between two writings of the state."""
@@ -35,6 +36,15 @@ class Checkpoint:
     """The file with the state of one recording's tracking."""
 
     path: Path
+    resumed_s: float = field(default=0.0, compare=False)
+    """Time that earlier, interrupted runs had spent when they last wrote the state."""
+    began_s: float = field(default_factory=time.monotonic, compare=False)
+
+    @staticmethod
+    def of(path: Path) -> Checkpoint:
+        """Return the checkpoint in a file that an earlier run may have written."""
+        state = Checkpoint(path).read()
+        return Checkpoint(path, 0.0 if state is None else float(state["elapsed_s"]))
 
     def read(self) -> State | None:
         """Return the state; None if there is none, or if it is damaged."""
@@ -46,8 +56,9 @@ class Checkpoint:
 
     def write(self, state: State) -> None:
         """Replace the state; a disk that is full does not stop the tracking."""
+        elapsed_s = self.resumed_s + time.monotonic() - self.began_s
         with suppress(InputError), atomic_path(self.path) as temporary, temporary.open("wb") as file:
-            np.savez(file, allow_pickle=False, **state)
+            np.savez(file, allow_pickle=False, elapsed_s=elapsed_s, **state)
 
     def delete(self) -> None:
         """Delete the state, and those of other recordings that are old."""
@@ -73,10 +84,7 @@ def checkpoint_of(recording: Recording, given: Sequence[FloatArray | None] | Non
         return None
     place = recording.folder if isinstance(recording, FolderRecording) else recording.path
     digest = hashlib.sha256(repr((VERSION, np.__version__, str(place.resolve()))).encode())
-    for path in sorted(place.rglob("*")) if place.is_dir() else [place]:
-        with suppress(OSError):
-            stat = path.stat()
-            digest.update(repr((path.name, stat.st_size, stat.st_mtime_ns)).encode())
+    digest.update(files_digest(place).encode())
     views = (recording.view(k) for k in range(len(recording.times_s)))
     view = next((view for view in views if view.depth.valid.any()), None)
     if view is None:
@@ -85,7 +93,17 @@ def checkpoint_of(recording: Recording, given: Sequence[FloatArray | None] | Non
         digest.update(np.ascontiguousarray(values).tobytes())
     for T in given or ():
         digest.update(b"none" if T is None else np.ascontiguousarray(T).tobytes())
-    return Checkpoint(cache_folder() / "tracking" / f"{digest.hexdigest()[:32]}.npz")
+    return Checkpoint.of(cache_folder() / "tracking" / f"{digest.hexdigest()[:32]}.npz")
+
+
+def files_digest(place: Path) -> str:
+    """Return a hash of the name, size and time of change of a file, or of all files in a folder."""
+    digest = hashlib.sha256()
+    for path in sorted(place.rglob("*")) if place.is_dir() else [place]:
+        with suppress(OSError):
+            stat = path.stat()
+            digest.update(repr((str(path.relative_to(place)), stat.st_size, stat.st_mtime_ns)).encode())
+    return digest.hexdigest()
 
 
 def cache_folder() -> Path:

@@ -58,8 +58,8 @@ def checked_poses(recording: Recording) -> Given:
     seen = _motions(recording, written)
     if len(seen) < LEAST_PAIRS:
         note = (
-            f"The poses of {recording.name} were not compared with its depth: it moves too little from frame "
-            "to frame, or too much"
+            f"The poses of {recording.name} were not compared with its depth: the camera moves too little "
+            "or too much from frame to frame"
         )
         return Given(written, (note,))
     apart = {name: _apart(seen, _read(written, read)) for name, read in CONVENTIONS.items()}

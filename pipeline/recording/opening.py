@@ -236,5 +236,5 @@ def _sentence(averaging: Averaging, of: int) -> str:
     moving, flickering = 100.0 * averaging.moving_share, 100.0 * averaging.flickering_share
     return (
         f"The camera stands: {averaging.frames} of {of} frames {verb}; {moving:.1f} % of the pixels moved "
-        f"and are left out, {flickering:.1f} % flicker"
+        f"and are left out, {flickering:.1f} % were measured in some, but less than a quarter, of the frames"
     )

@@ -100,8 +100,8 @@ class Places:
         one, other = self.features(source), self.features(target)
         if one is None or other is None:
             return None
-        moving, fixed = (back_project(self._frame(number)) for number in (source, target))
         try:
+            moving, fixed = (back_project(self._frame(number)) for number in (source, target))
             judge = Judge(*(Surface(cloud, from_camera=True) for cloud in (moving, fixed)))
             start = by_colour(one, other) if way == "colour" else by_surfaces(moving, fixed, True)
             found = search(moving, fixed, [start], judge, RegistrationConfig())

@@ -73,7 +73,10 @@ def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
     if checkpoint is not None:
         checkpoint.delete()
     colored = replace(points, colors=seen.colors)
-    walk = Walk(recording.times_s, poses, keyframes, links, colored, voxel_m, first, tracked, notes)
+    resumed_s = 0.0 if checkpoint is None else checkpoint.resumed_s
+    walk = Walk(
+        recording.times_s, poses, keyframes, links, colored, voxel_m, first, tracked, notes, resumed_s
+    )
     return Rig(recording.name, seen.views, walk=walk)
 
 

@@ -99,7 +99,10 @@ def _patches(surface: Surface, longest_m: float) -> list[IntArray]:
         patches.append(patch)
         edges.update((patch[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2) @ [count, 1]).tolist())
     if left:
-        _log.info("%d holes stay open: too many vertices, or no skin without a doubled edge", left)
+        _log.info(
+            "%d holes stay open: too many vertices, or no triangulation without an edge that the mesh has",
+            left,
+        )
     return patches
 
 

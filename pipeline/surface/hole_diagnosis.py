@@ -115,7 +115,8 @@ def explain_hole(
     reason = _reason(place, surface, found)
     sentence, remedy = _sentences(reason, place, surface, found)
     if hole.island:
-        sentence = f"This loop runs around a piece that hangs on the rest by single points. {sentence}"
+        island = "This loop runs around a piece of surface that touches the rest only at single points."
+        sentence = f"{island} {sentence}"
     known = found.known
     shares = known.sensor_share, known.inferred_share, known.unknown_share
     return Explanation(reason, sentence, remedy, found.radius_m, *shares)
@@ -319,7 +320,7 @@ def _unmeasured_sentences(place: _Place, surface: SurfaceResult, found: _Finding
         sentence = (
             f"Of the pixels {'beyond this rim' if place.ends else 'of the hole'}, the sensor measured "
             f"{known.sensor_share:.0%}; for {known.inferred_share:.0%} only the network inferred a depth, "
-            f"and for {known.unknown_share:.0%} nobody knows one."
+            f"and {known.unknown_share:.0%} have no depth at all."
         )
     elif place.ends:
         sentence = (
@@ -328,9 +329,9 @@ def _unmeasured_sentences(place: _Place, surface: SurfaceResult, found: _Finding
         )
     else:
         sentence = (
-            f"No point lies in a gap of {_length(place.widest_gap_m)}, "
-            f"{place.widest_gap_m / place.spacing_m:.0f} times the points' spacing of "
-            f"{_length(place.spacing_m)}: nobody measured here."
+            f"A gap of {_length(place.widest_gap_m)} contains no point "
+            f"({place.widest_gap_m / place.spacing_m:.0f} times the point spacing of "
+            f"{_length(place.spacing_m)}): nothing was measured here."
         )
     if known.inferred_share > known.unknown_share and not _has_inferred(surface):
         remedy = "Fuse the sensor's depth with the network's, which knows more here."
@@ -352,7 +353,10 @@ def _gap_sentences(place: _Place, ball_m: float, found: _Findings) -> tuple[str,
         sentence = f"{gap}, but triangles lie over or under {found.layered:.0%} of it: there are two layers."
         remedy = "Take more smoothing passes or fewer points, so that the layers become one."
     else:
-        sentence = f"{gap}, less than the {width} of {ball} and yet it rests nowhere around the whole loop."
+        sentence = (
+            f"{gap}, less than the {width} of {ball} but somewhere along the loop it finds no three points "
+            "to rest on."
+        )
     if found.known.past_share > MOST:
         sentence += f" A camera looks through {found.known.past_share:.0%} of it: it may be a true opening."
     return sentence, remedy
@@ -369,7 +373,7 @@ def _ball_sentence(place: _Place, found: _Findings) -> str:
     if found.most_radius_m is not None:
         return (
             f"A ball of {_length(found.most_radius_m)} radius covers most of it, but none of up to {tried} "
-            "closes it without a remainder; fill that."
+            "closes it completely; fill the remaining hole."
         )
     return (
         f"No ball of up to {tried} closed it, at best {found.most:.0%}; take more points, or fill the hole."

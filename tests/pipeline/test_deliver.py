@@ -16,6 +16,7 @@ from pipeline.folders.delivery import delivery_metrics, summary
 from pipeline.reconstruct import iterate_reconstruction
 from pipeline.sources import Recorded
 from pipeline.spec import Spec
+from pipeline.types import PointCloud, Walk
 from tests.pipeline.delivery.small import CONFIG, delivery_spec, small_rig
 from tests.pipeline.recording.standing import wall, write_tum
 
@@ -67,6 +68,20 @@ def test_a_recording_is_opened_once_with_the_frames_of_the_settings(tmp_path):
     result = deliver(replace(spec, spec=Spec(source, config=config)))
     assert result.sending.rig.frames[0].averaging.frames == 3
     assert result.lossless.rig is result.sending.rig
+
+
+def test_of_a_walk_the_keyframes_are_sent_and_rebuilt_without_the_map(rig):
+    """Its map, of all frames, would show what was never sent."""
+    nothing = PointCloud(np.zeros((0, 3))), 0.01, np.zeros(0, int)
+    poses = tuple(frame.T_world_camera for frame in rig.frames)
+    walk = Walk(np.arange(2.0), poses, (0, 1), (), *nothing, poses, ("a note",))
+    keyframes = replace(rig, truth=None, walk=walk)
+    result = deliver(delivery_spec(keyframes, moments=1))
+    assert result.last is result.lossless
+    assert result.lossless.rig.walk is None
+    assert result.sending.rig.notes == ("a note",)
+    assert same_surface(result.moments[-1].surface, result.last.after)
+    assert len(result.last.after.triangles) > 1000
 
 
 def test_in_the_end_there_is_what_a_reconstruction_of_the_images_gives(rig, whole):
@@ -125,6 +140,21 @@ def test_a_moment_does_not_depend_on_those_before_it(rig):
         assert one.truth == alone.truth
 
 
+def test_poses_change_with_the_colours_that_they_depend_on(rig):
+    """All depth is there at the first moment, most of the colours are not."""
+    spec = delivery_spec(rig, moments=2)
+    few = ("node_registration.max_iterations=3", "node_registration.max_points=500")
+    config = with_settings(CONFIG, ["node_registration.method=hicp", *few])
+    sending = send(replace(spec, spec=replace(spec.spec, config=config)), rig)
+    in_turn = Rebuilder(sending)
+    first, last = (drain(in_turn.moment(index)) for index in range(2))
+    assert all(node.depth_share == 1.0 and node.color_share < 0.5 for node in first.nodes)
+    alone = drain(Rebuilder(sending).moment(1))
+    assert last.T_world_camera.keys() == alone.T_world_camera.keys()
+    for name, T in alone.T_world_camera.items():
+        assert np.array_equal(last.T_world_camera[name], T)
+
+
 def test_two_processes_give_the_same_moments(rig, whole):
     there = drain(_only_moments(delivery_spec(rig), processes=2))
     for one, other in zip(whole.moments, there, strict=True):
@@ -155,6 +185,22 @@ def test_no_coding_claims_more_than_has_arrived(rig, coding):
         assert np.allclose(one.depth[measured] / 1000.0, frame.depth.z_m[measured], atol=1e-6)
     lost = 1.0 - np.mean([there.mean() for there in arrived_bytes(sending, int(sending.times_ns[-1]))])
     assert 0.02 < lost < 0.5
+
+
+def test_pixels_that_have_not_arrived_count_as_without_a_surface(rig):
+    """Of both nodes a quarter of the depth has arrived: the others' rays may meet nothing."""
+    sending = send(delivery_spec(rig, moments=1), rig)
+    came = sending.arrivals
+    kept = came.first_byte < len(sending.streams[0]) // 10
+    columns = {
+        name: getattr(came, name)[kept] for name in ("t_ns", "image", "node", "first_byte", "byte_count")
+    }
+    moment = drain(Rebuilder(replace(sending, arrivals=replace(came, **columns))).moment(0))
+    quality = moment.surface.quality
+    assert len(moment.T_world_camera) == 2
+    rays = sum(frame.depth.z_m.size for frame in rig.frames)
+    measured = sum(int(frame.depth.valid.sum()) for frame in rig.frames)
+    assert 0.0 < quality.within_2pct_share * measured <= (1.0 - quality.no_hit_ray_share) * rays
 
 
 def test_layers_keep_the_scene_under_bursts(rig, whole):

@@ -10,7 +10,7 @@ from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline import stages
 from pipeline.sources import Demo
-from pipeline.spec import CHAIN, NEEDS, SIDE_BY_SIDE, Spec
+from pipeline.spec import CHAIN, NEEDS, SIDE_BY_SIDE, Spec, whole_s
 from pipeline.stages import RunCache, compute, run
 
 SPEC = Spec(Demo("box-on-table"))
@@ -70,6 +70,11 @@ def test_a_stage_of_a_pair_that_fails_ends_the_run_with_its_sentence(computed, m
     monkeypatch.setitem(stages.STAGES, name, _broken)
     with pytest.raises(InputError, match="nothing to roll over"):
         drain(run(SPEC))
+
+
+def test_of_two_stages_at_the_same_time_the_longer_one_counts():
+    assert whole_s({"rig": 1.0, "after": 4.0, "before": 3.0, "truth": 0.5}) == 5.5
+    assert whole_s({"rig": 1.0, "after": 4.0}) == 5.0
 
 
 def _alone(name, order):

@@ -32,7 +32,7 @@ from packetmesh.errors import ReconstructionError
 from packetmesh.progress import Progress, part
 from pipeline.acquisition import back_project
 from pipeline.delivery.coding import Received
-from pipeline.delivery.moments import Moment, NodeArrival, Rebuilder
+from pipeline.delivery.moments import Moment, NodeArrival, Rebuilder, lossless_spec
 from pipeline.delivery.sending import (
     DeliverySpec,
     Sending,
@@ -41,6 +41,7 @@ from pipeline.delivery.sending import (
     send,
     senders_of,
 )
+from pipeline.reconstruct import Reconstruction, iterate_reconstruction
 from pipeline.spec import key as spec_key
 from pipeline.types import (
     BoolArray,
@@ -117,7 +118,7 @@ def _delivered(store: Store, spec: Spec) -> Steps:
         moments.append(_moment_view(sending, moment, int(sending.times_ns[index])))
         yield moments[-1]
     moments.sort(key=lambda one: one.t_ns)
-    return replace(view, moments=tuple(moments), lossless=(yield from _lossless(store, spec)))
+    return replace(view, moments=tuple(moments), lossless=(yield from _lossless(store, spec, sending)))
 
 
 def moment_of(
@@ -135,13 +136,26 @@ def _sent_of(spec: Spec) -> Sent:
     return spec.sent
 
 
-def _lossless(store: Store, spec: Spec) -> Generator[Progress, None, Lossless | None]:
+def reconstruction_of(store: Store, sending: Sending) -> Generator[Progress, None, Reconstruction]:
+    """Return the reconstruction of the images before coding. That of a walk's keyframes, which no other
+    screen needs, is not stored.
+    """
+    cache = store if sending.rig.walk is None else None
+    return (yield from iterate_reconstruction(lossless_spec(sending), cache))
+
+
+def _lossless(store: Store, spec: Spec, sending: Sending) -> Generator[Progress, None, Lossless | None]:
+    key = ("lossless", spec.key("network"))
     try:
-        after, truth = yield from store.stages(spec, "after", "truth")
+        return (yield from store.remember(key, partial(_measured, store, sending)))
     except ReconstructionError:
         return None
-    score = None if truth[1] is None else truth[1]["f_score_5cm"]
-    return Lossless(after.quality.no_hit_ray_share, score)
+
+
+def _measured(store: Store, sending: Sending) -> Generator[Progress, None, Lossless]:
+    result = yield from reconstruction_of(store, sending)
+    score = None if result.truth_after is None else result.truth_after["f_score_5cm"]
+    return Lossless(result.after.quality.no_hit_ray_share, score)
 
 
 def _first_view(sending: Sending, sent: Sent, elapsed_s: float) -> DeliveryView:

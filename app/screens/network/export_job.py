@@ -20,7 +20,7 @@ from app.reports.delivery import delivery_animation, delivery_page
 from app.reports.hand_out import HandOut
 from app.reports.hand_out_of import hand_out_of
 from app.reports.timeline_picture import timeline_picture
-from app.screens.network.delivery_job import cloud_of, moment_of, sending_of
+from app.screens.network.delivery_job import cloud_of, moment_of, reconstruction_of, sending_of
 from app.screens.network.delivery_view import DeliveryView
 from app.screens.network.job import network_job
 from app.screens.network.lanes import lanes_of
@@ -37,7 +37,6 @@ from pipeline.delivery.sending import frames_at_sink, received_at
 from pipeline.io.clouds import write_cloud
 from pipeline.io.meshes import write_mesh
 from pipeline.kernels.geometry import apply
-from pipeline.reconstruct import iterate_reconstruction
 from pipeline.types import PointCloud
 
 Content = Generator[Progress, None, bytes]
@@ -135,7 +134,7 @@ def _hand_out(store: Store, spec: Spec) -> Generator[Progress, None, HandOut]:
     moments: tuple[Moment, ...] = ()
     for index in range(count):
         moments += ((yield from moment_of(store, spec, rebuilder, index, index)),)
-    lossless = yield from iterate_reconstruction(spec, store)
+    lossless = yield from reconstruction_of(store, sending)
     return hand_out_of(Delivery(sending, moments, None, lossless))
 
 

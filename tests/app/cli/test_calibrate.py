@@ -82,7 +82,10 @@ def test_a_board_is_drawn_and_says_what_it_is(tmp_path, capsys):
     assert "11 x 9 circles, pitch 35 mm" in capsys.readouterr().err
     assert (tmp_path / "board.pdf").read_bytes().startswith(b"%PDF")
     main(["target", "--out", str(tmp_path / "board.png"), "--pixel-mm", "0.3"])
-    assert "--spacing-mm 35.1" in capsys.readouterr().err
+    assert "--spacing-mm 35.1\n" in capsys.readouterr().err
+    grid = ["--pattern", "aprilgrid", "--columns", "6", "--rows", "6", "--pixel-mm", "0.3"]
+    main(["target", "--out", str(tmp_path / "grid.png"), *grid])
+    assert "--spacing-mm 35.1 --tag-spacing 0.299145\n" in capsys.readouterr().err  # 35 of 117 pixels
     assert "size of its pixels" in failure(["target", "--out", str(tmp_path / "x.png")], capsys)
 
 
@@ -162,6 +165,7 @@ def circles(tmp_path_factory):
         (["--range-m", "0"], "range of 0 m"),
         (["--accuracy-mm", "0"], "accuracy of 0 mm"),
         (["--board-warp", "--lens", "fisheye"], "warp cannot be found with a fisheye"),
+        (["--board-warp", "--without", "view0.png"], "warp takes 4 views, because some are held out, and 3"),
     ],
 )
 def test_wrong_options_are_one_sentence_each(given, says, circles, tmp_path, capsys):

@@ -66,7 +66,7 @@ def test_a_doubtful_scale_of_depth_is_said_and_can_be_stated(folder, tmp_path, c
     words = ["calibrate", str(session), *ASKED, "--out", str(tmp_path / "camera")]
     main(words)
     told = capsys.readouterr().err
-    assert "Depth beside color_00.png: All depth values are multiples of 5" in told
+    assert "Depth image of color_00.png: All depth values are multiples of 5" in told
     assert "try --depth-scale 5000" in told
     main([*words, "--depth-scale", "5000"])
     told = capsys.readouterr().err

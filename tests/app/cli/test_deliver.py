@@ -5,6 +5,7 @@ import json
 
 import pytest
 
+from pipeline.folders.run import FILES
 from pipeline.io.rigs import save_rig
 from tests.app.commands import check_one_sentence, run
 from tests.pipeline.delivery.small import small_rig
@@ -72,6 +73,10 @@ def test_the_hand_out_stands_alone(delivered):
     assert len(page) < 15_000_000
     assert "http://" not in page.replace("http://www.w3.org", "")
     assert (delivered[0] / "delivery.gif").read_bytes()[:4] == b"GIF8"
+
+
+def test_a_later_run_deletes_each_of_its_files(delivered):
+    assert {path.name for path in delivered[0].iterdir()} <= set(FILES)
 
 
 def test_the_settings_are_kept_so_that_the_network_can_run_again(capsys, delivered):

@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.cli.runs import RigTask, reconstruct_one
+from app.cli.runs import RigTask, _record, reconstruct_one
+from packetmesh.files import write_json
 from packetmesh.settings import with_settings
 from pipeline.config import PipelineConfig
 from pipeline.io.clouds import read_cloud, write_cloud
@@ -143,6 +144,12 @@ def task(rig, tmp_path_factory):
     return task
 
 
+CHANGES = {
+    "another image": lambda rig: os.utime(rig / "node_00" / "depth.png", ns=(1, 1)),
+    "another node": lambda rig: shutil.copytree(rig / "node_00", rig / "node_01"),
+}
+
+
 class ComputedAgain(BaseException):
     """As it should be."""
 
@@ -160,3 +167,64 @@ def test_a_damaged_run_of_many_is_computed_again(task, tmp_path, monkeypatch, da
     with pytest.raises(ComputedAgain):
         reconstruct_one(replace(task, out=str(out)))
     assert not (out / "task.json").exists()
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_run_of_other_images_at_the_same_path_is_computed_again(task, tmp_path, monkeypatch, change):
+    rig, out = tmp_path / "rig", tmp_path / "out"
+    shutil.copytree(task.path, rig)
+    shutil.copytree(task.out, out)
+    moved = replace(task, path=str(rig), out=str(out))
+    write_json(out / "task.json", _record(moved))
+    assert reconstruct_one(moved).state == "kept"
+    CHANGES[change](rig)
+    monkeypatch.setattr("app.cli.runs.iterate_run", begun)
+    with pytest.raises(ComputedAgain):
+        reconstruct_one(moved)
+
+
+def test_a_lack_of_memory_is_a_sentence_and_no_error_of_the_program(task, tmp_path, monkeypatch):
+    def full(*arguments):
+        raise MemoryError
+
+    monkeypatch.setattr("app.cli.runs.iterate_run", full)
+    outcome = reconstruct_one(replace(task, out=str(tmp_path / "out")))
+    assert (outcome.state, outcome.sentence) == (
+        "failed",
+        "It was stopped, probably for lack of memory; try a smaller surface.max_points",
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+def everything(folder):
+    return {path: path.read_bytes() if path.is_file() else None for path in folder.rglob("*")}
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["reconstruct", "--recording", "scans/one", "--out", "scans/one"],
+        ["reconstruct", "--rig", "scans/one", "--out", "scans/one/keyframes"],
+        ["reconstruct", "--rigs", "scans", "--out", "scans"],
+        ["deliver", "--rig", "scans/one", "--out", "scans/one"],
+        ["deliver", "--scene", "office", "--out", "scans/one"],
+        ["mesh", "cloud.ply", "--out", "cloud.ply"],
+        ["register", "aligned.ply", "cloud.ply", "--out", "."],
+        ["register", "cloud.ply", "cloud.ply", "--init", "transform.txt", "--out", "."],
+        ["infer-depth", "room.png", "--sensor", "room_depth.png", "--out", "."],
+    ],
+)
+def test_results_do_not_replace_what_they_are_made_from(capsys, ellipsoid, tmp_path, monkeypatch, words):
+    """As Polycam's raw recordings, whose images are in keyframes/."""
+    for name in ("images/1.jpg", "cameras/1.json", "depth/1.png"):
+        (tmp_path / "scans/one/keyframes" / name).parent.mkdir(parents=True)
+        (tmp_path / "scans/one/keyframes" / name).write_text(name)
+    for name in ("cloud.ply", "aligned.ply"):
+        shutil.copy(ellipsoid, tmp_path / name)
+    np.savetxt(tmp_path / "transform.txt", np.eye(4))
+    for name in ("room.png", "room_depth.png"):
+        (tmp_path / name).write_text("an image")
+    before = everything(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    check_one_sentence(run(capsys, *words), 1, "would replace")
+    assert everything(tmp_path) == before

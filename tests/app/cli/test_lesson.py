@@ -65,9 +65,9 @@ def test_a_good_lesson_and_all_that_ship_have_no_fault(capsys, tmp_path):
             12,
             "take the three words of one name (better: ball, poisson, untold), or '- [x] choice' once",
         ),
-        ("{missed}", "{missed", 9, "has a brace that belongs to no field; write a number as {missed}"),
-        ("{missed}", "{Missed}", 9, "has a brace that belongs to no field"),
-        ("{missed}", "{{as {missed}", 9, "has a brace that belongs to no field"),
+        ("{missed}", "{missed", 9, "has a brace that is not part of a field; write a number as {missed}"),
+        ("{missed}", "{Missed}", 9, "has a brace that is not part of a field"),
+        ("{missed}", "{{as {missed}", 9, "has a brace that is not part of a field"),
         ("{missed}", "{{as {2:missed}}}", 9, "has the field 2:missed; number the stop from 1 to 1"),
         ("reveal: So.", "reveal: So.\nask: Or?", 11, "in this order, each once and with text"),
         (

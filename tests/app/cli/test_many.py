@@ -130,7 +130,7 @@ def test_an_error_of_the_program_and_a_rig_that_failed_are_rows_and_the_table_is
     run(capsys, *words)
     rows = table(out)
     assert [row["state"] for row in rows.values()] == ["done", "failed"]
-    assert "No two nodes stand beside each other" in rows["b-strangers"]["sentence"]
+    assert "No two nodes could be placed relative to each other" in rows["b-strangers"]["sentence"]
     assert not (out / "a-rig.log").exists()
     written = (out / "b-strangers" / "metrics.json").stat().st_mtime_ns
     _, printed, _ = run(capsys, *words, "--json")

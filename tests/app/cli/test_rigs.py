@@ -25,7 +25,7 @@ def test_two_rooms_are_no_rig_and_the_command_says_so(capsys, tmp_path):
     assert code == 1
     *_, left_out, last = err.splitlines()
     assert left_out.startswith("node_01 is left out: its pose is not known")
-    assert last == "No two nodes stand beside each other: the surface is of one node only"
+    assert last == "No two nodes could be placed relative to each other: the surface is of one node only"
     assert list(json.loads((tmp_path / "out" / "poses.json").read_text())) == ["node_00"]
     assert left_out in unescape((tmp_path / "out" / "report.html").read_text())
 
@@ -94,4 +94,4 @@ def test_given_poses_that_no_other_camera_confirms_have_no_share_of_agreement(ca
     save_rig(tmp_path / "rig", Rig("far", (first, replace(second, T_world_camera=far))))
     _, _, err = run(capsys, "reconstruct", "--rig", tmp_path / "rig", "--out", tmp_path / "out", *QUICK)
     assert "nan" not in err
-    assert "node_01 stands by its given pose alone: no other camera measured what it sees" in err
+    assert "node_01 has a pose that no other placed camera confirms: each measured less than 5 %" in err

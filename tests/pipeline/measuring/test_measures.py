@@ -261,6 +261,34 @@ def test_three_faces_of_a_box_and_the_box_as_a_part():
         measures.box_of_part(surface, np.array([-0.2, -0.2, 0.0]))
 
 
+def corner(*inward):
+    """Three 2 m planes at x = 0, y = 0 and z = 0, on a grid of 5 cm; normals point into the box or out."""
+    x, y, z = np.eye(3)
+    sides = zip(((y, z), (z, x), (x, y)), inward, strict=True)
+    surface = measured(
+        joined(
+            *(sheet(40, 40, 0.05, x=a, y=b) if to else sheet(40, 40, 0.05, x=b, y=a) for (a, b), to in sides)
+        )
+    )
+    return surface, tuple(plane_at(surface, 1.0 - axis) for axis in (x, y, z))
+
+
+@pytest.mark.parametrize("inward", [True, False])
+def test_a_corner_of_a_room_is_a_box_as_one_of_a_thing(inward):
+    found = measures.box_of_planes(*corner(inward, inward, inward))
+    for value in found.values:
+        assert value.value == pytest.approx(2.0, abs=0.025)
+        assert value.ci95[0] < 2.0 < value.ci95[1]
+    assert found.ends_m.min(axis=0) == pytest.approx(np.zeros(3), abs=1e-9)
+    assert found.ends_m.max(axis=0) == pytest.approx(np.full(3, 2.0), abs=0.025)
+
+
+@pytest.mark.parametrize("inward", [(True, True, False), (False, False, True)])
+def test_planes_seen_from_both_sides_of_a_box_are_none(inward):
+    with pytest.raises(InputError, match="some are seen from outside it, others from inside"):
+        measures.box_of_planes(*corner(*inward))
+
+
 def test_the_area_of_a_hole():
     vertices_m, triangles, normals = sheet(20, 20, 0.05)
     middle_m = vertices_m[triangles].mean(axis=1)

@@ -92,10 +92,13 @@ def frame(scale_sd):
 def test_the_scale_is_the_calibrations_or_assumed_and_says_so():
     sd, sentence = poses.scale_of([frame(0.002), frame(0.004)])
     assert sd == 0.004
-    assert sentence == "The calibration leaves lengths open by 0.4 %"
+    assert sentence == "By the calibration, lengths have a standard deviation of 0.4 %"
     sd, sentence = poses.scale_of([frame(None)])
     assert sd == poses.ASSUMED_SCALE_SD
-    assert "no node has a calibration" in sentence
+    assert sentence == (
+        "Lengths are assumed to have a standard deviation of 1 %, because no node has a calibration of known "
+        "accuracy"
+    )
     assert "not all nodes have" in poses.scale_of([frame(None), frame(0.001)])[1]
 
 

@@ -78,7 +78,7 @@ def test_a_surface_has_its_triangles_area_and_rim():
     table = rows(html)
     assert table["Triangles"] == "200"
     assert table["Area"] == "1.00 m²"
-    assert table["Hole boundaries"] == "4.0 m in 1 loop"
+    assert table["Boundary (holes and outer rims)"] == "4.0 m in 1 loop"
     assert table["Ball radii"] == "100.0 mm"
     assert table["Rays without a surface"] == "–"
     (rgb,) = images(html)
@@ -137,9 +137,14 @@ def test_a_rig_has_its_photographs_and_its_text_stays_text():
     assert len(images(rig._repr_html_())) == min(4, len(rig.frames))
 
 
-def test_a_reconstruction_shows_its_holes_in_magenta():
+@pytest.fixture(scope="module")
+def result():
+    """The reconstruction of one node."""
     rig = Rig("one node", load_demo("office").frames[:1])
-    result = reconstruct(rig, with_settings(PRESETS["packetmesh"], ["surface.max_points=3000"]))
+    return reconstruct(rig, with_settings(PRESETS["packetmesh"], ["surface.max_points=3000"]))
+
+
+def test_a_reconstruction_shows_its_holes_in_magenta(result):
     html = result._repr_html_()
     before, after = images(html)
     magenta = [float((rgb == (255, 0, 255)).all(axis=-1).mean()) for rgb in (before, after)]
@@ -148,6 +153,24 @@ def test_a_reconstruction_shows_its_holes_in_magenta():
         stated = float(table[f"Rays without a surface {when} fusion"].removesuffix(" %")) / 100.0
         assert share == pytest.approx(stated, abs=0.02)
     assert magenta[1] < magenta[0]
+
+
+def test_the_picture_is_that_of_a_node_whose_pose_is_used(result):
+    """The first one was excluded and keeps its given pose, which is far away."""
+    (frame,), (pose,), (verdict,) = (
+        result.rig.frames,
+        result.placement.T_world_camera,
+        result.placement.verdicts,
+    )
+    far = np.eye(4)
+    far[:3, 3] = 300.0
+    frames = replace(frame, name="elsewhere", T_world_camera=far), frame
+    verdicts = replace(verdict, name="elsewhere", placed=False), verdict
+    placement = replace(result.placement, T_world_camera=(far, pose), verdicts=verdicts)
+    html = replace(result, rig=Rig("two nodes", frames), placement=placement)._repr_html_()
+    assert "elsewhere" not in html
+    for own, alone in zip(images(html), images(result._repr_html_()), strict=True):
+        assert np.array_equal(own, alone)
 
 
 def test_what_has_no_table_is_a_type_error():

@@ -2,6 +2,8 @@
 
 import os
 import shutil
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -96,6 +98,15 @@ def test_a_damaged_state_is_not_used(tmp_path):
     assert [path.name for path in tmp_path.iterdir() if path.suffix == ".npz"] == ["state.npz"]
 
 
+def test_the_time_of_all_interrupted_runs_adds_up(tmp_path):
+    path, state = tmp_path / "state.npz", {"now": np.arange(3)}
+    Checkpoint(path, began_s=time.monotonic() - 100.0).write(state)
+    again = Checkpoint.of(path)
+    assert again.resumed_s >= 100.0
+    replace(again, began_s=again.began_s - 50.0).write(state)
+    assert Checkpoint.of(path).resumed_s >= 150.0
+
+
 def test_a_state_that_cannot_be_written_does_not_stop_the_tracking(tmp_path):
     (tmp_path / "file").write_text("no folder")
     checkpoint = Checkpoint(tmp_path / "file" / "state.npz")
@@ -133,7 +144,9 @@ def test_a_finished_walk_leaves_no_state(walk, cache):
     assert len(list((cache_folder() / "tracking").glob("*.npz"))) == 1
     steps.close()
     rig = drain(iterate_walk(recording))
+    assert rig.walk.resumed_s > 0.0
     assert list((cache / "packetmesh" / "tracking").iterdir()) == []
     again = drain(iterate_walk(recording))
+    assert again.walk.resumed_s == 0.0
     np.testing.assert_array_equal(rig.walk.map.points_m, again.walk.map.points_m)
     np.testing.assert_array_equal(rig.walk.map.colors, again.walk.map.colors)

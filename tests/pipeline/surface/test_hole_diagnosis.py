@@ -103,7 +103,9 @@ def test_a_wide_empty_disc_was_not_measured():
     surface, (hole, _) = rolled(cloud)
     explanation = explain_hole(hole, surface, cloud)
     assert explanation.reason == "no points"
-    assert "No point lies in a gap of 16 cm, 17 times the points' spacing of 9.6 mm" in explanation.sentence
+    assert explanation.sentence == (
+        "A gap of 16 cm contains no point (17 times the point spacing of 9.6 mm): nothing was measured here."
+    )
     assert widest_circumradius_m(cloud) <= explanation.closing_radius_m
     assert "Add a view" in explanation.remedy
     assert (
@@ -171,6 +173,7 @@ def test_where_nobody_knows_another_view_is_asked_for():
         explanation = explained_disc(View(CAMERA, ~IN_DISC, inferred), PointSource.SENSOR)
         assert explanation.reason == "no points"
         assert explanation.unknown_share == 1.0
+        assert explanation.sentence.endswith("a depth, and 100% have no depth at all.")
         assert explanation.remedy.startswith("Add a view from another place. A ball of ")
 
 

@@ -6,12 +6,13 @@ import io
 import json
 import zipfile
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from PIL import Image
 
 from app.compute.state import Sent, Spec
-from app.screens.network.delivery_job import delivery_job
+from app.screens.network.delivery_job import delivery_job, reconstruction_of, sending_of
 from app.screens.network.export import delivery_offers, network_offers
 from app.screens.network.export_job import (
     animation_job,
@@ -43,6 +44,15 @@ STREET = with_settings(PRESETS["street-grid"], ["street.vehicles=5", *NETWORKS["
 @pytest.fixture(scope="module")
 def view(store):
     return drain(delivery_job(store, SPEC))
+
+
+def test_a_walk_is_compared_with_the_surface_of_its_keyframes(view, store):
+    """Its map, which is not sent, would make the lossless images look better than they are."""
+    sending = drain(sending_of(store, SPEC))
+    walked = replace(sending, rig=replace(sending.rig, walk=SimpleNamespace(notes=())))
+    result = drain(reconstruction_of(store, walked))
+    assert result.rig.walk is None
+    assert result.after.quality.no_hit_ray_share == view.lossless.no_hit_share
 
 
 def test_mesh_and_clouds_are_those_of_the_moment(view, store, tmp_path):
