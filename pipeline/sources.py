@@ -1,4 +1,4 @@
-"""Sources of rigs: each has a title and knows its command-line arguments.
+"""Sources of rigs: each has a title and knows its command-line arguments; those on disk also their paths.
 
 ``stages.open_rig`` loads the rig of any source; sources of images have ``load``. Equal sources give equal
 rigs, so that results are cached by source. Reading images needs large libraries, so they are imported only
@@ -32,6 +32,10 @@ class Demo:
     def title(self) -> str:
         return self.name
 
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        return ()
+
     def load(self) -> Rig:
         return self.load_with(None)
 
@@ -56,6 +60,10 @@ class RigFolder:
     @property
     def title(self) -> str:
         return self.path
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        return (Path(self.path),)
 
     def load(self) -> Rig:
         return self.load_with(None)
@@ -94,6 +102,11 @@ class ImagePair:
     def title(self) -> str:
         color = Path(self.color)
         return f"{color.parent.name}/{color.name}"
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        cameras = (Path(str(file)) for file in self._files().values())
+        return (Path(self.color), Path(self.depth), *cameras)
 
     def load(self) -> Rig:
         return self.load_with(None)
@@ -136,6 +149,10 @@ class Calibrated:
     def title(self) -> str:
         return f"{self.source.title}, calibrated by {Path(self.folder).name}"
 
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        return (*self.source.paths, Path(self.folder))
+
     def load(self) -> Rig:
         return self.source.load_with(self.folder)
 
@@ -158,6 +175,10 @@ class Recorded:
     @property
     def title(self) -> str:
         return self.demo or self.path
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        return tuple(Path(path) for path in (self.path, self.intrinsics) if path is not None)
 
     @property
     def true_path(self) -> Path | None:

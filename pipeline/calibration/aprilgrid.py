@@ -15,6 +15,7 @@ from pipeline.calibration.board import Board
 from pipeline.calibration.detection import Detection, not_found
 from pipeline.calibration.dictionaries import APRILGRID, FAMILIES
 from pipeline.calibration.markers import (
+    FEW_CORNERS,
     FITS,
     LEAST_MARKERS,
     Fit,
@@ -77,6 +78,11 @@ def find_aprilgrid(gray: ByteArray, board: Board) -> Detection:
     good = (_apart(refined_px, predicted_px) <= WRONG) & ((refined_px >= 0) & (refined_px < size_px)).all(
         axis=2
     )
+    if good.sum() < FEW_CORNERS:
+        return not_found(
+            f"{seen.title} are seen, but only {good.sum()} of their corners where the tags around predict "
+            f"them, and it takes {FEW_CORNERS}; have the board flat, sharp and larger in the picture"
+        )
     order = np.argsort(indices[good])
     return Detection(refined_px[good][order], indices[good][order])
 

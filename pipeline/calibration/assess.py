@@ -81,7 +81,7 @@ def assess(
 
     Args:
         calibration: the camera.
-        views: the views of its calibration, in the order of ``calibration.views``.
+        views: the views of its calibration, in any order.
         board: the board in the views.
         range_m: distance of the surfaces that the camera will measure.
         accuracy_m: largest accepted error of a point.

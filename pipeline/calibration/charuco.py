@@ -11,6 +11,7 @@ from pipeline.calibration.board import MOST_POINTS, Board
 from pipeline.calibration.detection import Detection, not_found
 from pipeline.calibration.dictionaries import APRILGRID, FAMILIES, markers_in
 from pipeline.calibration.markers import (
+    FEW_CORNERS,
     FITS,
     LEAST_MARKERS,
     Fit,
@@ -22,9 +23,6 @@ from pipeline.calibration.markers import (
     markers_of,
 )
 from pipeline.types import ByteArray
-
-FEW_CORNERS = 6
-"""Least number of corners for a detection."""
 
 
 def find_charuco(gray: ByteArray, board: Board) -> Detection:
@@ -145,7 +143,7 @@ def _size_of(board: Board, seen: Markers) -> tuple[int, int] | None:
     for columns, rows in sizes:
         if (columns + 1) * (rows + 1) // 2 > markers_in(seen.dictionary):
             continue
-        other = Board("charuco", columns, rows, board.spacing_m)
+        other = Board("charuco", columns, rows, board.spacing_m, seen.dictionary)
         for legacy in (False, True):
             fitted = _fit(other, seen, legacy)
             if fitted is not None and fitted.share >= FITS and not fitted.mirrored:

@@ -128,8 +128,8 @@ def fit_depth(samples: DepthSamples) -> DepthFit:
     count = len(rows_of_views(paper))
     if count < LEAST_VIEWS:
         raise InputError(
-            f"{count} views have depth on the board, and it takes {LEAST_VIEWS} from near to far to find the "
-            "bias of depth; take more"
+            f"{count} views have depth on the board's white paper, and it takes {LEAST_VIEWS} from near to "
+            "far to find the bias of depth; take more, in which white areas are at least five pixels wide"
         )
     choice = separable(paper)
     bias_m: FloatArray = np.zeros(len(paper))

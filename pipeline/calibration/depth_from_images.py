@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,17 +11,20 @@ from pipeline.calibration.board import Board
 from pipeline.calibration.depth_bias import DepthFit, fit_depth
 from pipeline.calibration.depth_samples import board_depth_samples
 from pipeline.calibration.estimate import Calibration
-from pipeline.calibration.from_images import CameraReport
+from pipeline.calibration.from_images import CameraReport, paths_by_name
 from pipeline.io.images import ReadDepth, read_depth_noted
 
 
-def depth_beside(images: Iterable[Path]) -> dict[str, Path]:
+def depth_beside(images: Sequence[Path]) -> dict[str, Path]:
     """Find the depth image of each photograph: depth_00.png next to color_00.png, color_00.jpg and so on.
 
     Returns:
-        Paths by the photograph's file name, without its folder; photographs without depth are left out.
+        Paths by the photograph's name in a report; photographs without depth are left out.
     """
-    beside = {path.name: path.with_name(f"depth_{path.stem.partition('_')[2]}.png") for path in images}
+    beside = {
+        name: path.with_name(f"depth_{path.stem.partition('_')[2]}.png")
+        for name, path in paths_by_name(images).items()
+    }
     return {name: path for name, path in beside.items() if path.is_file()}
 
 
@@ -83,4 +86,4 @@ def _doubts(images: Mapping[str, ReadDepth]) -> tuple[str, ...]:
     """Return the sentences about a doubtful depth scale of the first image that has any."""
     doubtful = ((name, read.notes) for name, read in images.items() if read.notes)
     name, notes = next(doubtful, ("", ()))
-    return tuple(f"Depth beside {name}: {note}" for note in notes)
+    return tuple(f"Depth image of {name}: {note}" for note in notes)

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.calibration.board import Board
+from pipeline.calibration.board import MARKER_SHARE, Board
 from pipeline.calibration.estimate import Calibration, FittedView, pose_of
 from pipeline.calibration.lens import Optics
 from pipeline.kernels.geometry import apply, inverse
@@ -46,7 +46,7 @@ class DepthSamples:
     view: IntArray
     """(N,) index into ``names``."""
     ink: BoolArray
-    """(N,) True on or near black print, where the reflection of infrared differs."""
+    """(N,) True in markers and on or near black print, where the reflection of infrared differs."""
     names: tuple[str, ...]
     """Names of the views."""
     lens_m: FloatArray
@@ -79,8 +79,9 @@ def board_depth_samples(
     In each view the board's plane n . X = d has the depth d / (n . K^-1 [u v 1]) at pixel (u, v). The whole
     plane is used, because at a tilted board's centre alone an error of the pose would become a bias. Pixels
     are at least ``RIM_PX`` inside the outermost points, so that none mixes the board with the background.
-    Pixels on black circles or squares are marked: they reflect less infrared, and the fit does not use them.
-    Markers are not considered: those of a ChArUco board count as paper, an AprilGrid as a chessboard.
+    Pixels on black print are marked: they reflect less infrared, and the fit does not use them. Markers of
+    ChArUco boards and AprilGrids count as black as a whole, because programs print them with different cells.
+    A ChArUco board is taken to have the layout of OpenCV 4.6 and later, and markers of ``MARKER_SHARE``.
 
     Args:
         calibration: the lens with its uncertainty, and its views.
@@ -224,8 +225,8 @@ def _gate(name: str, measured_m: FloatArray, true_m: FloatArray) -> IntArray:
     ratio = float(np.median(measured_m / true_m))
     if abs(ratio - 1.0) > MOST_SHARE:
         raise InputError(
-            f"In {name} the board is {np.median(true_m):.2f} m away and the depth image says "
-            f"{np.median(measured_m):.4g} m; check the unit of the depth images and the board's spacing"
+            f"In {name} the board is {np.median(true_m):.2f} m away and the median of the depth image "
+            f"is {np.median(measured_m):.4g} m; check the unit of the depth images and the board's spacing"
         )
     off_m = measured_m - true_m
     off_m = off_m - np.median(off_m)
@@ -241,20 +242,28 @@ def _plane_m(T_camera_board: FloatArray, rays: FloatArray) -> FloatArray:
 
 
 def _on_ink(board: Board, T_camera_board: FloatArray, points_m: FloatArray, px: float) -> BoolArray:
-    """Return (N,) True for points on or within ``px`` of a black circle or square.
+    """Return (N,) True for points within ``px`` of black print, a marker counting as black as a whole.
 
     Args:
-        board: the board; its markers are not considered.
+        board: the board.
         T_camera_board: (4, 4) pose of the board.
         points_m: (N, 3) points in the camera's frame.
         px: widening of black areas in units of the focal length: pixels over the focal length.
     """
-    flat = apply(inverse(T_camera_board), points_m)
+    flat_m = apply(inverse(T_camera_board), points_m)[:, :2]
     rim_m = px * points_m[:, 2]
     if board.pattern.startswith("circles"):
-        apart_m = np.linalg.norm(flat[:, None, :2] - board.points_m[None, :, :2], axis=2).min(axis=1)
+        apart_m = np.linalg.norm(flat_m[:, None] - board.points_m[None, :, :2], axis=2).min(axis=1)
         return apart_m <= board.radius_m + rim_m
-    squares = (flat[:, :2] - board.points_m[0, :2]) / board.spacing_m
+    from_first_m = flat_m - board.points_m[0, :2]
+    if board.pattern == "aprilgrid":  # white is between two tags, except the squares at their corners
+        pitch_m = (1.0 + board.tag_spacing) * board.spacing_m
+        along_m = from_first_m % pitch_m
+        beside_tag = along_m < board.spacing_m
+        edges_m = np.minimum(np.minimum(along_m, pitch_m - along_m), np.abs(along_m - board.spacing_m))
+        return (beside_tag[:, 0] == beside_tag[:, 1]) | (edges_m.min(axis=1) <= rim_m)
+    squares = from_first_m / board.spacing_m
+    from_edge_m = np.abs(squares - np.rint(squares)).min(axis=1) * board.spacing_m
     black = np.floor(squares).sum(axis=1) % 2 == 0
-    beside = np.abs(squares - np.rint(squares)).min(axis=1) <= rim_m / board.spacing_m
-    return black | beside
+    white_m = 0.5 * (1.0 - MARKER_SHARE) * board.spacing_m if board.pattern == "charuco" else np.inf
+    return black | (from_edge_m <= rim_m) | (from_edge_m >= white_m - rim_m)

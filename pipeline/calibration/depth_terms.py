@@ -85,14 +85,14 @@ def separable(samples: DepthSamples) -> Choice:
     elif far_m < FAR_APART * near_m:
         models = 4
         sentences.append(
-            f"Views from {near_m:.2f} to {far_m:.2f} m cannot tell a curvature; take some at twice the "
-            "distance of the nearest"
+            f"Views from {near_m:.2f} to {far_m:.2f} m do not determine a curvature; add views at twice "
+            "the distance of the nearest"
         )
     unseen = int((~_seen_parts(samples)).sum())
     if unseen:
         sentences.append(
             f"{unseen} of the image's 12 parts have the board in fewer than {VIEWS_OF_A_PART} views, so that "
-            "no map over the image is known; take views with the board in its corners"
+            "a map over the image cannot be estimated; add views with the board in its corners"
         )
     return Choice(LADDER[:models], not unseen, ". ".join(sentences))
 

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import get_args
 
@@ -15,6 +15,7 @@ import numpy as np
 from packetmesh.errors import InputError, ReconstructionError
 from pipeline.calibration.fisheye import estimate_fisheye
 from pipeline.calibration.lens import FLAGS, FREE, NAMES, Optics
+from pipeline.calibration.one_thread import one_thread
 from pipeline.config import Lens
 from pipeline.kernels.geometry import rigid
 from pipeline.types import FloatArray
@@ -132,20 +133,23 @@ def coordinate_sd_px(views: Sequence[FittedView], lens: Lens) -> float:
     return float(np.sqrt((every**2).sum() / freedom))
 
 
-def calibrate(views: Sequence[View], size_px: tuple[int, int], lens: Lens = "thesis") -> Calibration:
+def calibrate(
+    views: Sequence[View], size_px: tuple[int, int], lens: Lens = "thesis", camera: str = ""
+) -> Calibration:
     """Estimate a camera.
 
     Args:
         views: at least three, tilted differently.
         size_px: width and height of all images.
         lens: distortion model.
+        camera: name of the camera if there are several; advice then names images as node_01/color_03.png.
 
     Raises:
         InputError: there are too few views, or the lens model is unknown.
         ReconstructionError: the views do not determine the lens, or the camera that fits best cannot exist.
     """
     found = best_fit(views, size_px, lens)
-    check_possible(found)
+    check_possible(found, camera)
     return found
 
 
@@ -169,8 +173,12 @@ def best_fit(views: Sequence[View], size_px: tuple[int, int], lens: Lens = "thes
     return calibration_of(views, poses, optics, size_px)
 
 
-def check_possible(found: Calibration) -> None:
+def check_possible(found: Calibration, camera: str = "") -> None:
     """Check that a camera of these parameters can exist.
+
+    Args:
+        found: the camera.
+        camera: its name if there are several.
 
     Raises:
         ReconstructionError: a focal length is negative, pixels are far from square, the principal point is
@@ -195,7 +203,7 @@ def check_possible(found: Calibration) -> None:
     raise ReconstructionError(
         f"The camera that fits best {wrong}, so it cannot be right; show the board in more of the image, "
         "tilted by 20 to 40° to different sides, try another --lens, or leave out the worst image "
-        f"(--without {worst.name}, {worst.rms_px:.2g} px)"
+        f"(--without {f'{camera}/' if camera else ''}{worst.name}, {worst.rms_px:.2g} px)"
     )
 
 
@@ -208,19 +216,6 @@ def calibration_of(
     return Calibration(
         optics.lens, size_px, optics.matrix, optics.distortion, FREE[optics.lens], covariance, fitted
     )
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Restrict OpenCV to one thread: with several, it sums the views in varying order, and the last bits
-    differ between runs. One thread is as fast.
-    """
-    threads = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        yield
-    finally:
-        cv2.setNumThreads(threads)
 
 
 def _brown(views: Sequence[View], size_px: tuple[int, int], lens: Lens) -> tuple[Optics, list[FloatArray]]:

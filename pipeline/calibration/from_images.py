@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -139,7 +140,7 @@ def image_files(given: Sequence[str], one_camera: bool = False) -> list[Path]:
         path = Path(word)
         if path.is_dir():
             named = photographs(path)
-        elif any(sign in word for sign in "*?["):
+        elif any(sign in word for sign in "*?[") and not path.is_file():
             named = sorted(Path(path.anchor or ".").glob(str(path.relative_to(path.anchor))))
         else:
             named = [path] if path.is_file() and not is_video(path) else []
@@ -152,6 +153,12 @@ def image_files(given: Sequence[str], one_camera: bool = False) -> list[Path]:
     return files
 
 
+def paths_by_name(files: Sequence[Path]) -> dict[str, Path]:
+    """Return images by their names in a report: the file's name, or its path if several have that name."""
+    count = Counter(path.name for path in files)
+    return {path.name if count[path.name] == 1 else str(path): path for path in files}
+
+
 def iterate_calibration(
     files: Sequence[Path],
     board: Board,
@@ -160,6 +167,7 @@ def iterate_calibration(
     without: Sequence[str] = (),
     warp: bool = False,
     one_camera: bool = False,
+    camera: str = "",
 ) -> Generator[Progress, None, CameraReport]:
     """Find the board in every image and estimate the camera.
 
@@ -176,6 +184,7 @@ def iterate_calibration(
         warp: whether to also estimate the board's points, and use them if held-out views then fit better;
             it takes two folds at least.
         one_camera: whether one camera took all images even if series of their names fit better alone.
+        camera: name of the camera if there are several, for advice.
 
     Yields:
         Progress before each image and each later step.
@@ -197,7 +206,7 @@ def iterate_calibration(
     if len(views) < LEAST_VIEWS:
         raise InputError(_too_few(detections, without, board, len(views)))
     yield Progress("estimating the camera", 0.7)
-    calibration = calibrate(views, size_px, lens)
+    calibration = calibrate(views, size_px, lens, camera)
     if not one_camera:
         check_series_agree(calibration, views, paths)
     if board.pattern in ("circles", "circles-asymmetric"):
@@ -206,18 +215,18 @@ def iterate_calibration(
             yield Progress(f"centring circles in {view.name}", 0.7 + 0.2 * len(again) / len(views))
             gray = cv2.cvtColor(read_color(paths[view.name]), cv2.COLOR_RGB2GRAY)
             again.append(replace(view, points_px=refined_px(gray, board, fitted, calibration.optics)))
-        better = calibrate(again, size_px, lens)
+        better = calibrate(again, size_px, lens, camera)
         if better.rms_px <= calibration.rms_px:
             views, calibration = again, better
     yield Progress("holding views out", 0.9)
-    folds = _folds(folds, len(views))
-    bent = board_warp(views, size_px, board, max(folds, 2), lens) if warp else None
+    bent = board_warp(views, size_px, board, _folds(max(folds, 2), len(views)), lens) if warp else None
     if bent is not None and bent.helps:
-        check_possible(bent.calibration)
+        check_possible(bent.calibration, camera)
         views = [replace(view, board_m=bent.board_m) for view in views]
         return CameraReport(
             board, detections, tuple(views), bent.calibration, bent.held_out, tuple(without), bent
         )
+    folds = _folds(folds, len(views))
     unseen = held_out(views, size_px, folds, lens) if folds else ()
     return CameraReport(board, detections, tuple(views), calibration, unseen, tuple(without), bent)
 
@@ -227,20 +236,19 @@ def _detections(
 ) -> Generator[Progress, None, tuple[dict[str, Detection], dict[str, Path], tuple[int, int]]]:
     """Detect the board in each image; returns detections and paths by name, and the size of all images."""
     detections: dict[str, Detection] = {}
-    paths: dict[str, Path] = {}
+    paths = paths_by_name(files)
     sizes: dict[tuple[int, int], str] = {}
-    for index, path in enumerate(files):
-        yield Progress(f"looking for the board in {path.name}", 0.7 * index / len(files))
+    for index, (name, path) in enumerate(paths.items()):
+        yield Progress(f"looking for the board in {path.name}", 0.7 * index / len(paths))
         image = read_color(path)
-        sizes.setdefault((image.shape[1], image.shape[0]), path.name)
+        sizes.setdefault((image.shape[1], image.shape[0]), name)
         if len(sizes) > 1:
             listed = " and ".join(f"{name} of {width} x {height}" for (width, height), name in sizes.items())
             raise InputError(
                 f"The images are not of one size: {listed}; give each camera's images a folder of its own, "
                 "and hold a camera upright or sideways in all of them"
             )
-        name = path.name if path.name not in detections else str(path)
-        detections[name], paths[name] = detect(image, board), path
+        detections[name] = detect(image, board)
     return detections, paths, next(iter(sizes))
 
 

@@ -14,6 +14,8 @@ from pipeline.types import BoolArray, ByteArray, FloatArray, IntArray
 
 LEAST_MARKERS = 4
 """Least number of markers by which a dictionary is recognised: noise gives single ones, too."""
+FEW_CORNERS = 6
+"""Least number of corners for the detection of a board."""
 OFF = 0.3
 """Largest distance of a marker from its place on the board, in pitches of the board."""
 FITS = 0.8

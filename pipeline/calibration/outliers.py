@@ -36,7 +36,8 @@ class OutlierView:
         return (
             f"{self.name} has {self.rms_px:.2f} px where the others have {self.others_px:.2f}; without it "
             f"the camera changes by {self.lens_moves_sd:.1f} standard errors and the others come to "
-            f"{self.rms_without_px:.2f} px. Is it blurred, another board, or a wrong order?"
+            f"{self.rms_without_px:.2f} px. Check whether it is blurred, shows another board, or has "
+            "its points in a wrong order."
         )
 
 
@@ -48,30 +49,27 @@ def outlier_views(calibration: Calibration, views: Sequence[View]) -> tuple[Outl
 
     Args:
         calibration: calibration from all views.
-        views: the views of the calibration, in the order of ``calibration.views``.
+        views: the same views, in any order.
     """
     found: list[OutlierView] = []
     now, left = calibration, list(views)
     while len(left) > LEAST_VIEWS + 1:
         errors_px = np.array([view.rms_px for view in now.views])
         worst = int(np.argmax(errors_px))
+        name = now.views[worst].name
         others_px = np.median(np.delete(errors_px, worst))
         if not _stands_out(errors_px, worst):
             break
-        left = [view for row, view in enumerate(left) if row != worst]
+        left = [view for view in left if view.name != name]
         try:
             without = best_fit(left, calibration.size_px, calibration.lens)
         except ReconstructionError:
             break
         moved = [
-            abs(now.parameters[name] - without.parameters[name]) / max(error, 1e-12)
-            for name, error in without.standard_errors.items()
+            abs(now.parameters[parameter] - without.parameters[parameter]) / max(error, 1e-12)
+            for parameter, error in without.standard_errors.items()
         ]
-        found.append(
-            OutlierView(
-                now.views[worst].name, float(errors_px[worst]), float(others_px), without.rms_px, max(moved)
-            )
-        )
+        found.append(OutlierView(name, float(errors_px[worst]), float(others_px), without.rms_px, max(moved)))
         now = without
     return tuple(found)
 

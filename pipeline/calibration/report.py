@@ -10,9 +10,12 @@ from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, finite
 from pipeline.calibration.assess import Trust
 from pipeline.calibration.from_images import CameraReport
+from pipeline.io.calibrations import delete_files
 from pipeline.io.camera_files import WRITERS, write_camera
 from pipeline.io.depth_correction import DEPTH_CORRECTION, write_depth_correction
 from pipeline.io.intrinsics import write_intrinsics
+
+METRICS = "metrics.json"
 
 
 def metrics(report: CameraReport, trust: Trust | None = None) -> dict[str, Any]:
@@ -22,7 +25,10 @@ def metrics(report: CameraReport, trust: Trust | None = None) -> dict[str, Any]:
 
 def write_camera_folder(report: CameraReport, folder: Path, trust: Trust | None = None) -> list[str]:
     """Write intrinsics.json, depth_correction.json if the bias is known, and files for other programs; write
-    metrics.json last, so that in a new folder it exists only if all files do.
+    metrics.json last, so that it exists only if all files do.
+
+    Those of an earlier calibration are deleted first: a file that this one does not write would belong to
+    another lens.
 
     Returns:
         A sentence for each file whose format cannot store the lens.
@@ -30,8 +36,9 @@ def write_camera_folder(report: CameraReport, folder: Path, trust: Trust | None 
     Raises:
         InputError: the folder cannot be written.
     """
+    delete_files(folder, (METRICS, DEPTH_CORRECTION, *WRITERS))
     missing = _write_cameras(report, folder)
-    with atomic_path(folder / "metrics.json") as sibling:
+    with atomic_path(folder / METRICS) as sibling:
         sibling.write_text(json.dumps(finite(metrics(report, trust)), indent=1, allow_nan=False) + "\n")
     return missing
 

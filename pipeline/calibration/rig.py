@@ -100,7 +100,7 @@ class RigCalibration:
     adjusted: Adjusted
     sightings: tuple[Sighting, ...]
     held_out: HeldOutRig | None
-    """None if no moment was held out, or too few moments link the cameras without a fold."""
+    """None if no moment was held out, or the moments without a fold do not determine the cameras."""
 
     @property
     def rms_px(self) -> float:
@@ -219,8 +219,8 @@ def _check_fit(together_px: float, alone_px: float) -> None:
     if together_px > max(MISFIT * alone_px, MISFIT_PX):
         raise ReconstructionError(
             f"The cameras do not fit together: points are off by {together_px:.1f} px, but by "
-            f"{alone_px:.2f} px in each by itself; are images of the same number of the same moment, and did "
-            "no camera move?"
+            f"{alone_px:.2f} px for a camera alone; check that images with the same number show the same "
+            "moment, and that no camera moved"
         )
 
 
@@ -248,7 +248,7 @@ def _held_out(
     names: Sequence[str], titles: Sequence[str], sightings: Sequence[Sighting], whole: Bundle, folds: int
 ) -> HeldOutRig | None:
     """Predict every moment with cameras estimated without its fold; None if the other folds do not link
-    them, or leave a camera too few views.
+    or do not determine them, or leave a camera too few views.
     """
     views: dict[str, tuple[FittedView, ...]] = dict.fromkeys(names, ())
     turned_deg, moved_m = dict.fromkeys(names[1:], 0.0), dict.fromkeys(names[1:], 0.0)
@@ -257,7 +257,12 @@ def _held_out(
         rest, begun = _alone([one for one in sightings if one.moment % folds != fold], whole)
         if not left or not _determined(rest, len(names)):
             return None
-        found = adjust(rest, begun).bundle
+        unseen, boards = _alone([sightings[index] for index in left], whole)
+        try:
+            found = adjust(rest, begun).bundle
+            placed = place_boards(unseen, replace(found, T_first_board=boards.T_first_board))
+        except np.linalg.LinAlgError:
+            return None
         for name, T, T_whole in zip(
             names[1:], found.T_camera_first[1:], whole.T_camera_first[1:], strict=True
         ):
@@ -265,8 +270,6 @@ def _held_out(
             turned_deg[name] = max(turned_deg[name], float(apart))
             off_m = inverse(T)[:3, 3] - inverse(T_whole)[:3, 3]
             moved_m[name] = max(moved_m[name], float(np.linalg.norm(off_m)))
-        unseen, boards = _alone([sightings[index] for index in left], whole)
-        placed = place_boards(unseen, replace(found, T_first_board=boards.T_first_board))
         for name, some in _views(names, [titles[index] for index in left], unseen, placed).items():
             views[name] += some
     return HeldOutRig(views, turned_deg, moved_m)

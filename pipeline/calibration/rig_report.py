@@ -10,10 +10,10 @@ from typing import Any
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, finite
 from pipeline.calibration.assess import Trust
-from pipeline.calibration.report import metrics, write_camera_folder
+from pipeline.calibration.report import METRICS, metrics, write_camera_folder
 from pipeline.calibration.rig_from_images import RigReport
 from pipeline.calibration.shots import INFRARED
-from pipeline.io.calibrations import write_calibration
+from pipeline.io.calibrations import delete_files, write_calibration
 from pipeline.io.poses import read_pose
 from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.types import AnyPath, FloatArray
@@ -39,7 +39,7 @@ def write_rig_folder(
     trust: Mapping[str, Trust] = NO_TRUST,
 ) -> list[str]:
     """Write the files of every node for ``load_rig(..., calibration=folder)`` and for other programs, and
-    metrics.json last.
+    metrics.json last; that of an earlier calibration is deleted first.
 
     Args:
         report: report of all cameras.
@@ -53,13 +53,14 @@ def write_rig_folder(
     Raises:
         InputError: the folder cannot be written.
     """
+    delete_files(folder, (METRICS,))
     sentences = []
     for name, one in report.cameras.items():
         if not name.endswith(INFRARED):
             told = write_camera_folder(one, folder / name, trust.get(name))
             sentences += [f"{name}: {sentence}" for sentence in told]
     write_calibration(folder, report.nodes(T_world_first))
-    with atomic_path(folder / "metrics.json") as sibling:
+    with atomic_path(folder / METRICS) as sibling:
         sibling.write_text(json.dumps(finite(rig_metrics(report, trust)), indent=1, allow_nan=False) + "\n")
     return sentences
 

@@ -186,12 +186,13 @@ def read_board(path: AnyPath) -> Board:
         tag_spacing = float(values.get("tag_spacing", TAG_SPACING))
     except (ValueError, KeyError, TypeError, OverflowError):
         raise InputError(
-            f"The board file {path} does not say what the board is; try pattern, columns, rows and spacing_mm"
+            f"The board file {path} lacks a valid pattern, columns, rows or spacing_mm, or its tag_spacing "
+            "is no number; correct it"
         ) from None
     try:
         return Board(cast(Pattern, pattern), columns, rows, spacing_m, dictionary, tag_spacing)
     except InputError as error:
-        raise InputError(f"The board file {path} is of no board: {error}") from None
+        raise InputError(f"The board file {path} describes an impossible board: {error}") from None
 
 
 def photographs(folder: Path) -> list[Path]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -162,9 +163,10 @@ def _foot(board: Board, top_mm: float) -> Iterator[Box | Text]:
 
 
 def write_target(board: Board, path: Path, pixel_mm: float | None = None) -> Board:
-    """Write the board in the format of the suffix; returns the board with the spacing that was written.
+    """Write the board in the format of the suffix; returns the board with the spacings that were written.
 
-    In a PNG the spacing is rounded to whole pixels, so that all squares are equal.
+    In a PNG the spacing, and the gap between AprilTags, are rounded to whole pixels, so that all squares, or
+    tags, are equal.
 
     Args:
         board: the board to draw.
@@ -183,6 +185,8 @@ def write_target(board: Board, path: Path, pixel_mm: float | None = None) -> Boa
             )
         pixels = max(1, round(1000.0 * board.spacing_m / pixel_mm))
         board = replace(board, spacing_m=pixels * pixel_mm / 1000.0)
+        if board.pattern == "aprilgrid":
+            board = replace(board, tag_spacing=max(1, round(pixels * board.tag_spacing)) / pixels)
         content = cv2.imencode(".png", picture_of(sheet(board), pixel_mm))[1].tobytes()
     elif ending == ".svg":
         content = svg_of(sheet(board)).encode()
@@ -258,14 +262,18 @@ def picture_of(whole: Sheet, pixel_mm: float) -> ByteArray:
     def fixed(value_mm: float) -> int:
         return round(value_mm * scale - 0.5 * (1 << SUB_PIXEL))  # pixel centres are at integers
 
+    def border(value_mm: float) -> int:
+        """Return the nearest border of pixels; halves are rounded up, so that equal boxes stay equal."""
+        return math.floor(round(value_mm / pixel_mm, 6) + 0.5)
+
     for shape in whole.shapes:
         if isinstance(shape, Disc):
             center, radius = (fixed(shape.x_mm), fixed(shape.y_mm)), round(shape.radius_mm * scale)
             cv2.circle(picture, center, radius, 0 if shape.black else 255, -1, cv2.LINE_AA, SUB_PIXEL)
         elif isinstance(shape, Box):
-            left, top = round(shape.x_mm / pixel_mm), round(shape.y_mm / pixel_mm)
-            right = max(left + 1, round((shape.x_mm + shape.width_mm) / pixel_mm))
-            bottom = max(top + 1, round((shape.y_mm + shape.height_mm) / pixel_mm))
+            left, top = border(shape.x_mm), border(shape.y_mm)
+            right = max(left + 1, border(shape.x_mm + shape.width_mm))
+            bottom = max(top + 1, border(shape.y_mm + shape.height_mm))
             picture[top:bottom, left:right] = 0
         else:
             place = (round(shape.x_mm / pixel_mm), round(shape.y_mm / pixel_mm))

@@ -128,8 +128,8 @@ def _advice(
     advice = []
     if likely.wrong_lens >= CERTAIN:
         advice.append(
-            f"The residuals have a pattern over the image that the lens model '{calibration.lens}' leaves: "
-            f"{LENS_REMEDY[calibration.lens]}."
+            f"The residuals have a pattern over the image that the lens model '{calibration.lens}' does "
+            f"not explain: {LENS_REMEDY[calibration.lens]}."
         )
     if likely.bent >= CERTAIN:
         remedy = (

@@ -13,17 +13,18 @@ import numpy as np
 from packetmesh.errors import InputError, ReconstructionError
 from pipeline.calibration.board import Board
 from pipeline.calibration.estimate import (
+    LEAST_VIEWS,
     Calibration,
     FittedView,
     View,
     calibration_of,
     held_out,
-    one_thread,
     place,
     pose_of,
     rms_px,
 )
 from pipeline.calibration.lens import FLAGS, Optics
+from pipeline.calibration.one_thread import one_thread
 from pipeline.config import Lens
 from pipeline.types import FloatArray
 
@@ -79,6 +80,11 @@ def board_warp(
     """
     if lens == "fisheye":
         raise InputError("A board's warp cannot be found with a fisheye lens; try the lens 'rational'")
+    if len(views) <= LEAST_VIEWS:
+        raise InputError(
+            f"A board's warp takes {LEAST_VIEWS + 1} views, because some are held out, and {len(views)} are "
+            "given; take more, or do without --board-warp"
+        )
     if any(len(view.points_px) != len(board.points_m) for view in views):
         raise InputError("A board's warp needs views of the whole board; leave out those of a part of it")
     flat = held_out(views, size_px, folds, lens)

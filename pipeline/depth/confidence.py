@@ -82,7 +82,8 @@ def judge(
         reach: largest distance of a pixel from sensor depth, as a share of the image's diagonal.
         least_confidence: least confidence of the pixels that are kept, 0 to 1.
         completed: (H, W) completed depth; it replaces aligned depth in the sensor's holes with a weight that
-            grows with the distance from their rims, or entirely if it is fine.
+            grows with the distance from their rims, or entirely if it is fine; what it leaves unknown stays
+            unknown.
         hidden: (H, W) True where measured depth was hidden for a test; such holes are easier. None: nowhere.
 
     Raises:

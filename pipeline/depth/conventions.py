@@ -150,8 +150,8 @@ def convention_of(
     values |= flagged(given)
     if "kind" not in values:
         raise InputError(
-            f"{name} does not say what it gives: name a preset ({', '.join(PRESETS)}), or its kind "
-            f"({', '.join(get_args(ModelKind))})"
+            f"{name} does not state the kind of its output: name a preset ({', '.join(PRESETS)}), or its "
+            f"kind ({', '.join(get_args(ModelKind))})"
         )
     return in_graph(values, signature, given.size_px, name)
 
@@ -251,7 +251,9 @@ def _possible(convention: Convention, name: str) -> Convention:
     size = (convention.width_px, convention.height_px or convention.width_px)
     box, (near_m, far_m) = convention.fit_px or size, convention.depth_range_m or (0.0, 1.0)
     if not all(0 < side <= MOST_SIDE_PX for side in size):
-        raise InputError(f"{name} is to get images of {_by(size)} pixels; try 1 to {MOST_SIDE_PX} a side")
+        raise InputError(
+            f"{name} cannot have an input of {_by(size)} pixels; give sides of 1 to {MOST_SIDE_PX}"
+        )
     if box[0] > size[0] or box[1] > size[1]:
         raise InputError(f"{name} fits images into {_by(box)} of {_by(size)} pixels; try a box inside")
     if near_m >= far_m:

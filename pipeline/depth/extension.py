@@ -141,6 +141,7 @@ def slopes(field: FloatArray, known: BoolArray) -> tuple[FloatArray, FloatArray]
         before, after = (np.roll(field, way, axis) for way in (1, -1))
         slope = 0.5 * (after - before)
         sound = known & np.roll(known, 1, axis) & np.roll(known, -1, axis) & (np.abs(slope) < LARGEST_SLOPE)
+        np.moveaxis(sound, axis, 0)[[0, -1]] = False  # np.roll gives them the opposite border as a neighbour
         count, total = (
             cv2.GaussianBlur(layer.astype(np.float32), (0, 0), SLOPE_SIGMA_PX)
             for layer in (sound, np.where(sound, slope, 0.0))

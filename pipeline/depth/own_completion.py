@@ -167,8 +167,8 @@ class OwnCompletion:
         deviation = float(np.median(np.abs(ratio - shift)))
         if deviation > LARGEST_DEVIATION:
             raise ReconstructionError(
-                f"The output of {self.model_path} does not follow the measured depth: half of it is more "
-                f"than {np.expm1(deviation):.0%} off, at the best scale. Try another "
+                f"The output of {self.model_path} does not follow the measured depth: half of the "
+                f"pixels differ by more than {np.expm1(deviation):.0%} after scaling. Try another "
                 "depth.completion_normalisation, or another network"
             )
         return np.log(z) + np.float32(shift)

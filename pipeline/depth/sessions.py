@@ -29,7 +29,7 @@ def modified_ns(model_path: Path) -> int:
         InputError: there is no such file.
     """
     if not model_path.is_file():
-        raise InputError(f"There is no depth network at {model_path}: name an ONNX file, or none at all.")
+        raise InputError(f"There is no network file at {model_path}: name an ONNX file, or none at all.")
     return model_path.stat().st_mtime_ns
 
 
@@ -56,8 +56,8 @@ def open_session(model_path: Path, modified_ns: int) -> onnxruntime.InferenceSes
     except Exception as error:  # onnxruntime raises a dozen unrelated types for damaged files
         raise InputError(
             f"{model_path} is not a readable ONNX network, is cut short, or needs more than "
-            f"{MOST_SECONDS:g} s or {MOST_BYTES / 1e9:g} GB: export or download it again, or take a smaller "
-            "one."
+            f"{MOST_SECONDS:g} s or {MOST_BYTES / 1e9:g} GB beyond twice its size: export or download it "
+            "again, or take a smaller one."
         ) from error
 
 
@@ -84,7 +84,7 @@ def run_session(
         if late.is_set():
             raise TimeoutError(f"more than {MOST_SECONDS:g} s for an image") from error
         if "Failed to allocate memory" in str(error) or "bad_alloc" in str(error):
-            raise MemoryError(f"more than {MOST_BYTES / 1e9:g} GB") from error
+            raise MemoryError(f"more than {MOST_BYTES / 1e9:g} GB beyond twice its size") from error
         raise
     return values
 

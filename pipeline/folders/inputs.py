@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from packetmesh.errors import InputError
+from pipeline.io.rigs import is_pair
 
 
 def keep_inputs(replaced: Iterable[Path], inputs: Iterable[Path]) -> None:
@@ -18,3 +19,16 @@ def keep_inputs(replaced: Iterable[Path], inputs: Iterable[Path]) -> None:
     for given in inputs:
         if any(given.resolve().is_relative_to(place) for place in places):
             raise InputError(f"The results would replace {given}, an input; try another place for --out")
+
+
+def keep_cameras(folder: Path) -> None:
+    """Check that a calibration in a folder would not replace the camera files of an RGB-D pair or a rig.
+
+    Raises:
+        InputError: the folder is a pair, or has nodes that are.
+    """
+    if any(map(is_pair, (folder, *folder.glob("node_*")))):
+        raise InputError(
+            f"{folder} has the images of a rig, and the results would replace its cameras; try another place "
+            "for --out, and give it to `reconstruct` as --calibration"
+        )

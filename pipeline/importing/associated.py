@@ -5,6 +5,8 @@ Handa et al., "A Benchmark for RGB-D Visual Odometry, 3D Reconstruction and SLAM
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,7 @@ from pipeline.importing.cameras import camera_of
 from pipeline.importing.handedness import mirrored_poses, y_points_up
 from pipeline.importing.sequence import Candidate, Sequence, named_inside, posed
 from pipeline.importing.tum import UNITS_PER_METRE, known_camera, poses_at, rows_in, seconds
-from pipeline.io.images import read_depth_values
+from pipeline.io.images import NoDepthError, read_depth_values
 from pipeline.types import CameraIntrinsics
 
 _LISTS = ("assoc*.txt",)
@@ -62,11 +64,20 @@ def read_associated(folder: Path, intrinsics: Path | None) -> Sequence:
         else "groundtruth.txt or .gt.freiburg",
     )
     camera, notes = camera_of(folder, candidates[0].color, intrinsics, *_assumed_camera(folder))
-    notes += (f"{file.name} is taken to mean 5000 units in a metre; --depth-scale names others",)
     if len(there) < len(pairs):
         notes += (f"Files of {len(pairs) - len(there)} of {len(pairs)} lines of {file.name} do not exist",)
     notes += (*trajectory_notes, *pose_notes)
-    sequence = Sequence(candidates, camera, UNITS_PER_METRE, without_poses=without, notes=notes)
+    completed = partial(_completed, file, trajectory)
+    return Sequence(
+        candidates, camera, UNITS_PER_METRE, without_poses=without, notes=notes, completed=completed
+    )
+
+
+def _completed(file: Path, trajectory: Path | None, sequence: Sequence) -> Sequence:
+    """Return the sequence with a note on a scale that is assumed, and right-handed poses by its depth."""
+    if not sequence.scale_stated:
+        note = f"{file.name} is taken to mean 5000 units in a metre; --depth-scale names others"
+        sequence = replace(sequence, notes=(*sequence.notes, note))
     if trajectory is None or trajectory.suffix != ".freiburg" or not y_points_up(sequence):
         return sequence
     return mirrored_poses(sequence, f"The y axis points up in {trajectory.name}: its poses were mirrored")
@@ -80,6 +91,8 @@ def _is_depth(path: Path) -> bool:
     """Return whether an image is a depth image, by one 16-bit channel."""
     try:
         read_depth_values(path)
+    except NoDepthError:
+        return True
     except InputError:
         return False
     return True

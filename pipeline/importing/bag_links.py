@@ -65,7 +65,8 @@ class TransformLink:
         inside = (times_s >= own_s[0] - BEYOND_S) & (times_s <= own_s[-1] + BEYOND_S)
         clipped_s = times_s.clip(own_s[0], own_s[-1])
         gaps_s = own_s[after] - own_s[after - 1]
-        known = inside & (gaps_s <= LONGEST_GAP_S)
+        at_sample = (clipped_s == own_s[after - 1]) | (clipped_s == own_s[after])
+        known = inside & (at_sample | (gaps_s <= LONGEST_GAP_S))
         share = ((clipped_s - own_s[after - 1]) / gaps_s)[:, None]
         T = np.tile(np.eye(4), (len(times_s), 1, 1))
         T[:, :3, 3] = (1.0 - share) * table[after - 1, 2:5] + share * table[after, 2:5]

@@ -45,7 +45,7 @@ def times_of(topics: Sequence[Timed]) -> tuple[list[FloatArray], tuple[str, ...]
     what = (
         f"All headers of {first.name} have the time {value:g} s"
         if value
-        else f"Headers of {first.name} have no time"
+        else f"Some headers of {first.name} have no time"
     )
     note = f"{what}: the times at which the messages came into the bag are used"
     return [np.array(topic.recorded_ns, np.float64) * 1e-9 for topic in topics], (note,)
@@ -55,30 +55,10 @@ def _stamped(stamps_s: FloatArray) -> bool:
     return bool((stamps_s > 0).all() and (len(stamps_s) == 1 or np.ptp(stamps_s) > 0))
 
 
-def moments_of(path: Path, times_s: Sequence[FloatArray], frames: int, one_camera: bool) -> IntArray:
-    """Return (moments, topics) indices of the messages of each chosen moment; no message is in two moments.
-
-    Args:
-        path: the bag.
-        times_s: (N,) times of each topic's messages; the first topic gives the moments.
-        frames: number of moments of a single camera, spread evenly; several cameras give the middle one.
-        one_camera: whether there is a single camera.
-
-    Raises:
-        InputError: the topics have no messages of one time.
-    """
-    nearest, chosen_s, together = _together(path, times_s)
-    if not one_camera:
-        middle = together[np.abs(together - len(nearest) / 2).argmin()]
-        return nearest[[middle]]
-    apart = _apart(chosen_s, together)
-    spread = np.linspace(0, len(apart) - 1, min(frames, len(apart))).round().astype(int)
-    found: IntArray = nearest[apart[spread]]
-    return found
-
-
-def all_moments(path: Path, times_s: Sequence[FloatArray]) -> IntArray:
+def moments_of(path: Path, times_s: Sequence[FloatArray]) -> IntArray:
     """Return (moments, topics) indices of the messages of every moment, in order of the first topic's time.
+
+    No message is in two moments.
 
     Args:
         path: the bag.
@@ -90,6 +70,21 @@ def all_moments(path: Path, times_s: Sequence[FloatArray]) -> IntArray:
     nearest, chosen_s, together = _together(path, times_s)
     apart = _apart(chosen_s, together)
     found: IntArray = nearest[apart[np.argsort(chosen_s[apart, 0], kind="stable")]]
+    return found
+
+
+def moments_from_middle(path: Path, times_s: Sequence[FloatArray]) -> IntArray:
+    """Return the moments of ``_together``, ascending by their distance from the middle of the bag.
+
+    Args:
+        path: the bag.
+        times_s: (N,) times of each topic's messages; the first topic gives the moments.
+
+    Raises:
+        InputError: the topics have no messages of one time.
+    """
+    nearest, _, together = _together(path, times_s)
+    found: IntArray = nearest[together[np.abs(together - len(nearest) / 2).argsort(kind="stable")]]
     return found
 
 

@@ -136,7 +136,9 @@ def pairs_of(
     ]
     notes += [f"{own.name} is left out: no depth belongs to it" for own in usable if own.name not in best]
     notes += [
-        f"{own.name} is left out: it has no colour of its own" for own in depths if own.name not in used
+        f"{own.name} is left out: no colour topic belongs to it alone"
+        for own in depths
+        if own.name not in used
     ]
     notes += [
         f"{color.name} is left out: a rig has at most {MAX_NODES} nodes" for color, _ in pairs[MAX_NODES:]

@@ -31,9 +31,9 @@ def camera_of(
     """Return the camera of a recording, and a note if it had to be assumed.
 
     Args:
-        folder: folder of the recording. These are tried in it and its ``_FOLDERS``: JSON and YAML files,
-            first those for images of this size, then \\*intrinsic\\*.txt and camera_matrix.csv; then
-            \\*intrinsic\\*.txt in the folder above.
+        folder: folder of the recording. These are tried in it and its ``_FOLDERS``: JSON and YAML files for
+            images of this size, then \\*intrinsic\\*.txt and camera_matrix.csv, then other JSON and YAML
+            files; then \\*intrinsic\\*.txt in the folder above.
         color: one of the colour images.
         given: intrinsics file given by the user, which is preferred.
         default: camera to assume if there is no such file; None raises an error then.
@@ -86,8 +86,8 @@ def _file_in(folder: Path, size_px: tuple[int, int]) -> tuple[Path | None, list[
     if fitting:
         return _only(folder, fitting), []
     named = [path for pattern in _NAMED for path in _files(folder, pattern)]
-    above = _of_color(sorted(folder.parent.glob(_NAMED[0])))
-    found = [*of_other_sizes, *_of_color(named), *above]
+    above = sorted(folder.parent.glob(_NAMED[0]))
+    found = _of_color([*named, *of_other_sizes, *above])
     return next(iter(found), None), others
 
 

@@ -6,6 +6,8 @@ Schönberger and Frahm, "Structure-from-Motion Revisited", CVPR 2016; https://co
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +17,10 @@ from packetmesh.files import MAX_IMAGE_BYTES, MAX_IMAGE_PIXELS, read_bytes
 from pipeline.importing.cameras import camera_of
 from pipeline.importing.colmap_binary import read_binary_model
 from pipeline.importing.colmap_model import Model, ModelImage, read_text_model
+from pipeline.importing.depth_views import first_depth_values
 from pipeline.importing.sequence import DEPTH_SUFFIXES, Candidate, Sequence, named_inside
 from pipeline.io.depth_scale import usual_scale
-from pipeline.io.images import read_depth_units, read_depth_values
+from pipeline.io.images import NoDepthError, read_depth_units
 from pipeline.io.intrinsics import check_camera
 from pipeline.kernels.geometry import inverse
 from pipeline.types import CameraIntrinsics, FloatArray
@@ -41,7 +44,8 @@ def read_colmap(folder: Path, intrinsics: Path | None) -> Sequence:
     ``depth/`` with the names of the photographs, which then determine the model's scale.
 
     Raises:
-        InputError: the model is damaged, its camera model is not supported, or depth is missing.
+        InputError: the model is damaged, its camera model is not supported, depth is missing, or some images
+            have dense and others measured depth.
     """
     text, binary = (_model_folder(folder, suffix) for suffix in (".txt", ".bin"))
     if text is not None:
@@ -66,23 +70,54 @@ def read_colmap(folder: Path, intrinsics: Path | None) -> Sequence:
         notes.append(
             f"{total - len(ours)} of {total} images have no file, no depth or no camera that is read"
         )
-    dense = ours[0][2].suffix == ".bin"
-    if dense:
-        units, metres = 1.0, 1.0
-        notes.append(
-            "COLMAP knows no metres: its unit is taken as one; --depth-scale says how many units a metre has"
-        )
+    if _is_dense(folder, [depth for _, _, depth in ours]):
+        units, metres, noted = 1.0, 1.0, _noted_dense
     else:
-        units = usual_scale(read_depth_values(ours[0][2]))
+        units = usual_scale(first_depth_values(folder, (depth for _, _, depth in ours)))
         metres = _metres_a_unit(model, [(image, depth) for image, _, depth in ours], cameras, units)
-        notes.append(f"A unit of the model is {metres:.4g} m by the depth that was measured at its points")
+        noted = partial(_noted_measured, units * metres)
     candidates = []
     for image, color, depth in ours:
         T_model_camera = inverse(image.T_camera_model)
         T_model_camera[:3, 3] *= metres
         own = cameras[image.camera] if len(cameras) > 1 else None
         candidates.append(Candidate(color, depth, T_model_camera, camera=own))
-    return Sequence(tuple(candidates), camera, units, poses_in_depth_units=True, notes=tuple(notes))
+    return Sequence(
+        tuple(candidates), camera, units, poses_in_depth_units=True, notes=tuple(notes), completed=noted
+    )
+
+
+def _is_dense(folder: Path, depths: list[Path]) -> bool:
+    """Return whether depth images are COLMAP's own maps, in the model's unit, and not a sensor's.
+
+    Raises:
+        InputError: only some are.
+    """
+    dense = sum(depth.suffix == ".bin" for depth in depths)
+    if 0 < dense < len(depths):
+        raise InputError(
+            f"{folder} has stereo/depth_maps for {dense} of {len(depths)} images and a sensor's depth for "
+            "the others, which have different units; try to move one of the two folders away"
+        )
+    return dense > 0
+
+
+def _noted_dense(sequence: Sequence) -> Sequence:
+    """Return the sequence with a note on the model's unit, unless the user gave the scale."""
+    if sequence.scale_stated:
+        return sequence
+    note = (
+        "COLMAP's models have no scale: one unit is read as one metre; --depth-scale says how many units a "
+        "metre has"
+    )
+    return replace(sequence, notes=(*sequence.notes, note))
+
+
+def _noted_measured(depth_units: float, sequence: Sequence) -> Sequence:
+    """Return the sequence with a note on the model's unit, which has so many units of the depth images."""
+    metres = depth_units / sequence.units_per_metre
+    note = f"A unit of the model is {metres:.4g} m by the depth that was measured at its points"
+    return replace(sequence, notes=(*sequence.notes, note))
 
 
 def _with_depth(folder: Path, model: Model) -> list[tuple[ModelImage, Path, Path]]:
@@ -130,7 +165,7 @@ def read_depth_map(path: Path) -> FloatArray:
     """Read an (H, W) depth map from ``stereo/depth_maps``, in the model's unit; 0 where it is unknown.
 
     Raises:
-        InputError: it is damaged, too large, has several channels or no depth.
+        InputError: it is damaged, too large or has several channels; NoDepthError if it has no depth.
     """
     data = read_bytes(path, MAX_IMAGE_BYTES, "depth map")
     words = data[:64].split(b"&", 3)
@@ -143,7 +178,7 @@ def read_depth_map(path: Path) -> FloatArray:
     values = np.frombuffer(data, "<f4", offset=start).reshape(height_px, width_px)
     known = np.isfinite(values) & (values > 0.0)
     if not known.any():
-        raise InputError(f"The depth map {path} has no depth anywhere; try another image")
+        raise NoDepthError(f"The depth map {path} has no depth anywhere; try another image")
     return np.where(known, values, 0.0)
 
 
@@ -166,7 +201,10 @@ def _metres_a_unit(
             continue
         places = np.array([point for _, _, point in seen])
         z = (places @ image.T_camera_model[:3, :3].T + image.T_camera_model[:3, 3])[:, 2]
-        units = read_depth_units(depth)
+        try:
+            units = read_depth_units(depth)
+        except NoDepthError:
+            continue
         height_px, width_px = units.shape
         camera = cameras[image.camera]
         shares = height_px / camera.height_px, width_px / camera.width_px

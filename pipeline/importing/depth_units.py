@@ -77,7 +77,7 @@ def _depth_in(image: AnyImage, sequence: Sequence) -> ReadDepth:
     values = read_depth_of(image)
     if sequence.rotated_bits and has_rotated_bits(values):
         read = depth_of(str(image), unrotated(values), MILLIMETRES, stated=True)
-        return replace(read, find_notes=lambda: ("The bits of the depth were turned back by three",))
+        return replace(read, find_notes=lambda: ("Depth values were rotated back by three bits (SUN RGB-D)",))
     whole = values.dtype.kind in "iu"
     scale = sequence.units_per_metre if whole or sequence.scale_stated else usual_scale(values)
     return depth_of(str(image), values, scale, sequence.scale_stated)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import TypeVar
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from packetmesh.errors import InputError
+from pipeline.importing.stored import AnyImage, read_depth_of
 from pipeline.io.depth_to_color import register_depth
 from pipeline.io.images import NoDepthError
 from pipeline.kernels.geometry import LEVEL_POSE, is_pinhole
@@ -117,12 +121,34 @@ def first_with_depth(reads: Iterable[Callable[[], Read]]) -> Read | None:
     return None
 
 
-def unreadable_note(unreadable: Mapping[int, str]) -> tuple[str, ...]:
-    """Return a note on the depth images that could not be read, from their errors by frame, if any."""
+def first_depth_values(folder: Path, images: Iterable[AnyImage]) -> NDArray[Any]:
+    """Return the (H, W) values of a recording's first depth image that has depth, as ``first_with_depth``.
+
+    Raises:
+        InputError: as for ``first_with_depth``; NoDepthError if no image has depth.
+    """
+    values = first_with_depth(partial(read_depth_of, image) for image in images)
+    if values is None:
+        raise NoDepthError(f"No frame of {folder} has depth; check the depth images")
+    return values
+
+
+@contextmanager
+def entered(unreadable: dict[int, str], index: int) -> Iterator[None]:
+    """Enter the error of a frame's image in ``unreadable`` and raise it again."""
+    try:
+        yield
+    except InputError as error:
+        unreadable[index] = str(error)
+        raise
+
+
+def unreadable_note(what: str, unreadable: Mapping[int, str]) -> tuple[str, ...]:
+    """Return a note on the images (``what``) that could not be read, from their errors by frame, if any."""
     if not unreadable:
         return ()
     first = unreadable[min(unreadable)]
-    return (f"{len(unreadable)} depth images were left out, the first because: {first}",)
+    return (f"{len(unreadable)} {what} images were left out, the first because: {first}",)
 
 
 @lru_cache(maxsize=2)

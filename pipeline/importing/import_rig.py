@@ -50,8 +50,8 @@ class ImportReport:
     folder: str
     candidates: int
     """Number of frames of the recording that were considered."""
-    depth_scale: float
-    """Depth units per metre that were used."""
+    depth_scale: float | None
+    """Depth units per metre that were used; None if the cameras of a bag have different ones."""
     frames: tuple[ImportedFrame, ...]
     notes: tuple[str, ...]
     """Notes, one sentence each."""
@@ -83,7 +83,7 @@ def iterate_import(
         InputError: the path is no usable recording, or the folder cannot be written.
     """
     if not 1 <= frames <= MAX_NODES:
-        raise InputError(f"A rig of {frames} frames cannot be; try 1 to {MAX_NODES}")
+        raise InputError(f"A rig cannot have {frames} nodes; try 1 to {MAX_NODES}")
     check_scale(depth_scale)
     out = Path(out)
     check_new(out)
@@ -129,12 +129,14 @@ def _from_bag(
     bag = yield from part(iterate_bag(path, frames, depth_scale), "files", 0.0, 0.7, detail=True)
     written = []
     with new_folder(out) as folder_of_rig:
-        for done, (time_s, node) in enumerate(bag.nodes):
+        for done, node in enumerate(bag.nodes):
             yield Progress("images", 0.7 + 0.3 * done / len(bag.nodes))
-            write_node(folder_of_rig / f"node_{done:02d}", node)
-            written.append(ImportedFrame.of(node, done, time_s))
-    notes = (*bag.notes, _scale_note(written, bag.units_per_metre))
-    return ImportReport("bag", str(path), bag.candidates, bag.units_per_metre, tuple(written), notes)
+            write_node(folder_of_rig / f"node_{done:02d}", node.images)
+            written.append(ImportedFrame.of(node.images, done, node.time_s))
+    scales = sorted({node.units_per_metre for node in bag.nodes})
+    notes = (*bag.notes, _scale_note(written, *scales))
+    scale = scales[0] if len(scales) == 1 else None
+    return ImportReport("bag", str(path), bag.candidates, scale, tuple(written), notes)
 
 
 def _chosen(sequence: Sequence, frames: int) -> tuple[Sequence, tuple[int, ...], ReadDepth]:
@@ -172,10 +174,11 @@ def _same_view_notes(sequence: Sequence, node: NodeImages) -> tuple[str, ...]:
     return (same_view_note(node.camera, node.depth_camera),)
 
 
-def _scale_note(written: list[ImportedFrame], units_per_metre: float) -> str:
-    """Return a sentence on the depth scale."""
+def _scale_note(written: list[ImportedFrame], *units_per_metre: float) -> str:
+    """Return a sentence on the depth scale, or on those of different cameras."""
+    units = " or ".join(f"{units:g}" for units in units_per_metre)
     median_m = float(np.median([frame.median_depth_m for frame in written]))
-    return f"Depth: {units_per_metre:g} units in a metre, which makes the median depth {median_m:.3g} m"
+    return f"Depth: {units} units in a metre, which makes the median depth {median_m:.3g} m"
 
 
 def _node_of(candidate: Candidate, sequence: Sequence, T_up_world: FloatArray | None) -> NodeImages:

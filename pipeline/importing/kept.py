@@ -61,7 +61,7 @@ def iterate_keep(
     check_new(Path(out))
     opening = iterate_opening(path, depth_scale, intrinsics)
     recording = yield from part(opening, "files", 0.0, 0.1, detail=True)
-    count = len(recording.times_s)
+    count, notes = len(recording.times_s), [*recording.notes]
     left_out: list[str] = []
     with new_folder(Path(out)) as folder:
         writer = _Writer(folder)
@@ -77,7 +77,6 @@ def iterate_keep(
         if writer.camera is None:
             raise InputError(f"No frame of {recording.name} can be read, the first because: {left_out[0]}")
         writer.finish(writer.camera)
-    notes = [*recording.notes]
     if left_out:
         notes.append(f"{len(left_out)} of {count} frames were left out, the first because: {left_out[0]}")
     if writer.too_far:

@@ -96,7 +96,7 @@ def _tracks(file: Path, contents: Contents) -> tuple[Track, Track]:
             names = ", ".join(named) or "none"
             raise InputError(
                 f"{file} has no {what} track {title} of an Azure Kinect or Femto (its tracks: {names}); try "
-                "k4arecorder with colour and a depth mode other than PASSIVE_IR"
+                "to record with k4arecorder, with colour on and a depth mode other than PASSIVE_IR"
             )
         if not named[title].stamps:
             raise InputError(f"{file} has no {what} image; try to copy it again, or to record longer")

@@ -21,7 +21,10 @@ from pipeline.types import CameraIntrinsics, FloatArray
 
 _FILE = "transforms.json"
 _DEPTHS = ("depth_file_path", "depth_path")
-_CAMERA = ("camera_model", "fl_x", "fl_y", "cx", "cy", "w", "h", "k1", "k2", "p1", "p2", "k3", "k4")
+_CAMERA = (
+    *("camera_model", "is_fisheye", "fl_x", "fl_y", "cx", "cy", "w", "h"),
+    *("k1", "k2", "p1", "p2", "k3", "k4"),
+)
 """Keys of a camera in the file or in one of its frames."""
 _Y_DOWN = np.diag([1.0, -1.0, -1.0, 1.0])
 """(4, 4) transform from camera axes with z forward, y down to OpenGL's, with z backward and y up."""

@@ -9,6 +9,7 @@ import numpy as np
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_TEXT_BYTES, read_text
 from pipeline.importing.cameras import PRIMESENSE, camera_of
+from pipeline.importing.depth_views import first_depth_values
 from pipeline.importing.found_poses import FoundPoses, found_poses, poses_in_files, scanned_transform
 from pipeline.importing.pairing import (
     COLOR_SUFFIXES,
@@ -20,7 +21,7 @@ from pipeline.importing.pairing import (
     visible,
 )
 from pipeline.importing.sequence import Candidate, Sequence, posed
-from pipeline.importing.stored import read_color_of, read_depth_of
+from pipeline.importing.stored import read_color_of
 from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.poses import rounding_note
 from pipeline.kernels.geometry import inverse
@@ -50,7 +51,7 @@ def read_seven_scenes(folder: Path, intrinsics: Path | None) -> Sequence:
     stem = colors[0].name.split(".")[0]
     require(found, folder, f"{stem}.depth.png beside {colors[0].name}")
     candidates, without, notes = _with_poses(found, found[0][2].name)
-    default = _SEVEN_SCENES, "those of 7-Scenes, whose depth is not quite registered to the colour"
+    default = _SEVEN_SCENES, "those of 7-Scenes; its depth is registered only roughly"
     camera, assumed = camera_of(folder, candidates[0].color, intrinsics, *default)
     return Sequence(candidates, camera, without_poses=without, notes=(*assumed, *notes))
 
@@ -72,7 +73,7 @@ def read_scannet(folder: Path, intrinsics: Path | None) -> Sequence:
         camera = read_intrinsics(beside / "intrinsic_color.txt", (width_px, height_px))
     else:
         camera, _ = camera_of(folder, first.color, intrinsics, None, "")
-    depth_height_px, depth_width_px = read_depth_of(first.depth).shape
+    depth_height_px, depth_width_px = first_depth_values(folder, (one.depth for one in candidates)).shape
     if (depth_height_px, depth_width_px) == (height_px, width_px):
         return Sequence(candidates, camera, without_poses=without, notes=notes)
     depth_camera = read_intrinsics(beside / "intrinsic_depth.txt", (depth_width_px, depth_height_px))

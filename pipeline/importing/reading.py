@@ -25,7 +25,7 @@ time and memory."""
 def of_many(frames: int, most: int) -> tuple[slice, tuple[str, ...]]:
     """Return a slice with at most ``most`` of a recording's frames, and a note if it lacks some."""
     step = max(1, -(-frames // most))
-    note = f"Of the {frames} frames one in {step} is used, so that there are at most {most}"
+    note = f"One in {step} of the {frames} frames is used (at most {most})"
     return slice(None, None, step), (note,) if step > 1 else ()
 
 
@@ -61,6 +61,7 @@ def read_sequence(
     sequence = kind.read(folder, None if intrinsics is None else Path(intrinsics))
     if depth_scale is not None:
         sequence = sequence.with_scale(depth_scale)
+    sequence = sequence.completed(sequence)
     candidates, repeated = distinct(sequence.candidates)
     chosen, rare = of_many(len(candidates), most)
     candidates = candidates[chosen]

@@ -16,6 +16,7 @@ from pipeline.importing.depth_units import depth_in, weighted_depth_in
 from pipeline.importing.depth_views import (
     DepthCamera,
     DepthView,
+    entered,
     first_with_depth,
     frame_of,
     unreadable_note,
@@ -28,7 +29,7 @@ from pipeline.importing.sequence import SAME_VIEW_REMEDY, Candidate, Sequence
 from pipeline.importing.stored import read_color_of
 from pipeline.io.images import NoDepthError, ReadDepth
 from pipeline.io.same_view import depth_camera_of
-from pipeline.types import AnyPath, FloatArray, RgbdFrame
+from pipeline.types import AnyPath, ByteArray, CameraIntrinsics, FloatArray, RgbdFrame
 
 FRAMES_PER_S = 30.0
 """Frame rate that is assumed for a recording without times."""
@@ -44,6 +45,8 @@ class FolderRecording:
     sequence: Sequence
     unreadable: dict[int, str] = field(default_factory=dict, compare=False)
     """Error of each frame whose depth image could not be read, entered when it is read."""
+    unreadable_colors: dict[int, str] = field(default_factory=dict, compare=False)
+    """Error of each frame whose colour image could not be used, entered when it is read."""
 
     @property
     def name(self) -> str:
@@ -64,7 +67,8 @@ class FolderRecording:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes; none on missing poses, because poses can be tracked and a camera may stand still."""
-        return (*self.sequence.notes, *unreadable_note(self.unreadable))
+        colors = unreadable_note("colour", self.unreadable_colors)
+        return (*self.sequence.notes, *unreadable_note("depth", self.unreadable), *colors)
 
     def view(self, index: int) -> DepthView:
         """Read the depth of a frame; it is all NaN without any depth, or if the image cannot be read.
@@ -79,7 +83,7 @@ class FolderRecording:
         except InputError as error:
             if not isinstance(error, NoDepthError):
                 self.unreadable[index] = str(error)
-            z_m = np.full(self._depth_shape, np.nan, np.float32)
+            z_m, weight = np.full(self._depth_shape, np.nan, np.float32), None
             depth_camera = self._depth_camera_of(candidate, self._depth_shape)
         return view_of(z_m, depth_camera, weight)
 
@@ -90,12 +94,9 @@ class FolderRecording:
             InputError: an image cannot be read, or does not fit its camera.
         """
         candidate = self.sequence.candidates[index]
-        rgb, camera = read_color_of(candidate.color), candidate.camera or self.sequence.camera
-        if rgb.shape[:2] != (camera.height_px, camera.width_px):
-            raise InputError(
-                f"The colour image {candidate.color} has {rgb.shape[1]} x {rgb.shape[0]} pixels and its "
-                f"camera {camera.width_px} x {camera.height_px}; try --intrinsics with the colour camera's"
-            )
+        camera = candidate.camera or self.sequence.camera
+        with entered(self.unreadable_colors, index):
+            rgb = _color_of(candidate, camera)
         depth = depth_in(candidate, self.sequence).depth
         depth_camera = None
         if self.sequence.depth_camera is not None or depth.z_m.shape != rgb.shape[:2]:
@@ -160,6 +161,21 @@ def iterate_opening(
     if _first_depth(sequence) is None:
         raise NoDepthError(f"No frame of {folder} has depth; check the depth images and the depth scale")
     return FolderRecording(kind.name, folder, sequence)
+
+
+def _color_of(candidate: Candidate, camera: CameraIntrinsics) -> ByteArray:
+    """Read (H, W, 3) colours.
+
+    Raises:
+        InputError: the image cannot be read, or has another size than its camera.
+    """
+    rgb = read_color_of(candidate.color)
+    if rgb.shape[:2] != (camera.height_px, camera.width_px):
+        raise InputError(
+            f"The colour image {candidate.color} has {rgb.shape[1]} x {rgb.shape[0]} pixels and its "
+            f"camera {camera.width_px} x {camera.height_px}; try --intrinsics with the colour camera's"
+        )
+    return rgb
 
 
 def _bag_in(place: Path) -> Path | None:

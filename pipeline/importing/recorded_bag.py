@@ -15,12 +15,13 @@ from pipeline.importing.bag_depth import BagScale, place_of_depth
 from pipeline.importing.bag_messages import color_of
 from pipeline.importing.bag_reader import opened_bag, readable
 from pipeline.importing.bag_stream import BagStream
-from pipeline.importing.bag_times import all_moments, times_of
+from pipeline.importing.bag_times import moments_of, times_of
 from pipeline.importing.bag_topics import Topic, iterate_scan, message_of, pairs_of
 from pipeline.importing.bag_transforms import Transforms
 from pipeline.importing.depth_views import (
     DepthCamera,
     DepthView,
+    entered,
     first_with_depth,
     frame_of,
     unreadable_note,
@@ -54,6 +55,8 @@ class BagRecording:
     """Notes on the whole bag, one sentence each."""
     unreadable: dict[int, str] = field(default_factory=dict, compare=False)
     """Error of each frame whose depth image could not be read, entered when it is read."""
+    unreadable_colors: dict[int, str] = field(default_factory=dict, compare=False)
+    """Error of each frame whose colour image could not be used, entered when it is read."""
 
     kind = "bag"
 
@@ -63,7 +66,8 @@ class BagRecording:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        return (*self.found, *unreadable_note(self.unreadable))
+        colors = unreadable_note("colour", self.unreadable_colors)
+        return (*self.found, *unreadable_note("depth", self.unreadable), *colors)
 
     def view(self, index: int) -> DepthView:
         """Read the depth of a frame; it is all NaN without any depth, or if the image cannot be read.
@@ -84,14 +88,16 @@ class BagRecording:
         Raises:
             InputError: an image cannot be read, or does not fit its camera.
         """
-        rgb = color_of(self.color.message(int(self.moments[index, 0])), self.color.topic)
-        _check_size(self.color.topic, rgb.shape, (self.camera.height_px, self.camera.width_px))
+        with entered(self.unreadable_colors, index):
+            rgb = color_of(self.color.message(int(self.moments[index, 0])), self.color.topic)
+            _check_size(self.color.topic, rgb.shape, (self.camera.height_px, self.camera.width_px))
         T = None if self.T_world_camera is None else self.T_world_camera[index]
         return frame_of(index, rgb, self.camera, self._depth(index).depth, self.depth_camera, T)
 
     def _depth(self, index: int) -> ReadDepth:
         read = self.scale.read(self.depth.message(int(self.moments[index, 1])))
-        _check_size(self.depth.topic, read.depth.z_m.shape, self.depth_shape)
+        shape = read.depth.z_m.shape
+        _check_size(self.depth.topic, shape, self.depth_shape, "the first image of this topic")
         return read
 
 
@@ -112,7 +118,7 @@ def iterate_bag_recording(path: Path, depth_scale: float | None) -> Generator[Pr
         pairs, left_out = pairs_of(path, reader, scanned.colors, scanned.depths)
         color, depth = max(pairs, key=lambda pair: min(len(own.recorded_ns) for own in pair))
         times_s, time_notes = times_of([color, depth])
-        moments = all_moments(path, times_s)
+        moments = moments_of(path, times_s)
         scale = BagScale.of(reader, depth.name, depth_scale)
 
         def depth_at(index: int) -> ReadDepth:
@@ -170,9 +176,11 @@ def _others(pairs: list[tuple[Topic, Topic]], used: Topic) -> tuple[str, ...]:
     return (f"{used.name} is used, and {', '.join(others)} left out: a recording is of one camera",)
 
 
-def _check_size(topic: str, shape: tuple[int, ...], expected: tuple[int, ...]) -> None:
+def _check_size(
+    topic: str, shape: tuple[int, ...], expected: tuple[int, ...], of: str = "its camera"
+) -> None:
     if shape[:2] != tuple(expected):
         raise InputError(
-            f"An image of {topic} has {shape[1]} x {shape[0]} pixels and its camera {expected[1]} x "
+            f"An image of {topic} has {shape[1]} x {shape[0]} pixels and {of} {expected[1]} x "
             f"{expected[0]}; try to record images of one size with their camera_info"
         )

@@ -44,27 +44,34 @@ class NodeImages:
 def check_new(out: Path) -> None:
     """Raise an InputError for a folder that is neither new nor empty."""
     if out.exists() and not (out.is_dir() and not any(out.iterdir())):
-        raise InputError(f"{out} is there already; try another name")
+        what = f"The folder {out} is not empty" if out.is_dir() else f"{out} exists already"
+        raise InputError(f"{what}; try another name")
 
 
 @contextmanager
 def new_folder(out: Path) -> Iterator[Path]:
-    """Create a sibling folder that is renamed to ``out`` if the body succeeds, and deleted if not.
+    """Create a hidden folder whose contents become those of ``out`` if the body succeeds, else deleted.
+
+    An empty folder ``out`` stays the same folder: it may be the working folder of this process.
 
     Raises:
         InputError: a folder or a file in it cannot be written.
     """
-    sibling = out.with_name(f".{out.name}-{secrets.token_hex(4)}")
+    out = out.resolve()
+    exists = out.is_dir()
+    hidden = (out if exists else out.parent) / f".{out.name}-{secrets.token_hex(4)}"
     try:
-        sibling.mkdir(parents=True)
-        yield sibling
-        if out.is_dir():
-            out.rmdir()
-        sibling.rename(out)
+        hidden.mkdir(parents=True)
+        yield hidden
+        if exists:
+            for path in sorted(hidden.iterdir()):
+                path.rename(out / path.name)
+        else:
+            hidden.rename(out)
     except OSError as error:
         raise InputError(f"{out} cannot be written ({error.strerror or error}); {remedy(error)}") from None
     finally:
-        shutil.rmtree(sibling, ignore_errors=True)
+        shutil.rmtree(hidden, ignore_errors=True)
 
 
 def write_node(folder: Path, node: NodeImages) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from packetmesh.errors import InputError
@@ -41,6 +42,10 @@ class Candidate:
         return self if T is None else replace(self, T_world_camera=rigid(T[:3, :3], factor * T[:3, 3]))
 
 
+def _unchanged(sequence: Sequence) -> Sequence:
+    return sequence
+
+
 @dataclass(frozen=True, slots=True)
 class Sequence:
     """The frames of one recording in order of time, with their common properties."""
@@ -66,6 +71,8 @@ class Sequence:
     """Note on a recording without any pose; empty if it has one, or if ``notes`` has the reason."""
     notes: tuple[str, ...] = ()
     """Assumptions, one sentence each."""
+    completed: Callable[[Sequence], Sequence] = field(default=_unchanged, compare=False, repr=False)
+    """Returns the sequence with what depends on the depth scale: it is called when that is known."""
 
     def with_scale(self, units_per_metre: float) -> Sequence:
         """Return the sequence with another depth scale."""

@@ -135,11 +135,11 @@ def _odometry(file: Path) -> dict[int, dict[str, float]]:
     lines = [
         line for line in read_text(file, "trajectory", 100 * MAX_TEXT_BYTES).splitlines() if line.strip()
     ]
-    titles, *rows = ([word for word in re.split(r"[,;\s]+", line.strip()) if word] for line in lines)
     try:
+        titles, *rows = ([word for word in re.split(r"[,;\s]+", line.strip()) if word] for line in lines)
         values = [dict(zip(titles, map(float, row), strict=True)) for row in rows]
         return {int(row["frame"]): row for row in values}
-    except (ValueError, KeyError):
+    except (ValueError, KeyError, OverflowError):
         raise InputError(
             f"The trajectory {file} is not in Stray Scanner's format; try the titles timestamp, frame, x, y, "
             "z, qx, qy, qz, qw and a row of numbers a frame, or remove the file to import without poses"

@@ -6,12 +6,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict, cast
 
 from packetmesh.errors import InputError
+from packetmesh.files import remedy
 from pipeline.io.extrinsics import write_extrinsics
 from pipeline.io.intrinsics import write_intrinsics
 from pipeline.io.poses import write_pose
@@ -63,6 +64,8 @@ class CalibratedNode:
 def write_calibration(folder: AnyPath, nodes: Mapping[str, CalibratedNode]) -> None:
     """Write a calibration folder, for ``load_rig(..., calibration=folder)``.
 
+    A node's older camera and poses are deleted where it has none now; its depth correction stays.
+
     Args:
         folder: created if it is missing.
         nodes: calibrations by the nodes' names, node_00 and so on.
@@ -76,6 +79,7 @@ def write_calibration(folder: AnyPath, nodes: Mapping[str, CalibratedNode]) -> N
     """
     for name, node in nodes.items():
         own = Path(folder) / name
+        delete_files(own, (file for part, file in FILES.items() if part != "depth_correction"))
         if node.intrinsics is not None:
             write_intrinsics(own / "intrinsics.json", node.intrinsics, node.focal_sd)
         if node.T_world_camera is not None:
@@ -83,6 +87,21 @@ def write_calibration(folder: AnyPath, nodes: Mapping[str, CalibratedNode]) -> N
         if node.depth_intrinsics is not None and node.T_color_depth is not None:
             write_intrinsics(own / "depth_intrinsics.json", node.depth_intrinsics)
             write_extrinsics(own / "extrinsics.json", node.T_color_depth)
+
+
+def delete_files(folder: Path, names: Iterable[str]) -> None:
+    """Delete those files of a folder that exist, before newer ones are written.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    for name in names:
+        try:
+            (folder / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"{folder / name} cannot be deleted ({error.strerror or error}); {remedy(error)}"
+            ) from None
 
 
 def calibration_files(folder: AnyPath, nodes: Sequence[str]) -> dict[str, NodeFiles]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path
-from pipeline.io.lenses import is_fisheye_name, ros_name
+from pipeline.io.lenses import FISHEYE, ros_name
 from pipeline.types import AnyPath, CameraIntrinsics
 
 COLMAP_MIDDLE, MATLAB_MIDDLE = 0.5, 1.0
@@ -23,8 +23,8 @@ COLMAP_MIDDLE, MATLAB_MIDDLE = 0.5, 1.0
 _COLMAP = re.compile(r"^\s*\d+\s+(PINHOLE|OPENCV|FULL_OPENCV|OPENCV_FISHEYE)\s+(.*)$", re.MULTILINE)
 _COLMAP_NUMBERS = {"PINHOLE": 4, "OPENCV": 8, "FULL_OPENCV": 12, "OPENCV_FISHEYE": 8}
 """Number of parameters after the image size."""
-_FISHEYE = re.compile(r"\bequidistant\b|\bOPENCV_FISHEYE\b|^fisheye_model:\s*1", re.MULTILINE)
 _KALIBR = re.compile(r"^\s+(intrinsics|distortion_coeffs|resolution):\s*\[([^\]]*)\]", re.MULTILINE)
+_KALIBR_MODEL = re.compile(r"^\s+distortion_model:\s*[\"']?(\w+)", re.MULTILINE)
 _KALIBR_CAMERA = re.compile(r"^cam\d+:", re.MULTILINE)
 _MATLAB = re.compile(
     r"^\s*(FocalLength|PrincipalPoint|ImageSize|RadialDistortion|TangentialDistortion)\s*[:=]\s*\[([^\]]*)\]",
@@ -178,13 +178,10 @@ def write_camera(path: AnyPath, camera: CameraIntrinsics, kind: str) -> None:
         sibling.write_text(text)
 
 
-def is_fisheye(text: str, model: str) -> bool:
-    """Return whether a camera file, or the distortion model that it names, is that of a fisheye lens."""
-    return is_fisheye_name(model) or _FISHEYE.search(text) is not None
-
-
-def camera_in(path: AnyPath, text: str, size_px: tuple[int, int] | None) -> CameraIntrinsics | None:
-    """Read a COLMAP, Kalibr or MATLAB camera; returns None if the text is none of these.
+def camera_in(
+    path: AnyPath, text: str, size_px: tuple[int, int] | None
+) -> tuple[CameraIntrinsics, str] | None:
+    """Read a COLMAP, Kalibr or MATLAB camera and the name of its distortion model; None for other texts.
 
     Of several cameras it is the one for images of the size ``size_px``, or else the first.
 
@@ -193,45 +190,54 @@ def camera_in(path: AnyPath, text: str, size_px: tuple[int, int] | None) -> Came
         ValueError: numbers are missing.
     """
     for read in (_from_colmap, _from_kalibr, _from_matlab):
-        cameras = read(text)
-        fitting = [camera for camera in cameras if (camera.width_px, camera.height_px) == size_px]
-        if any(not _same(camera, fitting[0]) for camera in fitting):
+        found = read(text)
+        fitting = [one for one in found if (one[0].width_px, one[0].height_px) == size_px]
+        if any(not _same(one, fitting[0]) for one in fitting):
+            first, _ = fitting[0]
             raise InputError(
                 f"The intrinsics file {path} has {len(fitting)} cameras for images of "
-                f"{fitting[0].width_px} x {fitting[0].height_px} pixels; try a file with only the camera of "
+                f"{first.width_px} x {first.height_px} pixels; try a file with only the camera of "
                 "these images"
             )
-        if cameras:
-            return (fitting or cameras)[0]
+        if found:
+            return (fitting or found)[0]
     return None
 
 
-def _same(one: CameraIntrinsics, other: CameraIntrinsics) -> bool:
-    return np.array_equal(one.matrix, other.matrix) and np.array_equal(one.distortion, other.distortion)
+def _same(one: tuple[CameraIntrinsics, str], other: tuple[CameraIntrinsics, str]) -> bool:
+    (camera, model), (other_camera, other_model) = one, other
+    return (
+        model == other_model
+        and np.array_equal(camera.matrix, other_camera.matrix)
+        and np.array_equal(camera.distortion, other_camera.distortion)
+    )
 
 
-def _from_colmap(text: str) -> list[CameraIntrinsics]:
+def _from_colmap(text: str) -> list[tuple[CameraIntrinsics, str]]:
     cameras = []
     for model, words in _COLMAP.findall(text):
         width, height, *numbers = (float(word) for word in words.split())
         if len(numbers) != _COLMAP_NUMBERS[model]:
             raise ValueError
         fx, fy, cx, cy, *lens = numbers
-        cameras.append(_camera((fx, fy, cx - COLMAP_MIDDLE, cy - COLMAP_MIDDLE), lens, width, height))
+        camera = _camera((fx, fy, cx - COLMAP_MIDDLE, cy - COLMAP_MIDDLE), lens, width, height)
+        cameras.append((camera, FISHEYE if model == "OPENCV_FISHEYE" else ""))
     return cameras
 
 
-def _from_kalibr(text: str) -> list[CameraIntrinsics]:
+def _from_kalibr(text: str) -> list[tuple[CameraIntrinsics, str]]:
     cameras = []
     for part in _KALIBR_CAMERA.split(text):
         found = {name: _numbers(words) for name, words in _KALIBR.findall(part)}
         if {"intrinsics", "resolution"} <= found.keys():
             width, height = found["resolution"]
-            cameras.append(_camera(found["intrinsics"], found.get("distortion_coeffs", []), width, height))
+            camera = _camera(found["intrinsics"], found.get("distortion_coeffs", []), width, height)
+            model = _KALIBR_MODEL.search(part)
+            cameras.append((camera, model[1] if model else ""))
     return cameras
 
 
-def _from_matlab(text: str) -> list[CameraIntrinsics]:
+def _from_matlab(text: str) -> list[tuple[CameraIntrinsics, str]]:
     found = {name: _numbers(words) for name, words in _MATLAB.findall(text)}
     if not {"FocalLength", "PrincipalPoint", "ImageSize"} <= found.keys():
         return []
@@ -241,7 +247,7 @@ def _from_matlab(text: str) -> list[CameraIntrinsics]:
     p1, p2 = (*found.get("TangentialDistortion", []), 0.0, 0.0)[:2]
     cx, cy = (value - MATLAB_MIDDLE for value in found["PrincipalPoint"])
     height, width = found["ImageSize"]
-    return [_camera((*found["FocalLength"], cx, cy), [k1, k2, p1, p2, k3], width, height)]
+    return [(_camera((*found["FocalLength"], cx, cy), [k1, k2, p1, p2, k3], width, height), "")]
 
 
 def _camera(

@@ -170,7 +170,7 @@ def _unit(path: AnyPath, titled: list[tuple[str, str | None]]) -> float | None:
     metres = {METRES.get(unit) if unit else None for _, unit in titled}
     if len(metres) > 1:
         raise InputError(
-            f"The position in {path} has columns of different units "
-            f"({', '.join(title for title, _ in titled)}); try to export it in one unit"
+            f"x, y and z in {path} have different units ({', '.join(title for title, _ in titled)}); try to "
+            "export them in one unit"
         )
     return metres.pop()

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, check_count, table_of, truncated
+from pipeline.io.cloud_table import COLOR, NORMAL, POSITION, check_count, table_of
 from pipeline.types import AnyPath
 
 _log = logging.getLogger(__name__)
@@ -53,7 +53,7 @@ def parse_ply(path: AnyPath, data: bytes) -> np.ndarray:
         names = [name for name, _ in vertex.properties]
         if len(set(names)) < len(names):
             raise ValueError
-        if vertex.count < 0 or not vertex.properties:
+        if min(element.count for element in elements[: place + 1]) < 0 or not vertex.properties:
             raise ValueError
     except (KeyError, ValueError, IndexError):
         raise InputError(
@@ -68,7 +68,7 @@ def parse_ply(path: AnyPath, data: bytes) -> np.ndarray:
                 "length; try to export it without this list"
             )
     check_count(path, vertex.count)
-    body = _after(path, data[_body_start(data, end) :], elements[:place], order)
+    body = _after(data[_body_start(data, end) :], elements[:place], order)
     table = table_of(path, body, vertex.count, _row(vertex, order), ascii_text=order == "a")
     return _with_splat_colors(path, table)
 
@@ -98,16 +98,13 @@ def _body_start(data: bytes, end: int) -> int:
     return data.find(mark, end) + len(mark) if mark in (b"\r\n", b"\r") else data.find(b"\n", end) + 1
 
 
-def _after(path: AnyPath, body: bytes, elements: list[_Element], order: Literal["a", "<", ">"]) -> bytes:
+def _after(body: bytes, elements: list[_Element], order: Literal["a", "<", ">"]) -> bytes:
     """Return a body without the elements before the vertices."""
     if not elements:
         return body
     if order == "a":
-        count = sum(element.count for element in elements)
-        rows = body.lstrip().split(b"\n", count)
-        if len(rows) <= count:
-            raise truncated(path, 0, elements[-1].count)
-        return rows[count]
+        rows = body.lstrip().splitlines(keepends=True)
+        return b"".join(rows[sum(element.count for element in elements) :])
     return body[sum(element.count * _row(element, order).itemsize for element in elements) :]
 
 

@@ -64,8 +64,8 @@ def doubts(values: NDArray[Any], depth_scale: float, stated: bool) -> tuple[str,
         )
     elif not ROOM_M[0] <= median_m <= ROOM_M[1]:
         found.append(
-            f"The median depth is {median_m:.3g} m at {depth_scale:g} units in a metre; no room is like "
-            f"that: {_try(median_m * depth_scale)}"
+            f"The median depth is {median_m:.3g} m at {depth_scale:g} units in a metre, which is "
+            f"unlikely for a room: {_try(median_m * depth_scale)}"
         )
     far = float(np.mean(known / depth_scale > FARTHEST_M))
     if far > MOST_FAR_SHARE and median_m <= ROOM_M[1]:

@@ -11,9 +11,9 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, json_object, read_text
-from pipeline.io.camera_files import camera_in, is_fisheye
+from pipeline.io.camera_files import camera_in
 from pipeline.io.camera_keys import camera_of_keys
-from pipeline.io.lenses import FISHEYE, KNOWN, is_known, lens_of
+from pipeline.io.lenses import FISHEYE, KNOWN, is_fisheye_name, is_known, lens_of
 from pipeline.types import AnyPath, CameraIntrinsics, FloatArray
 
 FOCAL_LENGTHS = (0.05, 100.0)
@@ -22,8 +22,10 @@ MOST_DISTORTION = 1e4
 FOCAL_SD = "focal_sd"
 """Key of the focal lengths' standard error, as a share of them."""
 _YAML_ENTRY = re.compile(r"^([ \t]*)(\w+):(.*(?:\n(?![ \t]*\w+:).*)*)", re.MULTILINE)
-_MODEL = re.compile(r"^[ \t]+distortion_model:\s*[\"']?(\w+)", re.MULTILINE)
-"""The indented distortion_model of Kalibr's files, which have one for each camera."""
+_FISHEYE = re.compile(r"\bequidistant\b|\bOPENCV_FISHEYE\b")
+"""Words that name the lens of a file without a key for it."""
+_OPENCV = ("", "SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV")
+"""Values of nerfstudio's camera_model whose lens is OpenCV's."""
 _LIST = re.compile(r"\[[^\]]*\]")
 _LIST_ITEM = re.compile(r"\s*-(\s|$)")
 """The first item of a block list, in contrast to a negative number."""
@@ -70,30 +72,38 @@ def camera_of_values(
     """
     model = _model_in(values, text)
     try:
-        camera = camera_of_keys(path, values, size_px, model == FISHEYE) or camera_in(path, text, size_px)
+        camera = camera_of_keys(path, values, size_px, is_fisheye_name(model))
+        found = (camera, model) if camera else camera_in(path, text, size_px)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError):
-        camera = None
-    if camera is None:
+        found = None
+    if found is None:
         raise _unknown(path)
-    camera = _with_lens(path, camera, model)
+    camera = _with_lens(path, *found)
     check_camera(f"The intrinsics file {path}", camera)
     return camera
 
 
 def _unknown(path: AnyPath) -> InputError:
     return InputError(
-        f"The intrinsics file {path} is of no known style; try JSON with width, height, fx, fy, cx and cy"
+        f"The intrinsics file {path} has no known format; try JSON with width, height, fx, fy, cx and cy"
     )
 
 
 def _model_in(values: dict[str, Any], text: str) -> str:
-    """Return the file's name of the distortion model, FISHEYE for all names of a fisheye; empty without one.
+    """Return the name of the distortion model in a file of one camera; empty for OpenCV's.
 
-    ``model`` is its key in files of the RealSense SDK, next to ``coeffs``.
+    The keys of the name: ``distortion_model`` of ROS, ``model`` next to ``coeffs`` of the RealSense SDK,
+    ``fisheye_model`` of OpenCV, ``is_fisheye`` of instant-ngp and ``camera_model`` of nerfstudio.
     """
-    named = _MODEL.search(text)
-    model = str(values.get("distortion_model") or (values.get("model", "") if "coeffs" in values else ""))
-    return FISHEYE if is_fisheye(text, model) else model or (named[1] if named else "")
+    if 1 in (values.get("fisheye_model"), values.get("is_fisheye")):
+        return FISHEYE
+    named = values.get("distortion_model") or (values.get("model") if "coeffs" in values else None)
+    if named:
+        return str(named)
+    if "fl_x" in values:
+        model = str(values.get("camera_model") or "")
+        return "" if model.upper() in _OPENCV else model
+    return FISHEYE if _FISHEYE.search(text) else ""
 
 
 def _with_lens(path: AnyPath, camera: CameraIntrinsics, model: str) -> CameraIntrinsics:
@@ -107,7 +117,7 @@ def _with_lens(path: AnyPath, camera: CameraIntrinsics, model: str) -> CameraInt
         count = f"of {len(camera.distortion)} coefficients" if is_known(model) else ""
         what = " ".join(word for word in ("the distortion model", model, count) if word)
         raise InputError(f"The intrinsics file {path} has {what}; try a calibration with {KNOWN}")
-    return replace(camera, distortion=lens, fisheye=model == FISHEYE)
+    return replace(camera, distortion=lens, fisheye=is_fisheye_name(model))
 
 
 def _bare_numbers(text: str) -> FloatArray | None:

@@ -11,7 +11,7 @@ FISHEYE = "equidistant"
 """ROS's and Kalibr's name of the fisheye model, also used in the files that are written."""
 _BROWN = "brown_conrady"
 """The RealSense SDK's name of the model plumb_bob; its variants differ from it if a coefficient is not 0."""
-_FISHEYES = {FISHEYE, "fisheye", "kannala_brandt", "kannala_brandt4"}
+_FISHEYES = {FISHEYE, "fisheye", "opencv_fisheye", "kannala_brandt", "kannala_brandt4"}
 _OPENCV = {"", "none", "plumb_bob", "radtan", _BROWN, "rational_polynomial"}
 """Names of OpenCV's model, which the number of coefficients extends."""
 KNOWN = "plumb_bob with 5 coefficients, rational_polynomial with 8, 12 or 14, or equidistant with 4"

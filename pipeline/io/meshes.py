@@ -8,15 +8,18 @@ import logging
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
 from PIL import Image
+from trimesh.exchange.gltf import export_glb, load_glb
 
 from packetmesh.errors import InputError
 from packetmesh.files import MAX_GEOMETRY_BYTES, atomic_path, read_bytes
 from pipeline.io.cloud_precision import middle_m, too_coarse
 from pipeline.io.images import jpeg_of
+from pipeline.io.srgb import linear_of, srgb_of
 from pipeline.io.textures import Texture
 from pipeline.kernels.geometry import rigid
 from pipeline.types import AnyPath, FloatArray, Surface
@@ -26,8 +29,10 @@ _log = logging.getLogger(__name__)
 MESH_SUFFIXES = (".ply", ".glb", ".obj", ".stl")
 _MAX_HEADER_BYTES = 10_000
 _PLY_FACES = re.compile(rb"^element face (\d{1,18})\s*$", re.MULTILINE)
-SRGB_GAMMA = 2.2
-"""Approximate gamma of sRGB; vertex colours in glTF are linear."""
+_LINEAR = "_LINEAR"
+"""Attribute in which trimesh stores numbers for ``COLOR_0`` as they are; its own colours have 8 bits."""
+_SRGB_WRITERS = ("https://github.com/mikedh/trimesh", "Open3D")
+"""Generators of glTF files whose vertex colours are sRGB, where the standard demands linear light."""
 T_GLTF_WORLD = rigid(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]), np.zeros(3))
 """(4, 4) rotation from the world frame (z up) to glTF's (y up); the file's root node stores it."""
 
@@ -41,7 +46,8 @@ def write_mesh(path: AnyPath, surface: Surface, texture: Texture | None = None) 
     Args:
         path: name ending in .ply (binary), .glb, .obj or .stl (binary, without colours).
         surface: in metres, Z up; a .glb file is rotated to Y up, as glTF requires.
-        texture: photographs for the surface, which only .glb files store.
+        texture: photographs for the surface, which only .glb files store; without them vertex colours are
+            stored as linear light there, as glTF requires.
 
     Raises:
         InputError: the suffix is none of these, there is no triangle, the format is too coarse for its place
@@ -72,17 +78,28 @@ def write_mesh(path: AnyPath, surface: Surface, texture: Texture | None = None) 
     if texture is not None and suffix == ".glb":
         mesh = _dressed(surface, texture)
     else:
-        corners = surface.vertices_m, surface.triangles
-        mesh = trimesh.Trimesh(*corners, vertex_colors=surface.colors, process=False)
+        colors = None if suffix == ".glb" else surface.colors
+        mesh = trimesh.Trimesh(surface.vertices_m, surface.triangles, vertex_colors=colors, process=False)
+        if suffix == ".glb" and surface.colors is not None:
+            mesh.vertex_attributes[_LINEAR] = linear_of(surface.colors)
     with atomic_path(path) as sibling:
         if suffix == ".glb":
             scene = trimesh.Scene()
             scene.add_geometry(mesh, transform=T_gltf_mesh)
-            scene.export(str(sibling))
+            sibling.write_bytes(export_glb(scene, tree_postprocessor=_name_colors))
         elif far and suffix == ".ply":
             sibling.write_bytes(_ply_of_doubles(surface))
         else:
             mesh.export(str(sibling))
+
+
+def _name_colors(document: dict[str, Any]) -> None:
+    """Give ``_LINEAR`` in the JSON of a glTF file glTF's name of colours, and the file its own generator."""
+    for mesh in document["meshes"]:
+        attributes = mesh["primitives"][0]["attributes"]
+        if _LINEAR in attributes:
+            attributes["COLOR_0"] = attributes.pop(_LINEAR)
+    document["asset"]["generator"] = "PacketMesh"
 
 
 def check_place(path: AnyPath, points_m: FloatArray) -> None:
@@ -124,8 +141,8 @@ def _dressed(surface: Surface, texture: Texture) -> trimesh.Trimesh:
     corners = texture.corners(surface.triangles)
     colors = np.full((len(corners.vertices), 4), 255, np.uint8)
     if surface.colors is not None:
-        own = surface.colors[corners.vertices[~corners.seen]] / 255.0
-        colors[~corners.seen, :3] = np.rint(255.0 * own**SRGB_GAMMA)
+        own = surface.colors[corners.vertices[~corners.seen]]
+        colors[~corners.seen, :3] = np.rint(255.0 * linear_of(own))
     picture = Image.open(io.BytesIO(jpeg_of(texture.image)))
     material = trimesh.visual.material.PBRMaterial(
         baseColorTexture=picture, metallicFactor=0.0, roughnessFactor=1.0
@@ -188,17 +205,22 @@ def scene_in(data: bytes, suffix: str) -> trimesh.Scene:
     Raises:
         Exception: of any type, if the file is damaged.
     """
-    if suffix == ".glb":
-        _check_accessors(data)
-    scene = trimesh.load_scene(io.BytesIO(data), file_type=suffix[1:], process=False)
-    if suffix == ".glb":
-        scene.apply_transform(T_GLTF_WORLD.T)
+    if suffix != ".glb":
+        return trimesh.load_scene(io.BytesIO(data), file_type=suffix[1:], process=False)
+    document = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    _check_accessors(document)
+    scene = trimesh.load_scene(io.BytesIO(data), file_type="glb", process=False)
+    if document.get("asset", {}).get("generator") not in _SRGB_WRITERS:
+        stored = load_glb(io.BytesIO(data), skip_materials=True)["geometry"]
+        for name, part in scene.geometry.items():
+            if part.visual.kind == "vertex":  # trimesh has rounded its colours to 8 bits of linear light
+                part.visual.vertex_colors = srgb_of(stored[name]["vertex_colors"])
+    scene.apply_transform(T_GLTF_WORLD.T)
     return scene
 
 
-def _check_accessors(data: bytes) -> None:
+def _check_accessors(document: dict[str, Any]) -> None:
     """Raise a ValueError for negative counts or offsets, which would be used as slices."""
-    document = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
     for part in (*document.get("accessors", ()), *document.get("bufferViews", ())):
         if min(part.get(name, 0) for name in ("count", "byteOffset", "byteLength", "byteStride")) < 0:
             raise ValueError

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.io.calibrations import FILES, NodeFiles, calibration_files, node_files
+from pipeline.io.calibrations import FILES, NodeFiles, calibration_files, delete_files, node_files
 from pipeline.io.depth_correction import (
     DepthCorrection,
     read_depth_correction,
@@ -25,7 +25,7 @@ from pipeline.io.images import read_color, read_depth_noted, write_color, write_
 from pipeline.io.intrinsics import read_focal_sd, read_intrinsics, write_intrinsics
 from pipeline.io.poses import read_pose_noted, write_pose
 from pipeline.io.same_view import depth_camera_of, same_view_note
-from pipeline.io.truth import read_truth, write_truth
+from pipeline.io.truth import INTRINSICS_NAME, MESH_NAME, POSE_NAME, read_truth, write_truth
 from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.types import MAX_NODES, AnyPath, CameraIntrinsics, DepthMap, RgbdFrame, Rig
 
@@ -213,6 +213,8 @@ def is_pair(path: Path) -> bool:
 def save_rig(directory: AnyPath, rig: Rig) -> None:
     """Write every frame of ``rig`` as ``directory/node_NN``, and the rig's truth if it has one.
 
+    An older rig of this folder is replaced. Depth is saved corrected and registered to colour.
+
     Raises:
         InputError: the folder cannot be written, or contains nodes of a larger rig.
 
@@ -226,27 +228,21 @@ def save_rig(directory: AnyPath, rig: Rig) -> None:
     for folder in _node_folders(directory):
         if folder.name not in names:
             raise InputError(f"{directory} already holds {folder.name} of another rig; try an empty folder")
+    delete_files(directory, [MESH_NAME])
     for name, frame in zip(names, rig.frames, strict=True):
         folder = directory / name
+        delete_files(folder, (*FILES.values(), POSE_NAME, INTRINSICS_NAME))
         write_color(folder / "color.png", frame.rgb)
         write_depth_mm(folder / "depth.png", frame.depth)
-        write_intrinsics(folder / "intrinsics.json", frame.intrinsics, frame.scale_sd)
+        write_intrinsics(folder / FILES["intrinsics"], frame.intrinsics, frame.scale_sd)
         if frame.pose_known:
-            write_pose(folder / "pose.txt", frame.T_world_camera)
-        _write_noise(folder, frame)
+            write_pose(folder / FILES["pose"], frame.T_world_camera)
+        if frame.noise is not None:
+            size_px = (frame.intrinsics.width_px, frame.intrinsics.height_px)
+            correction = DepthCorrection(size_px, noise=frame.noise)
+            write_depth_correction(folder / FILES["depth_correction"], correction)
     if rig.truth is not None:
         write_truth(directory, dict(zip(names, rig.frames, strict=True)), rig.truth)
-
-
-def _write_noise(folder: Path, frame: RgbdFrame) -> None:
-    """Write the frame's noise; delete an older rig's files, as depth is saved corrected and registered."""
-    for name in ("depth_correction", "depth_intrinsics", "extrinsics"):
-        (folder / FILES[name]).unlink(missing_ok=True)
-    if frame.noise is not None:
-        size_px = (frame.intrinsics.width_px, frame.intrinsics.height_px)
-        write_depth_correction(
-            folder / FILES["depth_correction"], DepthCorrection(size_px, noise=frame.noise)
-        )
 
 
 def _node_folders(directory: Path) -> list[Path]:

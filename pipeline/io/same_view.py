@@ -32,7 +32,7 @@ def depth_camera_of(
     smaller = scaled_to(camera, width_px, height_px)
     if smaller is None:
         raise InputError(
-            f"The depth image {depth} is for {width_px} x {height_px} pixels but the colour image {color} "
+            f"The depth image {depth} has {width_px} x {height_px} pixels but the colour image {color} "
             f"has {camera.width_px} x {camera.height_px}, whose sides are not in that proportion; {remedy}"
         )
     return smaller

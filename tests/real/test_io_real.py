@@ -18,7 +18,7 @@ def frame(shared_data, name) -> RgbdFrame:
 @pytest.mark.parametrize("name", ["kinect_basket", "kinect_desk"])
 @pytest.mark.parametrize(
     ("factor", "says"),
-    [(1, None), (5, "scale 5000"), (8, "scale 8000"), (20, "scale 10000"), (0.02, "no room")],
+    [(1, None), (5, "scale 5000"), (8, "scale 8000"), (20, "scale 10000"), (0.02, "unlikely for a room")],
 )
 def test_a_wrong_scale_of_a_real_frame_is_doubted_and_the_right_one_is_not(shared_data, name, factor, says):
     depth = frame(shared_data, name).depth

@@ -20,8 +20,8 @@ LIMIT_BYTES = 128 << 20
 TEXT = Markdown(
     """Any ONNX network that infers depth from one image can be used. The app reads its input (size,
 colours) and its output (metric, relative or inverse depth) from the file, or takes them from a preset.
-A network that takes **image and depth** (such as LingBot-Depth) is told by its inputs: it completes the
-sensor's depth instead of ours."""
+A network that takes **image and depth** (such as LingBot-Depth) is recognised by its inputs: it completes
+the sensor's depth instead of ours."""
 )
 ADVICE: dict[ModelKind, Markdown] = {
     "metric": Markdown("Its output is in metres: try the alignments *none* and *one scale*."),

@@ -1,6 +1,7 @@
 """``packetmesh target`` and ``calibrate`` as somebody uses them, and what they say when they cannot."""
 
 import json
+import shutil
 
 import cv2
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 from app.cli import main
 from pipeline.calibration.board import Board
+from pipeline.io.demos import SCENES
 from pipeline.io.intrinsics import read_intrinsics
 from pipeline.io.poses import read_pose
 from tests.pipeline.calibration.views import CAMERA, photograph, poses
@@ -172,6 +174,17 @@ def test_wrong_options_are_one_sentence_each(given, says, circles, tmp_path, cap
     out = tmp_path / "camera"
     assert says in failure(["calibrate", str(circles), "--out", str(out), *given], capsys)
     assert not out.exists()
+
+
+@pytest.mark.parametrize("name", ["", "node_00"])
+def test_a_rigs_own_cameras_stay(name, circles, tmp_path, capsys):
+    """A calibration without a depth camera would delete that of the rig."""
+    rig = tmp_path / "rig"
+    shutil.copytree(SCENES / "box-on-table" / "node_00", rig / "node_00")
+    before = {path: path.read_bytes() for path in rig.rglob("*") if path.is_file()}
+    says = failure(["calibrate", str(circles), "--out", str(rig / name)], capsys)
+    assert "the results would replace its cameras" in says
+    assert {path: path.read_bytes() for path in rig.rglob("*") if path.is_file()} == before
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import sem
 
+from lab.worlds.printed import printed, sheet_px
 from packetmesh.errors import InputError
+from pipeline.calibration import depth_samples
 from pipeline.calibration.board import Board
 from pipeline.calibration.depth_bias import fit_depth
 from pipeline.calibration.depth_samples import board_depth_samples
@@ -17,11 +19,13 @@ from pipeline.io.depth_correction import (
     read_depth_correction,
     write_depth_correction,
 )
+from pipeline.kernels.geometry import apply, inverse
 from pipeline.types import DepthMap
 from tests.pipeline.calibration.depth_views import (
     BOARD,
     CAMERA,
     NOISE,
+    RAYS,
     SIZE,
     depth_of,
     poses,
@@ -198,14 +202,37 @@ def test_samples_lie_on_the_board_alone():
     assert 0.18 < found.ink.mean() < 0.35
 
 
-@pytest.mark.parametrize("pattern", ["chessboard", "charuco"])
-def test_ink_of_a_chessboard_is_half_of_it(pattern):
+@pytest.fixture(scope="module")
+def near_boards():
+    """Poses, and what lens and sensor make of them; boards of the same size need no others."""
     rng = np.random.default_rng(0)
-    boards = poses(rng, 6)
-    views = [view_of(T, 0.0, rng, str(index)) for index, T in enumerate(boards)]
-    depths = [depth_of(T, NONE, NOISE, rng) for T in boards]
-    found = board_depth_samples(calibrate(views, SIZE), depths, Board(pattern, 11, 9, 0.035))
-    assert 0.5 < found.ink.mean() < 0.75
+    boards = poses(rng, 4, (0.4, 0.7))
+    lens = calibrate([view_of(T, 0.0, rng, str(index)) for index, T in enumerate(boards)], SIZE)
+    return boards, lens, [depth_of(T, NONE, NOISE, rng) for T in boards]
+
+
+@pytest.mark.parametrize(
+    ("board", "white"),
+    [
+        (BOARD, 1.0 - np.pi / 16.0),
+        (Board("chessboard", 11, 9, 0.035), 0.5),
+        (Board("charuco", 11, 9, 0.035, "4X4_100"), 0.5 * (1.0 - 0.75**2)),
+        (Board("aprilgrid", 8, 6, 0.035), 1.0 - (48 + 35 * 0.3**2) / ((8 + 7 * 0.3) * (6 + 5 * 0.3))),
+    ],
+    ids=lambda value: getattr(value, "pattern", ""),
+)
+def test_what_counts_as_paper_is_white_on_the_printed_sheet(board, white, near_boards, monkeypatch):
+    """White besides whole markers is a known share of the board."""
+    boards, lens, depths = near_boards
+    paper = (found := board_depth_samples(lens, depths, board)).select(~found.ink)
+    rays = RAYS[paper.pixels[:, 1], paper.pixels[:, 0]]
+    for view, T in enumerate(boards):
+        points_m = (rays * paper.true_m[:, None])[paper.view == view]
+        u, v = np.rint(sheet_px(board, apply(inverse(T), points_m)[:, :2])).astype(int).T
+        assert len(u) > 20
+        assert printed(board)[v, u].min() > 128
+    monkeypatch.setattr(depth_samples, "INK_PX", 0.0)
+    assert 1.0 - board_depth_samples(lens, depths, board).ink.mean() == pytest.approx(white, abs=0.03)
 
 
 def test_bad_input_is_refused_in_a_sentence():
@@ -219,6 +246,6 @@ def test_bad_input_is_refused_in_a_sentence():
         board_depth_samples(found, [DepthMap(np.ones((240, 320), np.float32)), *depths[1:]], BOARD)
     with pytest.raises(InputError, match="unit of the depth images"):
         board_depth_samples(found, [DepthMap(1000.0 * depth.z_m) for depth in depths], BOARD)
-    with pytest.raises(InputError, match="3 views have depth on the board, and it takes 4"):
+    with pytest.raises(InputError, match="3 views have depth on the board's white paper, and it takes 4"):
         fit_depth(board_depth_samples(found, [*depths[:3], None, None, None], BOARD))
     assert CAMERA.width_px == SIZE[0]

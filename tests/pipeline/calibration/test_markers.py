@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
+from pipeline.calibration import aprilgrid
 from pipeline.calibration.aprilgrid import tag_points
 from pipeline.calibration.board import Board
 from pipeline.calibration.detect import detect
@@ -106,6 +107,18 @@ def test_no_marker_at_all_says_so():
     )
 
 
+def test_markers_that_only_a_large_dictionary_has_are_named():
+    """A board with these numbers has more markers than the dictionary of our own boards."""
+    picture = np.full((400, 400), 255, np.uint8)
+    for place, number in enumerate((990, 1000, 1010, 1020)):
+        y, x = 50 + 180 * (place // 2), 50 + 180 * (place % 2)
+        marker = cv2.aruco.generateImageMarker(dictionary("APRILTAG_36H10"), number, 120)
+        picture[y : y + 120, x : x + 120] = marker
+    found = detect(picture, Board("charuco", 5, 4, 0.03))
+    assert not found.found
+    assert "4 markers of the dictionary APRILTAG_36H10 (numbers 990 to 1020) are seen" in found.reason
+
+
 @pytest.mark.parametrize("name", ["DICT_APRILTAG_36h11", "apriltag_36h11", "APRILTAG_36H11"])
 def test_a_dictionary_has_one_name_in_any_spelling(name):
     assert known_dictionary(name) == "APRILTAG_36H11"
@@ -186,6 +199,15 @@ def test_an_aprilgrid_asked_for_as_charuco_and_the_other_way_round_names_what_is
     picture, _ = drawn(Board("charuco", 5, 4, 0.03))
     reason = detect(picture, GRID).reason
     assert "15 markers of the dictionary 5X5_1000 (numbers 0 to 14); try --pattern charuco" in reason
+
+
+def test_tags_without_usable_corners_say_why_they_are_not_used(monkeypatch):
+    monkeypatch.setattr(aprilgrid, "WRONG", -1.0)  # nothing is as close to its prediction
+    refused = detect(photograph(GRID, poses(GRID)[0]), GRID)
+    assert not refused.found
+    assert (
+        "are seen, but only 0 of their corners where the tags around predict them, and it" in refused.reason
+    )
 
 
 def test_a_camera_is_calibrated_by_an_aprilgrid():

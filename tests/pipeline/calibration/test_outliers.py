@@ -1,5 +1,7 @@
 """Views that do not belong are named, and only those."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -38,6 +40,13 @@ def test_the_view_that_went_wrong_is_named_and_no_other(kind, row):
 def test_two_bad_views_are_both_found_the_worst_first():
     given = spoiled("blurred", 2, spoiled("wrong order", 7, views(0.2, 2)))
     assert [one.name for one in outlier_views(best_fit(given, SIZE), given)] == ["7", "2"]
+
+
+def test_a_rig_orders_the_views_by_moments_and_the_right_one_is_left_out():
+    given = spoiled("blurred", 2, views(0.2, 1))
+    found = best_fit(given, SIZE)
+    reordered = replace(found, views=found.views[3:] + found.views[:3])
+    assert outlier_views(reordered, given) == outlier_views(found, given)
 
 
 @pytest.mark.parametrize("row", [0, 6])

@@ -1,11 +1,14 @@
 """The demo rig that nobody has calibrated, from the photographs of a board before its three cameras."""
 
+import re
+
 import numpy as np
 import pytest
 
 from lab.claims.calibration.photograph import photograph
-from packetmesh.errors import InputError
+from packetmesh.errors import InputError, ReconstructionError
 from packetmesh.progress import drain
+from pipeline.calibration import estimate
 from pipeline.calibration.board import Board
 from pipeline.calibration.rig_from_images import iterate_rig_calibration
 from pipeline.calibration.rig_report import pose_like, rig_metrics, write_rig_folder
@@ -112,6 +115,19 @@ def test_what_is_wrong_with_one_camera_names_it(tmp_path):
         drain(iterate_rig_calibration(node_shots([tmp_path]), board))
     with pytest.raises(InputError, match=r"^node_09/color_00\.jpg is none of the cameras' images"):
         drain(iterate_rig_calibration(node_shots([tmp_path]), board, without=["node_09/color_00.jpg"]))
+
+
+def test_an_impossible_camera_names_its_worst_image_as_without_takes_it(tmp_path, monkeypatch):
+    board = Board("chessboard", 5, 4, 0.05)
+    for index, T in enumerate(poses(board, 3)):
+        for node in ("node_00", "node_01"):
+            write_color(tmp_path / node / f"color_{index}.png", np.dstack([photograph(board, T, CAMERA)] * 3))
+    monkeypatch.setattr(estimate, "MOST_RMS_PX", 1e-6)
+    with pytest.raises(ReconstructionError) as told:
+        drain(iterate_rig_calibration(node_shots([tmp_path]), board))
+    word = re.search(r"--without (node_00/color_\d\.png), ", str(told.value))[1]
+    with pytest.raises(InputError, match="is found in 2 of 3 images, 1 left out"):
+        drain(iterate_rig_calibration(node_shots([tmp_path]), board, without=[word]))
 
 
 def test_a_separate_depth_camera_is_placed_beside_its_colour_camera(tmp_path):

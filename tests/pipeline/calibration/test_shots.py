@@ -92,5 +92,5 @@ def test_the_board_is_what_is_said_then_what_its_file_says_then_the_thesiss(tmp_
         assert board_beside([where]) == Board("chessboard", 9, 6, 0.025)
     assert board_beside([node], spacing_mm=30.0) == Board("chessboard", 9, 6, 0.03)
     (tmp_path / "board.json").write_text('{"pattern": "chessboard"}')
-    with pytest.raises(InputError, match="does not say what the board is"):
+    with pytest.raises(InputError, match="lacks a valid pattern, columns, rows or spacing_mm"):
         board_beside([node])

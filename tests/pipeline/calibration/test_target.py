@@ -8,6 +8,7 @@ import pytest
 
 from packetmesh.errors import InputError
 from pipeline.calibration.board import Board
+from pipeline.calibration.detect import detect
 from pipeline.calibration.target import MARGIN_MM, Box, Disc, picture_of, sheet, write_target
 
 BOARDS = [
@@ -81,6 +82,21 @@ def test_on_a_monitor_all_pitches_are_whole_pixels(board, tmp_path):
     assert abs(shown.spacing_m - board.spacing_m) <= 0.15e-3 + 1e-9
     picture = cv2.imread(str(tmp_path / "board.png"), cv2.IMREAD_GRAYSCALE)
     assert picture.shape == picture_of(sheet(shown), 0.3).shape
+
+
+@pytest.mark.parametrize("pixel_mm", [0.277, 0.4])
+@pytest.mark.parametrize(
+    "board",
+    [Board("chessboard", 9, 6, 0.0348), Board("charuco", 7, 5, 0.0348), Board("aprilgrid", 6, 6)],
+    ids=lambda board: board.pattern,
+)
+def test_on_a_monitor_corners_are_where_the_returned_board_has_them(board, pixel_mm, tmp_path):
+    """The margin of 15 mm is 37.5 pixels of 0.4 mm, and a gap of 0.3 tags 37.8 pixels of 0.277 mm."""
+    shown = write_target(board, tmp_path / "board.png", pixel_mm)
+    found = detect(cv2.imread(str(tmp_path / "board.png"), cv2.IMREAD_GRAYSCALE), shown)
+    assert len(found.indices) == len(shown.points_m)
+    off_mm = pixel_mm * found.points_px - 1000.0 * shown.points_m[found.indices, :2]
+    np.testing.assert_allclose(off_mm - off_mm.mean(axis=0), 0.0, atol=0.02)
 
 
 @pytest.mark.parametrize(

@@ -55,6 +55,22 @@ def test_a_slope_loses_three_per_cent_of_the_mean_of_the_rings_before(axis):
     assert steps[270] / steps[220] == pytest.approx(decay**50, rel=0.01)
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_opposite_border_has_no_effect_on_a_hole(axis):
+    """A ramp of 0.05 over the image, and a hole 4 pixels from its border."""
+    shape, hole = ((320, 240), np.s_[4:60, 60:180]) if axis == 0 else ((240, 320), np.s_[60:180, 4:60])
+    field = 0.05 / 320 * np.indices(shape)[axis].astype(np.float32)
+    known = known_but(hole, shape)
+    changed = field.copy()
+    np.moveaxis(changed, axis, 0)[-1] += 0.02
+    filled, other = (
+        extrapolated(np.where(known, one, np.float32(0.0)), known, np.full((*shape, 3), 90, np.uint8))[hole]
+        for one in (field, changed)
+    )
+    np.testing.assert_allclose(filled, other, atol=1e-6)
+    assert np.abs(filled - field[hole]).max() < 0.003
+
+
 @pytest.mark.parametrize("shape", [(2, 2), (5, 700), (37, 53), (480, 640), (300, 1280)])
 @pytest.mark.parametrize("share", [0.02, 0.9])
 def test_what_is_known_stays_and_the_rest_is_finite_whatever_the_size(shape, share):

@@ -131,7 +131,7 @@ def test_a_file_of_another_kind_is_refused(tmp_path):
 
 
 def test_a_missing_network_is_refused(tmp_path):
-    with pytest.raises(InputError, match="no depth network at"):
+    with pytest.raises(InputError, match="no network file at"):
         DepthNetwork(tmp_path / "nowhere.onnx")
 
 

@@ -126,6 +126,36 @@ def test_a_line_of_another_form_is_quoted(tmp_path):
         imported(tmp_path)
 
 
+@pytest.mark.parametrize("order", ["depth first", "colour first"])
+def test_a_blank_first_depth_image_is_still_depth(tmp_path, order):
+    write(tmp_path / "recording", order)
+    cv2.imwrite(str(tmp_path / "recording" / "depth" / "0.png"), np.zeros((120, 160), np.uint16))
+    _, frames = imported(tmp_path)
+    assert [int(frame.rgb[0, 0, 0]) for frame in frames] == [60, 120]
+    for frame, T in zip(frames, POSES[1:], strict=True):
+        np.testing.assert_allclose(frame.depth.z_m, depth_of(T), atol=6e-4)
+
+
+def test_a_scale_that_is_given_is_not_said_to_be_assumed(tmp_path):
+    write(tmp_path / "recording")
+    report, _ = imported(tmp_path, depth_scale=2500.0)
+    assert any("Depth: 2500 units in a metre" in note for note in report.notes)
+    assert not any("5000" in note for note in report.notes)
+
+
+@pytest.mark.parametrize("mirror", [np.eye(4), MIRROR])
+def test_depth_tells_at_its_own_scale_whether_poses_have_y_up(tmp_path, mirror):
+    """A camera that rises over a floor, in millimetres; with 5000 units in a metre both answers are wrong."""
+    rising = [look_at((0.0, -1.0, 0.2 * k), (0.0, 0.0, 0.2 * k - 0.8)) for k in range(3)]
+    write(tmp_path / "recording", poses=[mirror @ T @ mirror for T in rising])
+    for k, T in enumerate(rising):
+        units = np.rint(1000.0 * depth_of(T)).astype(np.uint16)
+        cv2.imwrite(str(tmp_path / "recording" / "depth" / f"{k}.png"), units)
+    _, frames = imported(tmp_path, depth_scale=1000.0)
+    for found, expected in zip(steps([frame.T_world_camera for frame in frames]), steps(rising), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-6)
+
+
 def test_depth_in_millimetres_opens_with_the_option_that_the_note_names(tmp_path):
     write(tmp_path / "recording")
     _, frames = imported(tmp_path, depth_scale=1000.0)

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from pipeline.importing.bag_links import TransformLink
 from pipeline.importing.recorded import open_recording
 from pipeline.kernels.geometry import inverse, rigid, rotation_exp
 from tests.pipeline.importing.bag_parts import Images, Info, colors, wall
@@ -146,6 +147,17 @@ def test_no_pose_is_made_up_across_a_long_gap(tmp_path):
     recording = write(tmp_path / "a.bag", moved=np.concatenate([before, after]))
     assert known_in(recording) == [0, 1, 4]
     np.testing.assert_allclose(recording.T_world_camera[4], T_map_optical(START_S + 2.0), atol=1e-6)
+
+
+def test_at_its_own_time_a_transform_holds_next_to_any_gap(tmp_path):
+    """Samples 1.5 s apart; the first and the last one hold for a twentieth of a second beyond them."""
+    link = TransformLink("odom", "base", False)
+    for time_s in (0.0, 1.5, 3.0):
+        link.samples.extend((time_s, time_s, time_s, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
+    times_s = np.array([-0.04, 0.0, 0.1, 1.4, 1.5, 1.6, 3.0, 3.04, 3.06])
+    T, known = link.at(times_s, in_bag=False)
+    assert times_s[known].tolist() == [-0.04, 0.0, 1.5, 3.0, 3.04]
+    np.testing.assert_array_equal(T[known, 0, 3], [0.0, 0.0, 1.5, 3.0, 3.0])
 
 
 def test_transforms_of_another_time_give_no_poses(tmp_path):

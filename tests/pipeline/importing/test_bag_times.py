@@ -1,6 +1,7 @@
 """Moments of a bag: headers without times, and never the same moment twice."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,8 @@ import pytest
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.importing import iterate_import
-from pipeline.importing.bag_times import moments_of
+from pipeline.importing.bag_times import moments_from_middle, moments_of, times_of
+from pipeline.io.images import NoDepthError
 from pipeline.io.rigs import load_rig
 from tests.pipeline.importing.bag_parts import Images, Info, colors, wall, write_parts
 
@@ -66,13 +68,28 @@ def test_a_time_that_two_headers_have_is_one_moment(tmp_path):
 def test_a_depth_image_is_in_one_moment_only():
     """Colour every 20 ms and depth every 40 ms, 4 ms late: of two colour images the nearer one counts."""
     color_s, depth_s = np.arange(6) * 0.02, np.arange(3) * 0.04 + 0.004
-    moments = moments_of(Path("a.bag"), [color_s, depth_s], 6, one_camera=True)
+    moments = moments_of(Path("a.bag"), [color_s, depth_s])
     np.testing.assert_array_equal(moments, [[0, 0], [2, 1], [4, 2]])
+
+
+def test_moments_of_several_cameras_begin_in_the_middle():
+    """Of seven images the fourth has no partner within 50 ms; the middle is 3.5."""
+    first_s, second_s = np.arange(7) * 1.0, np.array([0.0, 1.0, 2.0, 3.2, 4.0, 5.0, 6.0])
+    moments = moments_from_middle(Path("a.bag"), [first_s, second_s])
+    np.testing.assert_array_equal(moments[:, 0], [4, 2, 5, 1, 6, 0])
+
+
+def test_one_header_without_a_time_is_no_statement_on_all_headers():
+    def topic(stamps_s):
+        return SimpleNamespace(name="/rgb", stamps_s=np.array(stamps_s), recorded_ns=np.array([5, 6, 7]))
+
+    assert times_of([topic([1.0, 0.0, 3.0])])[1][0].startswith("Some headers of /rgb have no time: ")
+    assert times_of([topic([1.0, 2.0, 3.0])])[1] == ()
 
 
 def test_all_messages_at_one_time_are_one_moment(tmp_path):
     times_s = [np.zeros(5), np.zeros(5)]
-    assert len(moments_of(Path("a.bag"), times_s, 3, one_camera=True)) == 1
+    assert len(moments_of(Path("a.bag"), times_s)) == 1
 
 
 def test_messages_that_came_at_the_same_time_are_told_apart(tmp_path):
@@ -95,7 +112,27 @@ def test_images_that_repeat_are_said(tmp_path):
     """Three times, and the same bytes: a recording that stood still."""
     repeated = Images(np.repeat(colors(1), 3, axis=0)), Images(np.repeat(wall(1), 3, axis=0))
     report, _ = imported(tmp_path, *repeated)
-    assert "2 other nodes have the very same images as node_00" in report.notes
+    assert "2 other nodes have the same images as node_00" in report.notes
+
+
+@pytest.mark.parametrize(
+    ("blank", "chosen"), [([0], [1, 5, 8]), ([0, 1, 8], [2, 4, 7]), (range(1, 9), [0]), ([], [0, 4, 8])]
+)
+def test_moments_without_depth_are_not_chosen(tmp_path, blank, chosen):
+    """As where the first image came before the sensor had started."""
+    depth = wall(9)
+    depth[list(blank)] = 0
+    report, frames = imported(tmp_path, Images(colors(9)), Images(depth))
+    assert order_of(frames, colors(9))[1] == chosen
+    notes = [note for note in report.notes if "without any depth" in note]
+    expected = f"{len(blank)} moments with a depth image without any depth were left out"
+    assert notes == ([expected] if blank else [])
+
+
+def test_a_bag_without_any_depth_is_refused(tmp_path):
+    with pytest.raises(NoDepthError, match=f"A depth image of {DEPTH} has no depth anywhere"):
+        imported(tmp_path, Images(colors(3)), Images(0 * wall(3)))
+    assert not (tmp_path / "rig").exists()
 
 
 def test_clocks_that_disagree_are_refused(tmp_path):

@@ -100,6 +100,23 @@ def write_two_cameras(path, frames):
                 bag.write(f"/cam{k}/{name}/image_raw", image, 100.0)
 
 
+def test_cameras_take_the_moment_nearest_to_the_middle_in_which_both_have_depth(tmp_path):
+    """The middle is that of three moments, in which the second camera has none; it records metres."""
+    metres = (wall(3) / 1000.0).astype(np.float32)
+    metres[1] = np.nan
+    images = {
+        f"/cam{k}/{name}": Images(values, f"optical{k}")
+        for k, depth in enumerate((wall(3), metres))
+        for name, values in (("color", colors(3)), ("depth", depth))
+    }
+    infos = {f"/cam{k}/camera_info": Info(k=K, frame=f"optical{k}") for k in range(2)}
+    report, frames = imported(tmp_path, images, infos)
+    assert [float(np.median(frame.depth.z_m)) for frame in frames] == pytest.approx([2.002, 2.002])
+    assert "1 moments with a depth image without any depth were left out" in report.notes
+    assert report.depth_scale is None
+    assert any(note.startswith("Depth: 1 or 1000 units in a metre") for note in report.notes)
+
+
 def test_cameras_of_one_frame_do_not_get_one_pose(tmp_path):
     """Two drivers that were started with the same name of the frame."""
     write_two_cameras(tmp_path / "bag.bag", ("left", "right"))

@@ -91,10 +91,10 @@ def test_one_camera_gives_moments_spread_over_the_bag(tmp_path):
                 "/cam2/color/image is left out: no camera_info of /cam2/color/image is in the bag, which has "
                 "only /cam0/color/camera_info, /cam1/color/camera_info; try to record "
                 "/cam2/color/camera_info, too",
-                "/cam2/depth/image is left out: it has no colour of its own",
+                "/cam2/depth/image is left out: no colour topic belongs to it alone",
             ],
         ),
-        (3, "cam0/color/image", 2, ["/cam0/depth/image is left out: it has no colour of its own"]),
+        (3, "cam0/color/image", 2, ["/cam0/depth/image is left out: no colour topic belongs to it alone"]),
         (8, "nothing", 8, []),
         (2, "nothing", 2, []),
     ],

@@ -50,6 +50,36 @@ def test_the_depth_scale_holds_for_depth_and_poses(tmp_path, sensor):
     np.testing.assert_allclose(rig.frames[0].depth.z_m, written.frames[0].depth.z_m / 4.0, atol=6e-4)
 
 
+@pytest.mark.parametrize(
+    ("sensor", "options", "says"),
+    [
+        (False, {}, "COLMAP's models have no scale: one unit is read as one metre; --depth-scale says"),
+        (False, {"depth_scale": 4.0}, None),
+        (True, {}, "A unit of the model is 0.5 m by"),
+        (True, {"depth_scale": 4000.0}, "A unit of the model is 0.125 m by"),
+    ],
+)
+def test_what_is_said_of_the_model_s_unit_holds_at_the_scale_that_is_used(tmp_path, sensor, options, says):
+    write_colmap(tmp_path / "model", orbit(3), metres_a_unit=0.5, sensor=sensor)
+    report = drain(iterate_import(tmp_path / "model", tmp_path / "rig", **options))
+    of_unit = [note for note in report.notes if "unit of the model" in note or "one unit" in note]
+    assert len(of_unit) == (says is not None)
+    assert all(note.startswith(says) for note in of_unit)
+
+
+def test_maps_of_some_images_and_a_sensor_s_depth_of_others_are_refused_until_one_is_moved_away(tmp_path):
+    write_colmap(tmp_path / "model", orbit(3), metres_a_unit=0.5, sensor=True)
+    maps = tmp_path / "model" / "stereo" / "depth_maps" / "room"
+    maps.mkdir(parents=True)
+    values = np.full((30, 40), 4.0, "<f4")
+    (maps / "view_0.png.geometric.bin").write_bytes(b"40&30&1&" + values.tobytes())
+    says = "has stereo/depth_maps for 1 of 3 images and a sensor's depth for the others, .*; try to move one"
+    with pytest.raises(InputError, match=says):
+        drain(iterate_import(tmp_path / "model", tmp_path / "rig"))
+    (tmp_path / "model" / "stereo").rename(tmp_path / "away")
+    assert len(drain(iterate_import(tmp_path / "model", tmp_path / "rig")).frames) == 3
+
+
 def test_depth_smaller_than_its_photograph_has_its_camera_resized(tmp_path):
     """Pixel 0 of 20 covers pixels 0 and 1 of 40, so that its centre is at 0.5 there."""
     write_colmap(tmp_path / "model", orbit(1))

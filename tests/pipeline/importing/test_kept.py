@@ -105,7 +105,7 @@ def test_a_camera_that_changes_is_refused_and_nothing_is_left(tmp_path):
 
 def test_a_folder_with_files_is_not_overwritten(tmp_path):
     write_tum(tmp_path / "tum", orbit(2))
-    with pytest.raises(InputError, match="is there already; try another name"):
+    with pytest.raises(InputError, match="is not empty; try another name"):
         kept(tmp_path / "tum", tmp_path / "tum")
     steps = iterate_keep(tmp_path / "tum", tmp_path / "out")
     told = [next(steps).fraction for _ in range(1)]

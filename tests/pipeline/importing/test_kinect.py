@@ -178,7 +178,7 @@ def without(*keys):
     [
         (
             {"titles": ("COLOR", "INFRARED")},
-            r"no depth track DEPTH .*tracks: COLOR, INFRARED, IR.*; try k4arec",
+            r"no depth track DEPTH .*tracks: COLOR, INFRARED, IR.*; try to record with k4arec",
         ),
         ({"titles": ("FILM", "DEPTH")}, r"no colour track COLOR"),
         ({"calibration": []}, r"calibration.json in .* holds no JSON object"),

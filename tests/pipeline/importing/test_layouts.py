@@ -1,6 +1,7 @@
 """Recordings in other people's layouts become the rig they were written from."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -210,9 +211,40 @@ def test_a_rig_that_is_there_is_not_overwritten(tmp_path):
     write_tum(tmp_path / "recording", orbit(2))
     (tmp_path / "rig").mkdir()
     (tmp_path / "rig" / "notes.txt").write_text("mine")
-    with pytest.raises(InputError, match="there already"):
+    with pytest.raises(InputError, match="rig is not empty; try another name"):
         imported(tmp_path)
     assert (tmp_path / "rig" / "notes.txt").read_text() == "mine"
+
+
+def test_a_file_at_the_rig_s_place_is_kept(tmp_path):
+    write_tum(tmp_path / "recording", orbit(2))
+    (tmp_path / "rig").write_text("mine")
+    with pytest.raises(InputError, match="rig exists already; try another name"):
+        imported(tmp_path)
+    assert (tmp_path / "rig").read_text() == "mine"
+
+
+def test_the_working_folder_becomes_the_rig_if_it_is_empty(tmp_path, monkeypatch):
+    written = orbit(2)
+    write_tum(tmp_path / "recording", written)
+    (tmp_path / "rig").mkdir()
+    monkeypatch.chdir(tmp_path / "rig")
+    drain(iterate_import(tmp_path / "recording", "."))
+    assert sorted(path.name for path in Path(".").iterdir()) == ["node_00", "node_01"]
+    for frame, expected in zip(load_rig(".").frames, written.frames, strict=True):
+        assert_same(frame, expected)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["recording", "rig"]
+
+
+def test_an_empty_folder_stays_empty_if_the_import_stops(tmp_path):
+    write_tum(tmp_path / "recording", orbit(2))
+    (tmp_path / "rig").mkdir()
+    steps = iterate_import(tmp_path / "recording", tmp_path / "rig")
+    while next(steps).stage != "images":
+        pass
+    assert list((tmp_path / "rig").iterdir())
+    steps.close()
+    assert list((tmp_path / "rig").iterdir()) == []
 
 
 @pytest.mark.parametrize("options", [{"frames": 0}, {"frames": 201}, {"depth_scale": 0.0}])
@@ -243,7 +275,7 @@ def test_frames_that_were_not_looked_at_and_extrinsics_that_are_missing_are_said
     write_scannet(tmp_path / "recording", written)
     report, _ = imported(tmp_path)
     assert report.candidates == 4
-    assert "Of the 10 frames one in 3 is used, so that there are at most 4" in report.notes
+    assert "One in 3 of the 10 frames is used (at most 4)" in report.notes
     assert not any("extrinsic" in note for note in report.notes)
 
 

@@ -16,7 +16,7 @@ from tests.pipeline.importing.test_layouts import assert_same
 CAMERA = {"fl_x": 30.0, "fl_y": 30.5, "cx": 20.0, "cy": 15.0, "w": 40, "h": 30, "camera_model": "OPENCV"}
 
 
-def write(folder, rig, depth_key="depth_file_path", of_frames=False):
+def write(folder, rig, depth_key="depth_file_path", of_frames=False, camera=CAMERA):
     frames = []
     for k, frame in enumerate(rig.frames):
         names = f"images/frame_{k:05d}.png", f"depths/frame_{k:05d}.png"
@@ -25,8 +25,8 @@ def write(folder, rig, depth_key="depth_file_path", of_frames=False):
         axes = frame.T_world_camera.copy()
         axes[:3, 1:3] *= -1.0
         frames.append({"file_path": names[0], depth_key: names[1], "transform_matrix": axes.tolist()})
-    shared = {} if of_frames else CAMERA
-    own = [frame | (CAMERA if of_frames else {}) for frame in frames]
+    shared = {} if of_frames else camera
+    own = [frame | (camera if of_frames else {}) for frame in frames]
     (folder / "transforms.json").write_text(json.dumps(shared | {"frames": own}))
 
 
@@ -53,6 +53,25 @@ def test_a_lens_is_that_of_the_file(tmp_path):
     file.write_text(json.dumps(json.loads(file.read_text()) | {"k1": -0.1, "p2": 1e-3}))
     _, rig = imported(tmp_path)
     np.testing.assert_array_equal(rig.frames[0].intrinsics.distortion, [-0.1, 0.0, 0.0, 1e-3, 0.0])
+
+
+@pytest.mark.parametrize("of_frames", [False, True])
+@pytest.mark.parametrize("named", [{"is_fisheye": True}, {"camera_model": "OPENCV_FISHEYE"}])
+def test_a_fisheye_is_named_by_instant_ngp_or_by_nerfstudio(tmp_path, named, of_frames):
+    lens = {"k1": 0.1, "k2": 0.02, "k3": 3e-3, "k4": 4e-4, "p1": 0.0, "p2": 0.0}
+    camera = {key: value for key, value in CAMERA.items() if key != "camera_model"} | lens | named
+    write(tmp_path / "recording", orbit(2), of_frames=of_frames, camera=camera)
+    intrinsics = imported(tmp_path)[1].frames[0].intrinsics
+    assert intrinsics.fisheye
+    np.testing.assert_array_equal(intrinsics.distortion, [0.1, 0.02, 3e-3, 4e-4])
+
+
+@pytest.mark.parametrize("model", ["EQUIRECTANGULAR", "FISHEYE624"])
+def test_a_camera_of_another_model_is_refused_by_its_name(tmp_path, model):
+    write(tmp_path / "recording", orbit(2), camera=CAMERA | {"camera_model": model})
+    with pytest.raises(InputError, match=f"transforms.json has the distortion model {model}; try"):
+        imported(tmp_path)
+    assert not (tmp_path / "rig").exists()
 
 
 def test_without_a_camera_the_option_that_names_one_helps(tmp_path):

@@ -219,6 +219,8 @@ def test_depth_without_photographs_of_3d_scanner_app_gets_a_sentence(tmp_path):
     [
         ("Stray Scanner", "odometry.csv", "time; place\n1; 2\n", "not in Stray Scanner's format"),
         ("Stray Scanner", "odometry.csv", "timestamp, frame, x\n0, 1, x\n", "not in Stray Scanner's format"),
+        ("Stray Scanner", "odometry.csv", " \n\n", "not in Stray Scanner's format"),
+        ("Stray Scanner", "odometry.csv", "timestamp, frame\n0, inf\n", "not in Stray Scanner's format"),
         ("Record3D", "metadata.json", '{"K": [1, 2], "w": 9, "h": 9}', "not in Record3D's format"),
         (
             "Record3D",

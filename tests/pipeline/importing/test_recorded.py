@@ -321,6 +321,19 @@ def test_medium_confidence_counts_a_quarter_whatever_the_app_calls_it(tmp_path, 
     assert "medium confidence counts 0.25 in the map of a camera that walks, and 1 elsewhere" in note
 
 
+def test_a_view_that_cannot_be_read_has_no_weight(tmp_path):
+    """Depth that is out of proportion, with confidence of its own size."""
+    for path in stray(tmp_path / "capture", None)[1:]:
+        cv2.imwrite(str(path), np.full((24, 40), 2, np.uint8))
+    units(tmp_path / "capture" / "depth" / "000001.png", np.full((24, 40), 2000))
+    recording = open_recording(tmp_path / "capture")
+    view = recording.view(1)
+    assert view.depth.z_m.shape == (30, 40)
+    assert not view.depth.valid.any()
+    assert view.weight is None
+    assert any("1 depth images were left out" in note for note in recording.notes)
+
+
 def test_confidence_moves_with_the_depth_of_a_bent_lens():
     """Depth and weight differ from column to column, so that a wrong pixel would be seen."""
     bent = CameraIntrinsics(CAMERA.matrix, np.array([-0.3, 0.1, 0.0, 0.0, 0.0]), 40, 30)
@@ -396,8 +409,8 @@ def test_of_a_long_recording_every_nth_frame_is_used(tmp_path, monkeypatch):
     np.testing.assert_array_equal(recording.times_s, every.times_s[[0, 3, 6]])
     np.testing.assert_array_equal(recording.T_world_camera[2], every.T_world_camera[6])
     np.testing.assert_array_equal(recording.frame(1).rgb, every.frame(3).rgb)
-    assert "Of the 7 frames one in 3 is used, so that there are at most 3" in recording.notes
-    assert not any("one in" in note for note in every.notes)
+    assert "One in 3 of the 7 frames is used (at most 3)" in recording.notes
+    assert not any("One in" in note for note in every.notes)
 
 
 def test_a_damaged_first_depth_image_is_left_out_like_any_other(tmp_path):
@@ -409,6 +422,21 @@ def test_a_damaged_first_depth_image_is_left_out_like_any_other(tmp_path):
     assert recording.view(0).depth.z_m.shape == recording.view(1).depth.z_m.shape
     assert recording.view(1).depth.valid.any()
     assert any(first.name in note for note in recording.notes)
+
+
+def test_photographs_that_cannot_be_used_are_counted_and_the_first_is_named(tmp_path):
+    """One is cut off, one has another size; both are noted when they are asked for, and only once."""
+    write_seven_scenes(tmp_path, orbit(4))
+    cut, other = (tmp_path / f"frame-00000{k}.color.png" for k in (1, 3))
+    cut.write_bytes(cut.read_bytes()[:200])
+    write_color(other, np.zeros((60, 80, 3), np.uint8))
+    recording = open_recording(tmp_path)
+    for k in (3, 1, 1):
+        with pytest.raises(InputError):
+            recording.frame(k)
+    (note,) = (note for note in recording.notes if "colour images" in note)
+    assert note.startswith("2 colour images were left out, the first because: The colour image")
+    assert f"{cut.name} is truncated or damaged" in note
 
 
 def test_a_recording_whose_depth_is_all_damaged_is_refused_with_the_first_reason(tmp_path):

@@ -268,6 +268,24 @@ def test_damage_behind_the_index_is_one_sentence(tmp_path):
     assert not recording.view(1).depth.valid.any()
 
 
+def test_images_of_another_size_are_compared_with_what_they_must_fit(tmp_path):
+    """Colour has its camera's size, and depth, which is resized, that of the first depth image."""
+    bag = BagWriter(tmp_path / "a.bag", "ros1")
+    with bag.writer:
+        bag.write("/rgb/camera_info", Info(k=CAMERA.matrix, size=(40, 30)).message(bag, 1.0), 1.0)
+        for k, size in enumerate([(40, 30), (80, 60)]):
+            bag.write("/rgb/image", Images(colors(1, size)).message(bag, 1.0 + k, 0), 1.0 + k)
+            bag.write("/depth/image", Images(wall(1, size)).message(bag, 1.0 + k, 0), 1.0 + k)
+    recording = open_recording(tmp_path / "a.bag")
+    says = "An image of /rgb/image has 80 x 60 pixels and its camera 40 x 30"
+    with pytest.raises(InputError, match=says):
+        recording.frame(1)
+    assert not recording.view(1).depth.valid.any()
+    of_depth, of_colors = recording.notes[-2:]
+    assert "/depth/image has 80 x 60 pixels and the first image of this topic 40 x 30" in of_depth
+    assert of_colors.startswith(f"1 colour images were left out, the first because: {says}")
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_opening_reports_progress_and_can_be_stopped(tmp_path, kind):
     steps = iterate_opening(write_walk(tmp_path, orbit(50), kind))

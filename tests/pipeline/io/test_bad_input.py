@@ -95,21 +95,21 @@ BAD_FILES = {
     "intrinsics: binary": (read_intrinsics, b"\xff\xfe\x80" * 9, "not a text file"),
     "intrinsics: half JSON": (read_intrinsics, camera_json()[:30], "not valid JSON"),
     "intrinsics: nested JSON": (read_intrinsics, b'{"a":' * 100_000, "not valid JSON"),
-    "intrinsics: other keys": (read_intrinsics, b'{"focal": 3}', "no known style"),
-    "intrinsics: text": (read_intrinsics, b"hello world", "no known style"),
+    "intrinsics: other keys": (read_intrinsics, b'{"focal": 3}', "no known format"),
+    "intrinsics: text": (read_intrinsics, b"hello world", "no known format"),
     "intrinsics: a focal length of no lens": (
         read_intrinsics,
         camera_json(fx=1e300),
         "a focal length of 1e\\+300 px for .* px, which no lens has",
     ),
-    "intrinsics: without fy": (read_intrinsics, b'{"fx": 3, "width": 4}', "no known style"),
-    "intrinsics: without size": (read_intrinsics, json.dumps({"K": K9}).encode(), "no known style"),
-    "intrinsics: eight numbers": (read_intrinsics, json.dumps({"K": K9[1:]}).encode(), "no known style"),
-    "intrinsics: words": (read_intrinsics, camera_json(fx="wide"), "no known style"),
+    "intrinsics: without fy": (read_intrinsics, b'{"fx": 3, "width": 4}', "no known format"),
+    "intrinsics: without size": (read_intrinsics, json.dumps({"K": K9}).encode(), "no known format"),
+    "intrinsics: eight numbers": (read_intrinsics, json.dumps({"K": K9[1:]}).encode(), "no known format"),
+    "intrinsics: words": (read_intrinsics, camera_json(fx="wide"), "no known format"),
     "intrinsics: negative": (read_intrinsics, camera_json(fx=-14.0), "focal lengths -14 and 14"),
     "intrinsics: zero": (read_intrinsics, camera_json(fy=0.0), "focal lengths 14 and 0"),
     "intrinsics: NaN": (read_intrinsics, camera_json(cx=float("nan")), "not finite"),
-    "intrinsics: infinite size": (read_intrinsics, camera_json(width=float("inf")), "no known style"),
+    "intrinsics: infinite size": (read_intrinsics, camera_json(width=float("inf")), "no known format"),
     "intrinsics: no width": (read_intrinsics, camera_json(width=-16), "image size of -16 x 12"),
     "intrinsics: wrong centre": (
         read_intrinsics,
@@ -255,7 +255,7 @@ def rig_folder(tmp_path):
 def test_sizes_that_do_not_match_are_named(rig_folder):
     write_depth_mm(rig_folder / "node_01" / "depth.png", DepthMap(np.ones((10, 16), np.float32)))
     with pytest.raises(
-        InputError, match=r"depth.png is for 16 x 10 pixels but .*color.png has 16 x 12"
+        InputError, match=r"depth.png has 16 x 10 pixels but .*color.png has 16 x 12"
     ) as error:
         load_rig(rig_folder)
     assert_one_sentence(error.value, "node_01")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.io.calibrations import CalibratedNode, write_calibration
+from pipeline.io.calibrations import CalibratedNode, calibration_files, write_calibration
 from pipeline.io.demos import SCENES
 from pipeline.io.depth_correction import DepthCorrection, write_depth_correction
 from pipeline.io.extrinsics import read_extrinsics, write_extrinsics
@@ -66,6 +66,16 @@ def test_a_depth_correction_is_applied_once_whoever_brings_it(rig, calibration):
     np.testing.assert_allclose(laid_over.frames[0].depth.z_m, 2.1, rtol=1e-6)
     assert laid_over.frames[0].noise == noise
     assert laid_over.frames[1].noise is None
+
+
+def test_a_calibration_without_poses_does_not_keep_older_ones(tmp_path):
+    """The bias of the depth sensor is written apart and stays."""
+    separate = CalibratedNode(BETTER, POSE, depth_intrinsics=CAMERA, T_color_depth=np.eye(4))
+    write_calibration(tmp_path, {"node_00": separate})
+    write_depth_correction(tmp_path / "node_00" / "depth_correction.json", DepthCorrection((16, 12)))
+    assert len(calibration_files(tmp_path, ["node_00"])["node_00"]) == 5
+    write_calibration(tmp_path, {"node_00": CalibratedNode(BETTER)})
+    assert calibration_files(tmp_path, ["node_00"])["node_00"].keys() == {"intrinsics", "depth_correction"}
 
 
 def test_the_truth_of_a_demo_stays(tmp_path):

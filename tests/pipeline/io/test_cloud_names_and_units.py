@@ -62,11 +62,31 @@ def test_headers_end_their_lines_as_they_like_and_may_be_long(tmp_path, newline,
     np.testing.assert_array_equal(read_cloud(tmp_path / "a.ply").points_m, POINTS)
 
 
-def test_rows_before_the_vertices_of_a_text_are_skipped(tmp_path):
-    header = "ply\nformat ascii 1.0\nelement camera 1\nproperty float f\nelement vertex 1\n"
+def with_a_camera(rows, count=2, cameras=1):
+    """A text PLY with one row of a camera before its vertices."""
+    header = f"ply\nformat ascii 1.0\nelement camera {cameras}\nproperty float f\nelement vertex {count}\n"
     header += "property float x\nproperty float y\nproperty float z\nend_header\n"
-    (tmp_path / "a.ply").write_text(header + "9\n1 2 3\n")
-    assert read_cloud(tmp_path / "a.ply").points_m.tolist() == [[1.0, 2.0, 3.0]]
+    return header + "".join(f"{row}\n" for row in ("9", *rows))
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
+def test_rows_before_the_vertices_of_a_text_are_skipped(tmp_path, newline):
+    text = with_a_camera(("1 2 3", "4 5 6")).replace("\n", newline)
+    (tmp_path / "a.ply").write_bytes(text.encode())
+    assert read_cloud(tmp_path / "a.ply").points_m.tolist() == [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
+
+
+@pytest.mark.parametrize(("rows", "there"), [((), 0), (("1 2 3",), 1)])
+def test_a_text_that_ends_early_counts_its_vertices_only(tmp_path, rows, there):
+    (tmp_path / "a.ply").write_text(with_a_camera(rows, count=100))
+    with pytest.raises(InputError, match=f"ends after {there} of its 100 points"):
+        read_cloud(tmp_path / "a.ply")
+
+
+def test_a_negative_number_of_rows_before_the_vertices_is_refused(tmp_path):
+    (tmp_path / "a.ply").write_text(with_a_camera(("1 2 3", "4 5 6"), cameras=-1))
+    with pytest.raises(InputError, match="unusual PLY header"):
+        read_cloud(tmp_path / "a.ply")
 
 
 def test_a_list_among_the_vertices_is_named(tmp_path):

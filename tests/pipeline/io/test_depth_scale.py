@@ -33,10 +33,10 @@ def test_millimetres_of_a_room_leave_nothing_to_say():
         (5 * MM, "--depth-scale 5000, which makes it 2."),
         (5 * (MM // 5), "--depth-scale 5000"),  # 3 m that are .6 m
         (rotated(MM), "--depth-scale 8000, which makes it 2."),
-        (16 * MM.astype(np.int32), "no room is like that: try --depth-scale 10000"),
-        (20 * MM.astype(np.int32), "no room is like that: try --depth-scale 10000"),
-        (MM // 50, "no room is like that: try --depth-scale 100"),
-        (MM.astype(np.float32) / 50.0, "no room is like that"),
+        (16 * MM.astype(np.int32), "unlikely for a room: try --depth-scale 10000"),
+        (20 * MM.astype(np.int32), "unlikely for a room: try --depth-scale 10000"),
+        (MM // 50, "unlikely for a room: try --depth-scale 100"),
+        (MM.astype(np.float32) / 50.0, "unlikely for a room"),
     ],
 )
 def test_a_wrong_scale_is_one_sentence_that_says_what_to_try(values, says):
@@ -49,7 +49,7 @@ def test_a_wrong_scale_is_one_sentence_that_says_what_to_try(values, says):
 def test_a_scale_that_a_person_gave_settles_what_the_steps_mean_but_not_a_median_of_no_room():
     assert doubts(5 * MM, 1000.0, stated=True) == ()
     assert doubts(rotated(MM), 8000.0, stated=True) == ()
-    assert "no room" in doubts(MM, 20.0, stated=True)[0]
+    assert "unlikely for a room" in doubts(MM, 20.0, stated=True)[0]
 
 
 def test_rotated_bits_are_told_where_some_depth_is_beyond_eight_metres():

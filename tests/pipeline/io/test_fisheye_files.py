@@ -128,6 +128,34 @@ def test_kalibr_s_other_models_are_not_taken_for_radtan(tmp_path):
         read_intrinsics(tmp_path / "camchain.yaml")
 
 
+COLMAP_PAIR = (
+    "1 OPENCV 640 480 500 500 320 240 0.1 -0.05 0.001 0.002\n"
+    "2 OPENCV_FISHEYE 800 600 400 400 400 300 0.01 0.02 0.03 0.04\n"
+)
+KALIBR_PAIR = (
+    "cam0:\n  intrinsics: [500.0, 500.0, 320.0, 240.0]\n  distortion_model: radtan\n"
+    "  distortion_coeffs: [0.1, -0.05, 0.001, 0.002]\n  resolution: [640, 480]\n"
+    "cam1:\n  intrinsics: [400.0, 400.0, 400.0, 300.0]\n  distortion_model: equidistant\n"
+    "  distortion_coeffs: [0.01, 0.02, 0.03, 0.04]\n  resolution: [800, 600]\n"
+)
+
+
+@pytest.mark.parametrize("text", [COLMAP_PAIR, KALIBR_PAIR])
+def test_each_camera_of_a_file_has_its_own_lens(text, tmp_path):
+    (tmp_path / "cameras.txt").write_text(text)
+    pinhole, fisheye = (read_intrinsics(tmp_path / "cameras.txt", size) for size in ((640, 480), (800, 600)))
+    assert (pinhole.fisheye, fisheye.fisheye) == (False, True)
+    np.testing.assert_array_equal(pinhole.distortion, [0.1, -0.05, 0.001, 0.002, 0.0])
+    np.testing.assert_array_equal(fisheye.distortion, [0.01, 0.02, 0.03, 0.04])
+
+
+def test_two_lenses_with_the_same_numbers_are_two_cameras(tmp_path):
+    same_numbers = "640 480 500 500 320 240 0.1 -0.05 0.001 0.002"
+    (tmp_path / "cameras.txt").write_text(f"1 OPENCV {same_numbers}\n2 OPENCV_FISHEYE {same_numbers}\n")
+    with pytest.raises(InputError, match="has 2 cameras for images of 640 x 480 pixels"):
+        read_intrinsics(tmp_path / "cameras.txt", (640, 480))
+
+
 @pytest.mark.parametrize("kind", KIND)
 def test_a_rig_keeps_its_lenses(kind, tmp_path):
     rgb, depth = np.zeros((240, 320, 3), np.uint8), DepthMap(np.ones((240, 320), np.float32))

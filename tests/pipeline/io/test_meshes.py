@@ -1,12 +1,17 @@
 """Meshes come back with their triangles, whatever the format."""
 
+import io
 import json
 
 import numpy as np
 import pytest
 import trimesh
+from trimesh.exchange.gltf import export_glb, load_glb
 
+from pipeline.io.clouds import read_cloud
 from pipeline.io.meshes import read_mesh, write_mesh
+from pipeline.io.textures import Texture
+from pipeline.kernels.open3d_runtime import o3d
 from pipeline.types import Surface
 
 
@@ -49,6 +54,80 @@ def test_a_glb_stands_upright_in_other_viewers(tmp_path):
     assert seen.bounds[1].tolist() == [1.0, 2.0, 0.0]
     data = (tmp_path / "mesh.glb").read_bytes()
     assert json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])["asset"]["version"] == "2.0"
+
+
+GREYS = np.array([0, 1, 10, 128, 200, 255], np.uint8)
+LINEAR = np.array([0.0, 0.000304, 0.003035, 0.215861, 0.577580, 1.0])
+"""Their linear light by IEC 61966-2-1: c / 12.92 up to 0.04045, then ((c + 0.055) / 1.055) ** 2.4."""
+GREY = Surface(
+    np.random.default_rng(3).normal(size=(6, 3)),
+    np.array([[0, 1, 2], [3, 4, 5]], np.int32),
+    np.repeat(GREYS[:, None], 3, axis=1),
+)
+
+
+def colors_in(path):
+    """The numbers of COLOR_0 in a file of one mesh, as they are stored."""
+    (part,) = load_glb(io.BytesIO(path.read_bytes()), skip_materials=True)["geometry"].values()
+    return part["vertex_colors"]
+
+
+def test_colours_of_a_glb_are_linear_light(tmp_path):
+    """As glTF 2.0 says in 3.7.2.1, so that viewers show the surface's own colours."""
+    write_mesh(tmp_path / "mesh.glb", GREY)
+    stored = colors_in(tmp_path / "mesh.glb")
+    assert stored.dtype == np.float32
+    np.testing.assert_allclose(stored, np.repeat(LINEAR[:, None], 3, axis=1), atol=1e-6)
+
+
+def test_colours_of_other_formats_are_as_they_were(tmp_path):
+    for suffix in (".ply", ".obj"):
+        write_mesh(tmp_path / f"mesh{suffix}", GREY)
+        found = trimesh.load(tmp_path / f"mesh{suffix}", process=False).visual.vertex_colors
+        np.testing.assert_array_equal(found[:, :3], GREY.colors)
+
+
+def test_parts_without_a_photograph_have_their_colours_in_linear_light(tmp_path):
+    """The others are white, by which the photograph is multiplied."""
+    image, uv = np.zeros((8, 8, 3), np.uint8), np.full((1, 6, 2), 0.5, "f4")
+    texture = Texture(image, np.array([0, -1], np.int32), uv)
+    write_mesh(tmp_path / "mesh.glb", GREY, texture)
+    stored = np.unique(colors_in(tmp_path / "mesh.glb")[:, 0])
+    np.testing.assert_array_equal(stored, np.unique([*np.rint(255.0 * LINEAR[3:]), 255]))
+
+
+def by_trimesh(path):
+    mesh = trimesh.Trimesh(GREY.vertices_m, GREY.triangles, vertex_colors=GREY.colors, process=False)
+    mesh.export(path)
+
+
+def by_open3d(path):
+    corners = o3d.utility.Vector3dVector(GREY.vertices_m), o3d.utility.Vector3iVector(GREY.triangles)
+    mesh = o3d.geometry.TriangleMesh(*corners)
+    mesh.vertex_colors = o3d.utility.Vector3dVector(GREY.colors / 255.0)
+    o3d.io.write_triangle_mesh(str(path), mesh)
+
+
+def by_the_standard(path):
+    """16 bits of linear light."""
+    linear = np.rint(65535 * np.repeat(LINEAR[:, None], 3, axis=1)).astype(np.uint16)
+    mesh = trimesh.Trimesh(GREY.vertices_m, GREY.triangles, process=False)
+    mesh.vertex_attributes["_C"] = np.column_stack([linear, np.full(6, 65535, np.uint16)])
+
+    def name(document):
+        attributes = document["meshes"][0]["primitives"][0]["attributes"]
+        attributes["COLOR_0"] = attributes.pop("_C")
+        document["asset"]["generator"] = "a modeller"
+
+    path.write_bytes(export_glb(trimesh.Scene(mesh), tree_postprocessor=name))
+
+
+@pytest.mark.parametrize("write", [by_trimesh, by_open3d, by_the_standard])
+def test_colours_of_others_are_read_as_they_were_meant(tmp_path, write):
+    """trimesh and Open3D store sRGB, and name themselves in the file."""
+    write(tmp_path / "mesh.glb")
+    np.testing.assert_array_equal(read_mesh(tmp_path / "mesh.glb").colors, GREY.colors)
+    np.testing.assert_array_equal(read_cloud(tmp_path / "mesh.glb").colors, GREY.colors)
 
 
 def test_an_stl_keeps_its_triangles_and_joins_its_vertices_but_has_no_colours(tmp_path, sphere):

@@ -92,7 +92,7 @@ def test_a_file_without_a_size_has_that_of_the_images(tmp_path):
     camera = read_intrinsics(path, (40, 30))
     assert (camera.width_px, camera.height_px, camera.fx_px) == (40, 30, 30.0)
     path.write_text(json.dumps({key: value for key, value in CAMERA.items() if key != "height"}))
-    with pytest.raises(InputError, match="no known style"):
+    with pytest.raises(InputError, match="no known format"):
         read_intrinsics(path, (40, 30))
 
 

@@ -1,6 +1,7 @@
 """Rig folders: what is saved is loaded, and the nodes' order and poses hold."""
 
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -10,7 +11,7 @@ from packetmesh.errors import InputError
 from pipeline.io.depth_correction import DepthCorrection, write_depth_correction
 from pipeline.io.rigs import load_frame, load_rig, save_rig
 from pipeline.kernels.geometry import LEVEL_POSE, look_at
-from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise, RgbdFrame, Rig
+from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise, RgbdFrame, Rig, RigTruth
 
 
 def small_frame(seed: int) -> RgbdFrame:
@@ -60,6 +61,22 @@ def test_a_rig_can_be_saved_over_itself(tmp_path):
     save_rig(tmp_path / "rig", rig_of(2))
     save_rig(tmp_path / "rig", Rig("rig", rig_of(2).frames[::-1]))
     np.testing.assert_array_equal(load_rig(tmp_path / "rig").frames[0].rgb, small_frame(1).rgb)
+
+
+def test_a_saved_rig_replaces_all_of_an_older_one(tmp_path):
+    """A camera without a pose and a rig without truth keep neither those of the rig before them."""
+    posed = rig_of(1).frames[0]
+    surface = np.array([[0.0, 3.0, 0.0], [4.0, 3.0, 0.0], [0.0, 3.0, 4.0]]), np.array([[0, 1, 2]], np.int32)
+    lens = CameraIntrinsics.pinhole(15.0, 15.5, 7.5, 5.5, 16, 12)
+    truth = RigTruth(*surface, (posed.T_world_camera,), (posed.depth,), (lens,))
+    save_rig(tmp_path / "rig", Rig("rig", (posed,), truth))
+    assert load_rig(tmp_path / "rig").truth is not None
+    save_rig(tmp_path / "rig", Rig("rig", (replace(posed, pose_known=False),)))
+    again = load_rig(tmp_path / "rig")
+    assert again.truth is None
+    assert not again.frames[0].pose_known
+    names = sorted(path.relative_to(tmp_path / "rig").as_posix() for path in (tmp_path / "rig").rglob("*.*"))
+    assert names == [f"node_00/{name}" for name in ("color.png", "depth.png", "intrinsics.json")]
 
 
 def test_a_node_without_pose_stands_level(tmp_path):

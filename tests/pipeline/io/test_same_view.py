@@ -41,7 +41,7 @@ def test_equal_sizes_need_no_camera():
 def test_sides_out_of_proportion_get_a_sentence(size, other):
     """Sizes of ScanNet and of a RealSense camera, whose colour and depth cameras have other views."""
     camera = CameraIntrinsics.pinhole(500.0, 500.0, size[0] / 2, size[1] / 2, *size)
-    says = f"depth.png is for {other[0]} x {other[1]} pixels but .* has {size[0]} x {size[1]}.*; try another"
+    says = f"depth.png has {other[0]} x {other[1]} pixels but .* has {size[0]} x {size[1]}.*; try another"
     with pytest.raises(InputError, match=says):
         depth_camera(camera, *other)
 

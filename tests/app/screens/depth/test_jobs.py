@@ -270,7 +270,7 @@ def test_a_chosen_model_is_fed_as_its_choice_says(tmp_path):
         (300, 256, "multiples of 32 pixels, not 300 x 256; try 288 x 256"),
         (300, None, "only one is set, to 300; try both"),
         (-32, 32, "depth.input_width_px is -32; try at least 1"),
-        (8192, 8192, "8192 x 8192 pixels; try 1 to 4096 a side"),
+        (8192, 8192, "8192 x 8192 pixels; give sides of 1 to 4096"),
     ],
 )
 def test_a_bad_input_size_is_one_sentence(tmp_path, width_px, height_px, sentence):
