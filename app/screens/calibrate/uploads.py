@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable, Sequence
+from itertools import count
 from pathlib import Path, PurePosixPath
 from typing import get_args
 
@@ -99,11 +100,11 @@ class UploadFolder:
         views = views_in(self._folder)
         if BOARD_FILE in kept:
             self._write(views)
-        count = sum(len(node.shots) for node in shots_of(views))
-        noun = "photograph" if count == 1 else "photographs"
+        total = sum(len(node.shots) for node in shots_of(views))
+        noun = "photograph" if total == 1 else "photographs"
         self._have.content = Markdown(
             "**{} {}**, the last {}. Add more, or press *Find the cameras*."
-        ).format(count, noun, kept[-1])
+        ).format(total, noun, kept[-1])
 
     def _write(self, views: BoardViews) -> None:
         """Show the board that a ZIP describes."""
@@ -144,7 +145,7 @@ def keep_photographs(file: viser.UploadedFile, folder: Path, node: str) -> list[
             f"{file.name} has {len(file.content) >> 20} MB; the app takes up to {UPLOAD_LIMIT_BYTES >> 20} "
             f"MB, so {INSTEAD}."
         )
-    photographs = {_place(file.name, node): file.content}
+    photographs = {_free_place(folder, _place(file.name, node), file.content): file.content}
     if file.name.lower().endswith(".zip"):
         photographs = _unpacked(file, node)
     elif not file.name.lower().endswith(ENDINGS):
@@ -186,6 +187,19 @@ def _place(name: str, node: str) -> str:
         return BOARD_FILE
     named = next((part for part in path.parts[:-1] if re.fullmatch(r"node_\d\d", part)), node)
     return f"{named}/{re.sub(r'[^A-Za-z0-9._-]', '-', path.name)[-60:]}"
+
+
+def _free_place(folder: Path, place: str, content: bytes) -> str:
+    """Return a place below ``folder``, with a number if it has another photograph: a telephone may name each
+    of its pictures image.jpg.
+    """
+    path, free = PurePosixPath(place), place
+    for number in count(2):
+        there = path_below(folder, free)
+        if not there.exists() or there.read_bytes() == content:
+            break
+        free = str(path.with_stem(f"{path.stem}-{number}"))
+    return free
 
 
 def _path(name: str) -> PurePosixPath:

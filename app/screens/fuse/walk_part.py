@@ -314,10 +314,10 @@ class WalkPart:
         self._picked_loop()
 
     def _numbers(self) -> Numbers:
-        """Return the numbers of the lesson's texts; empty until the walk is computed."""
+        """Return the numbers of the lesson's texts; empty until the scene's walk is computed."""
         session = self._session
-        scene = session.results.view("scene")
-        if scene is None or self._view is None:
+        if self._view is None or not session.results.fresh("scene", session.spec):
             return {}
+        scene = session.results.view("scene")
         surface = session.results.view("surface") if session.results.fresh("surface", session.spec) else None
         return numbers(scene.title, self._view, surface, enlarging(self._view))

@@ -215,6 +215,18 @@ def test_photographs_of_two_cameras_do_not_replace_each_other(tmp_path):
     assert sorted(kept) == ["board.json", "node_00/color_00.png", "node_01/color_00.png"]
 
 
+def test_photographs_of_one_name_are_all_kept(tmp_path):
+    """A telephone names each picture that it takes for a page image.jpg."""
+    contents = [b"0", b"1", b"0", b"2", b"1"]
+    kept = [
+        keep_photographs(SimpleNamespace(name="image.jpg", content=content), tmp_path, "node_00")
+        for content in contents
+    ]
+    names = ["image.jpg", "image-2.jpg", "image.jpg", "image-3.jpg", "image-2.jpg"]
+    assert kept == [[f"node_00/{name}"] for name in names]
+    assert [(tmp_path / "node_00" / name).read_bytes() for name in names] == contents
+
+
 def test_a_camera_is_found_by_its_name_alone():
     one = SimpleNamespace(name="node_00")
     view = CalibrationView(Board(), (one,))
