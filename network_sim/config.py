@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from network_sim.bounds.limits import check_limits
+from network_sim.bounds.limits import LARGEST_S, check_limits
 from packetmesh.checks import above, at_least, finite, one_each, one_of, several, share
 from packetmesh.errors import InputError
 
@@ -175,10 +175,12 @@ class NodesConfig:
             above(f"nodes.{key}", getattr(self, key), 0.0)
         share("nodes.duty_cycle", self.duty_cycle)
         if self.duty_cycle < 1.0 and self.duty_cycle * self.duty_period_s < GUARD_S:
+            period_s = 2.0 * GUARD_S / self.duty_cycle
+            longer = f"nodes.duty_period_s={period_s:.3g}"
             raise InputError(
                 f"nodes.duty_cycle is {self.duty_cycle} with a nodes.duty_period_s of {self.duty_period_s}, "
                 f"which keeps nodes awake for less than {GUARD_S} s, too short to send; try "
-                f"nodes.duty_period_s={2.0 * GUARD_S / self.duty_cycle:.3g}"
+                f"{longer if period_s < LARGEST_S else 'a larger nodes.duty_cycle'}"
             )
         nodes = f"nodes.count is {self.count}"
         places = f"x and y of each node and of the sink ({nodes})"

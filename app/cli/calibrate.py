@@ -85,7 +85,7 @@ def calibrate(
     from pipeline.calibration.from_images import image_files, iterate_calibration
     from pipeline.calibration.report import metrics, write_camera_folder
     from pipeline.calibration.shots import board_beside
-    from pipeline.folders.inputs import keep_cameras
+    from pipeline.folders.inputs import check_cameras_stay
 
     if not images:
         wrong_use("calibrate needs images of a board: files, a folder, or a pattern in quotes")
@@ -94,7 +94,7 @@ def calibrate(
         raise InputError(f"--held-out {held_out} leaves no view to predict; try 2, or 0 for none")
     if rig and one_camera:
         raise InputError("--rig and --one-camera contradict each other; give one of them")
-    keep_cameras(out)
+    check_cameras_stay(out)
     nodes = several_cameras(images, rig)
     if nodes and board_warp:
         raise InputError(

@@ -81,7 +81,9 @@ def calibrate_cameras(
     from pipeline.calibration.assess import assess
     from pipeline.calibration.rig_from_images import iterate_rig_calibration
     from pipeline.calibration.rig_report import pose_like, rig_metrics, write_rig_folder
+    from pipeline.io.calibrations import check_calibration_folder
 
+    check_calibration_folder(out, [node.name for node in nodes])
     T_world_first = pose_like(like, nodes[0].name)
     steps = iterate_rig_calibration(nodes, board, lens, held_out, without, depth_scale)
     report = drain(steps, say_progress)

@@ -56,11 +56,11 @@ def deliver(
     from pipeline.deliver import iterate_delivery
     from pipeline.delivery.sending import DeliverySpec
     from pipeline.folders.delivery import delivery_metrics, summary, write_delivery_folder
-    from pipeline.folders.run import clear_run_folder, keep_images
+    from pipeline.folders.run import check_run_folder, clear_run_folder
     from pipeline.spec import Spec
     from pipeline.stages import RunCache, compute
 
-    keep_images(out, named)
+    check_run_folder(out, named)
     source, imported = drain(iterate_imported(named, out), say_progress)
     if link_trace is not None:
         network = _with_link(network, link_trace, of_network)

@@ -68,7 +68,7 @@ def infer_depth(
         wrong_use("--completion fills the holes of measured depth: add --fill and --sensor DEPTH")
     from packetmesh.files import writable_folder
     from pipeline.depth import DepthNetwork, Overrides
-    from pipeline.folders.inputs import keep_inputs
+    from pipeline.folders.inputs import check_inputs_stay
 
     stems = [photo.stem for photo in photos]
     twice = next((stem for stem in stems if stems.count(stem) > 1), None)
@@ -78,7 +78,7 @@ def infer_depth(
             "one by one"
         )
     written = [path for stem in stems for path in _files(out, stem)]
-    keep_inputs(written, [*photos, *filter(None, (sensor, model, completion))])
+    check_inputs_stay(written, [*photos, *filter(None, (sensor, model, completion))])
     network = DepthNetwork(model, preset, Overrides(kind, size_px, normalisation, channels))
     writable_folder(out)
     report = {"model": str(network.model_path), "kind": network.convention.kind, "provider": network.provider}

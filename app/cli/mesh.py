@@ -41,13 +41,13 @@ def mesh(
             used; without it, they are found in the file.
         json: Print the quality of the mesh as one JSON object.
     """
-    from pipeline.folders.inputs import keep_inputs
+    from pipeline.folders.inputs import check_inputs_stay
     from pipeline.surface.mesh_cloud import MeshOptions, iterate_mesh_file
 
     if radii_m == ():
         wrong_use("--radii-m needs at least one radius, or auto")
     if out.is_file():
-        keep_inputs([out], [cloud])
+        check_inputs_stay([out], [cloud])
     given_m = None if radii_m == "auto" else radii_m
     options = MeshOptions(
         given_m, viewpoint, max_points, smoothing_passes, metres_per_unit, estimate_normals, columns

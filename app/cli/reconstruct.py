@@ -114,7 +114,7 @@ def _many(
 
     from app.cli.runs import HEADINGS, RigTask, iterate_rigs, rigs_in, rigs_row
     from packetmesh.files import writable_folder
-    from pipeline.folders.run import keep_images
+    from pipeline.folders.run import check_run_folder
     from pipeline.sources import RigFolder
 
     tasks = [
@@ -122,7 +122,7 @@ def _many(
         for path in rigs_in(rigs)
     ]
     for task in tasks:
-        keep_images(Path(task.out), RigFolder(task.path))
+        check_run_folder(Path(task.out), RigFolder(task.path))
     writable_folder(out)
     outcomes = drain(iterate_rigs(tasks, out, scheduler), say_progress)
     if json:

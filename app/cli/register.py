@@ -56,7 +56,7 @@ def register(
         json: Print the metrics as one JSON object.
     """
     from packetmesh.files import writable_folder
-    from pipeline.folders.inputs import keep_inputs
+    from pipeline.folders.inputs import check_inputs_stay
     from pipeline.folders.pair import FILES, answer_metrics, chosen_answer, write_register_folder
     from pipeline.io.poses import read_pose
     from pipeline.pairs.clouds import read_pair
@@ -68,7 +68,7 @@ def register(
         methods = chosen_methods(method)
     except InputError as error:
         wrong_use(str(error))
-    keep_inputs([out / name for name in FILES], filter(None, (source, target, init, truth)))
+    check_inputs_stay([out / name for name in FILES], filter(None, (source, target, init, truth)))
     config = config_for(methods, metric=metric, gate_m=gate_m, start=start, with_scale=scale)
     T_init, T_true = (None if path is None else read_pose(path) for path in (init, truth))
     moving, fixed = read_pair(source, target, columns, metres_per_unit)

@@ -30,8 +30,9 @@ from pipeline.folders.run import (
     PICTURE,
     REPORT,
     TASK,
+    check_run_folder,
     clear_run_folder,
-    keep_images,
+    is_imported,
     metrics_of,
     write_baseline,
     write_run_folder,
@@ -96,7 +97,7 @@ def iterate_run(
     Raises:
         PacketMeshError: images, settings or a folder that cannot be used.
     """
-    keep_images(out, source)
+    check_run_folder(out, source)
     rig, report = yield from iterate_imported(source, out)
     spec, cache = Spec(rig, preset, config), RunCache()
     loading = run(spec, cache, ["rig"])
@@ -137,7 +138,7 @@ def iterate_imported(
         inner, report = yield from iterate_imported(source.source, out)
         assert not isinstance(inner, Calibrated | Recorded)
         return replace(source, source=inner), report
-    if not isinstance(source, RigFolder) or is_rig(Path(source.path)) or not is_recording(Path(source.path)):
+    if not (isinstance(source, RigFolder) and is_imported(source)):
         return source, None
     rig, new = out / IMPORTED, not out.exists()
     if rig.is_dir():

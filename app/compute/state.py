@@ -122,6 +122,10 @@ class Results:
         """Whether the panels show a result of this step that does not belong to ``spec``."""
         return step in self._shown and self._shown[step] != spec.key(step)
 
+    def shown_key(self, step: Step) -> Hashable:
+        """Return the key of the result of this step that the panels show; None without one."""
+        return self._shown.get(step)
+
     def fail(self, step: Step, key: Hashable, sentence: str) -> None:
         """Record a failure, so that the step is not tried again until its key changes."""
         self._failures[step] = (key, sentence)

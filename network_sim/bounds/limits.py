@@ -12,10 +12,12 @@ from typing import Any
 
 from packetmesh.errors import InputError
 
+LARGEST_S = 1e9
+"""Largest time of a setting."""
 _MOST = {
     "db": 300.0,
     "dbm": 300.0,
-    "s": 1e9,
+    "s": LARGEST_S,
     "m": 1e9,
     "hz": 1e15,
     "bps": 1e15,

@@ -61,7 +61,8 @@ def _by_markers(gray: ByteArray, board: Board, seen: Markers) -> tuple[Detection
         )
         if ids is not None and len(ids) >= FEW_CORNERS:
             points_px = np.asarray(corners, float).reshape(-1, 2)
-            return Detection(points_px, np.asarray(ids).ravel().astype(np.int64)), len(ids)
+            indices = np.asarray(ids).ravel().astype(np.int64)
+            return Detection(points_px, indices, legacy=legacy), len(ids)
         most = max(most, 0 if ids is None else len(ids))
     return None, most
 

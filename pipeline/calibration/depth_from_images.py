@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -45,11 +45,12 @@ def with_depth(
     """
     if not depths:
         return report
-    calibration = (depth_camera or report).calibration
+    own = depth_camera or report
+    legacy = [name for name, one in own.detections.items() if one.legacy]
     try:
-        images = _read(calibration, depths, depth_scale)
+        images = _read(own.calibration, depths, depth_scale)
         report = replace(report, depth_notes=_doubts(images))
-        found = _fit(calibration, images, report.board)
+        found = _fit(own.calibration, images, report.board, legacy)
     except InputError as error:
         return replace(report, depth_reason=str(error))
     return replace(report, depth=found)
@@ -77,9 +78,11 @@ def _read(
     return {name: read_depth_noted(depths[name], depth_scale) for name in names}
 
 
-def _fit(calibration: Calibration, images: Mapping[str, ReadDepth], board: Board) -> DepthFit:
+def _fit(
+    calibration: Calibration, images: Mapping[str, ReadDepth], board: Board, legacy: Collection[str] = ()
+) -> DepthFit:
     measured = [images[view.name].depth if view.name in images else None for view in calibration.views]
-    return fit_depth(board_depth_samples(calibration, measured, board))
+    return fit_depth(board_depth_samples(calibration, measured, board, legacy))
 
 
 def _doubts(images: Mapping[str, ReadDepth]) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -72,7 +72,10 @@ class DepthSamples:
 
 
 def board_depth_samples(
-    calibration: Calibration, depths: Sequence[DepthMap | None], board: Board
+    calibration: Calibration,
+    depths: Sequence[DepthMap | None],
+    board: Board,
+    legacy: Collection[str] = (),
 ) -> DepthSamples:
     """Collect measured and true depth of a board.
 
@@ -81,12 +84,13 @@ def board_depth_samples(
     are at least ``RIM_PX`` inside the outermost points, so that none mixes the board with the background.
     Pixels on black print are marked: they reflect less infrared, and the fit does not use them. Markers of
     ChArUco boards and AprilGrids count as black as a whole, because programs print them with different cells.
-    A ChArUco board is taken to have the layout of OpenCV 4.6 and later, and markers of ``MARKER_SHARE``.
+    The markers of a ChArUco board are taken to be of ``MARKER_SHARE``.
 
     Args:
         calibration: the lens with its uncertainty, and its views.
         depths: (H, W) metric depth of each view on the image's pixel grid; None for a view without depth.
         board: the board in the views.
+        legacy: names of the views of a ChArUco board in the layout of OpenCV before 4.6.
 
     Raises:
         InputError: there is no depth on the board, or a depth image has another size or unit.
@@ -96,7 +100,8 @@ def board_depth_samples(
     for view, depth in zip(calibration.views, depths, strict=True):
         if depth is None:
             continue
-        part = _samples_of(view, depth, calibration.size_px, lenses, errors, board, len(parts))
+        printed = board, view.name in legacy
+        part = _samples_of(view, depth, calibration.size_px, lenses, errors, *printed, len(parts))
         if len(part) >= FEWEST:
             parts.append(part)
     if not parts:
@@ -145,6 +150,7 @@ def _samples_of(
     lenses: Sequence[Optics],
     errors: FloatArray,
     board: Board,
+    legacy: bool,
     index: int,
 ) -> DepthSamples:
     """Collect the pixels of one view."""
@@ -172,7 +178,7 @@ def _samples_of(
         true_m=true_m,
         cosine=np.abs(rays @ T[:3, 2]) / np.linalg.norm(rays, axis=1),
         view=np.full(len(pixels), index),
-        ink=_on_ink(board, T, rays * true_m[:, None], INK_PX / focal_px),
+        ink=_on_ink(board, legacy, T, rays * true_m[:, None], INK_PX / focal_px),
         names=(view.name,),
         lens_m=np.array(moved_m).reshape(len(moved_m), len(pixels)),
         lens_focal=np.array([float(one.matrix[0, 0]) / focal_px - 1.0 for one in lenses[1:]]),
@@ -241,11 +247,15 @@ def _plane_m(T_camera_board: FloatArray, rays: FloatArray) -> FloatArray:
     return (normal @ T_camera_board[:3, 3]) / (rays @ normal)
 
 
-def _on_ink(board: Board, T_camera_board: FloatArray, points_m: FloatArray, px: float) -> BoolArray:
+def _on_ink(
+    board: Board, legacy: bool, T_camera_board: FloatArray, points_m: FloatArray, px: float
+) -> BoolArray:
     """Return (N,) True for points within ``px`` of black print, a marker counting as black as a whole.
 
     Args:
         board: the board.
+        legacy: whether a ChArUco board has the layout of OpenCV before 4.6, which begins with a white square
+            if the number of rows of squares is even.
         T_camera_board: (4, 4) pose of the board.
         points_m: (N, 3) points in the camera's frame.
         px: widening of black areas in units of the focal length: pixels over the focal length.
@@ -264,6 +274,7 @@ def _on_ink(board: Board, T_camera_board: FloatArray, points_m: FloatArray, px: 
         return (beside_tag[:, 0] == beside_tag[:, 1]) | (edges_m.min(axis=1) <= rim_m)
     squares = from_first_m / board.spacing_m
     from_edge_m = np.abs(squares - np.rint(squares)).min(axis=1) * board.spacing_m
-    black = np.floor(squares).sum(axis=1) % 2 == 0
+    first_white = legacy and board.rows % 2 == 1
+    black = np.floor(squares).sum(axis=1) % 2 == first_white
     white_m = 0.5 * (1.0 - MARKER_SHARE) * board.spacing_m if board.pattern == "charuco" else np.inf
     return black | (from_edge_m <= rim_m) | (from_edge_m >= white_m - rim_m)

@@ -25,6 +25,8 @@ class Detection:
     """(B, 2) circle-like blobs, if the board was not found."""
     oriented: bool = True
     """Whether a mark or the pattern showed the orientation; if not, all points may be rotated by 180°."""
+    legacy: bool = False
+    """Whether a ChArUco board has the layout of OpenCV before 4.6."""
 
     @property
     def found(self) -> bool:

@@ -133,23 +133,20 @@ def coordinate_sd_px(views: Sequence[FittedView], lens: Lens) -> float:
     return float(np.sqrt((every**2).sum() / freedom))
 
 
-def calibrate(
-    views: Sequence[View], size_px: tuple[int, int], lens: Lens = "thesis", camera: str = ""
-) -> Calibration:
+def calibrate(views: Sequence[View], size_px: tuple[int, int], lens: Lens = "thesis") -> Calibration:
     """Estimate a camera.
 
     Args:
         views: at least three, tilted differently.
         size_px: width and height of all images.
         lens: distortion model.
-        camera: name of the camera if there are several; advice then names images as node_01/color_03.png.
 
     Raises:
         InputError: there are too few views, or the lens model is unknown.
         ReconstructionError: the views do not determine the lens, or the camera that fits best cannot exist.
     """
     found = best_fit(views, size_px, lens)
-    check_possible(found, camera)
+    check_possible(found)
     return found
 
 
@@ -173,12 +170,8 @@ def best_fit(views: Sequence[View], size_px: tuple[int, int], lens: Lens = "thes
     return calibration_of(views, poses, optics, size_px)
 
 
-def check_possible(found: Calibration, camera: str = "") -> None:
+def check_possible(found: Calibration) -> None:
     """Check that a camera of these parameters can exist.
-
-    Args:
-        found: the camera.
-        camera: its name if there are several.
 
     Raises:
         ReconstructionError: a focal length is negative, pixels are far from square, the principal point is
@@ -202,8 +195,8 @@ def check_possible(found: Calibration, camera: str = "") -> None:
     worst = max(found.views, key=lambda view: view.rms_px)
     raise ReconstructionError(
         f"The camera that fits best {wrong}, so it cannot be right; show the board in more of the image, "
-        "tilted by 20 to 40° to different sides, try another --lens, or leave out the worst image "
-        f"(--without {f'{camera}/' if camera else ''}{worst.name}, {worst.rms_px:.2g} px)"
+        "tilted by 20 to 40° to different sides, try another lens, or leave out the worst image, "
+        f"{worst.name} ({worst.rms_px:.2g} px)"
     )
 
 

@@ -167,7 +167,6 @@ def iterate_calibration(
     without: Sequence[str] = (),
     warp: bool = False,
     one_camera: bool = False,
-    camera: str = "",
 ) -> Generator[Progress, None, CameraReport]:
     """Find the board in every image and estimate the camera.
 
@@ -184,7 +183,6 @@ def iterate_calibration(
         warp: whether to also estimate the board's points, and use them if held-out views then fit better;
             it takes two folds at least.
         one_camera: whether one camera took all images even if series of their names fit better alone.
-        camera: name of the camera if there are several, for advice.
 
     Yields:
         Progress before each image and each later step.
@@ -206,7 +204,7 @@ def iterate_calibration(
     if len(views) < LEAST_VIEWS:
         raise InputError(_too_few(detections, without, board, len(views)))
     yield Progress("estimating the camera", 0.7)
-    calibration = calibrate(views, size_px, lens, camera)
+    calibration = calibrate(views, size_px, lens)
     if not one_camera:
         check_series_agree(calibration, views, paths)
     if board.pattern in ("circles", "circles-asymmetric"):
@@ -215,13 +213,13 @@ def iterate_calibration(
             yield Progress(f"centring circles in {view.name}", 0.7 + 0.2 * len(again) / len(views))
             gray = cv2.cvtColor(read_color(paths[view.name]), cv2.COLOR_RGB2GRAY)
             again.append(replace(view, points_px=refined_px(gray, board, fitted, calibration.optics)))
-        better = calibrate(again, size_px, lens, camera)
+        better = calibrate(again, size_px, lens)
         if better.rms_px <= calibration.rms_px:
             views, calibration = again, better
     yield Progress("holding views out", 0.9)
     bent = board_warp(views, size_px, board, _folds(max(folds, 2), len(views)), lens) if warp else None
     if bent is not None and bent.helps:
-        check_possible(bent.calibration, camera)
+        check_possible(bent.calibration)
         views = [replace(view, board_m=bent.board_m) for view in views]
         return CameraReport(
             board, detections, tuple(views), bent.calibration, bent.held_out, tuple(without), bent

@@ -123,7 +123,7 @@ def iterate_rig_calibration(
         left_out[name].append(image)
     reports: dict[str, CameraReport] = {}
     for index, (name, files) in enumerate(images.items()):
-        steps = iterate_calibration(list(files), board, lens, 0, left_out[name], camera=name)
+        steps = iterate_calibration(list(files), board, lens, 0, left_out[name])
         begin, end = (ALONE * share / len(images) for share in (index, index + 1))
         try:
             reports[name] = yield from part(steps, name, begin, end, detail=True)
@@ -156,7 +156,7 @@ def cameras_together(
     rig = calibrate_rig({name: one.calibration for name, one in reports.items()}, seen, board, folds)
     for name, found in rig.cameras.items():
         try:
-            check_possible(found, name)
+            check_possible(found)
         except ReconstructionError as error:
             raise ReconstructionError(f"{name}: {error}") from None
     together = {

@@ -13,7 +13,7 @@ from pipeline.calibration.assess import Trust
 from pipeline.calibration.report import METRICS, metrics, write_camera_folder
 from pipeline.calibration.rig_from_images import RigReport
 from pipeline.calibration.shots import INFRARED
-from pipeline.io.calibrations import delete_files, write_calibration
+from pipeline.io.calibrations import check_calibration_folder, delete_files, write_calibration
 from pipeline.io.poses import read_pose
 from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.types import AnyPath, FloatArray
@@ -51,15 +51,17 @@ def write_rig_folder(
         A sentence for each file whose format cannot store the lens.
 
     Raises:
-        InputError: the folder cannot be written.
+        InputError: the folder cannot be written, is a rig with images, or has a calibration of other nodes.
     """
+    nodes = report.nodes(T_world_first)
+    check_calibration_folder(folder, nodes)
     delete_files(folder, (METRICS,))
+    write_calibration(folder, nodes)
     sentences = []
     for name, one in report.cameras.items():
         if not name.endswith(INFRARED):
             told = write_camera_folder(one, folder / name, trust.get(name))
             sentences += [f"{name}: {sentence}" for sentence in told]
-    write_calibration(folder, report.nodes(T_world_first))
     with atomic_path(folder / METRICS) as sibling:
         sibling.write_text(json.dumps(finite(rig_metrics(report, trust)), indent=1, allow_nan=False) + "\n")
     return sentences

@@ -109,7 +109,7 @@ def series_shots(files: Sequence[Path]) -> tuple[NodeShots, ...]:
         )
     if len(series) > MOST_CAMERAS:
         raise InputError(f"The images are of {len(series)} cameras, and a rig has at most {MOST_CAMERAS}")
-    numbered = all(len({_moment(rest) for rest in paths.values()}) == len(paths) for paths in series.values())
+    numbered = all(len(set(map(moment_of, paths.values()))) == len(paths) for paths in series.values())
     return tuple(
         NodeShots(
             f"node_{index:02d}",
@@ -228,7 +228,7 @@ def _by_moment(images: Mapping[Path, str], numbered: bool = True) -> dict[str, P
     """
     found: dict[str, Path] = {}
     for path, stem in images.items():
-        moment = _moment(stem) if numbered else stem
+        moment = moment_of(stem) if numbered else stem
         if moment in found:
             raise InputError(
                 f"{found[moment]} and {path.name} are both of moment {moment}; give each camera's images a "
@@ -238,7 +238,7 @@ def _by_moment(images: Mapping[Path, str], numbered: bool = True) -> dict[str, P
     return found
 
 
-def _moment(stem: str) -> str:
-    """Return the last number in a name without leading zeros, or else the whole name."""
+def moment_of(stem: str) -> str:
+    """Return an image's moment: the last number in its name without leading zeros, or else the name."""
     number = _LAST_NUMBER.search(stem)
     return stem if number is None else number[1].lstrip("0") or "0"

@@ -83,7 +83,7 @@ def board_warp(
     if len(views) <= LEAST_VIEWS:
         raise InputError(
             f"A board's warp takes {LEAST_VIEWS + 1} views, because some are held out, and {len(views)} are "
-            "given; take more, or do without --board-warp"
+            "given; take more, or assume that the board is flat"
         )
     if any(len(view.points_px) != len(board.points_m) for view in views):
         raise InputError("A board's warp needs views of the whole board; leave out those of a part of it")
@@ -124,8 +124,8 @@ def _released(
             )
     except cv2.error:
         raise ReconstructionError(
-            "The views do not determine lens and board together; take more, tilted to all sides, or do "
-            "without --board-warp"
+            "The views do not determine lens and board together; take more, tilted to all sides, or "
+            "assume that the board is flat"
         ) from None
     board_m = np.asarray(board_m, float).reshape(-1, 3)
     bent = [replace(view, board_m=board_m) for view in views]

@@ -9,7 +9,7 @@ from packetmesh.errors import InputError
 from pipeline.io.rigs import is_pair
 
 
-def keep_inputs(replaced: Iterable[Path], inputs: Iterable[Path]) -> None:
+def check_inputs_stay(replaced: Iterable[Path], inputs: Iterable[Path]) -> None:
     """Check that no file or folder that a command replaces is one of its inputs, or contains one.
 
     Raises:
@@ -21,7 +21,7 @@ def keep_inputs(replaced: Iterable[Path], inputs: Iterable[Path]) -> None:
             raise InputError(f"The results would replace {given}, an input; try another place for --out")
 
 
-def keep_cameras(folder: Path) -> None:
+def check_cameras_stay(folder: Path) -> None:
     """Check that a calibration in a folder would not replace the camera files of an RGB-D pair or a rig.
 
     Raises:

@@ -13,7 +13,7 @@ from packetmesh.files import delete_unfinished, file_trouble, write_json
 from packetmesh.memory import peak_memory_bytes
 from packetmesh.settings import settings
 from pipeline.config import Baseline
-from pipeline.folders.inputs import keep_inputs
+from pipeline.folders.inputs import check_inputs_stay
 from pipeline.folders.keyframes import FOLDER as KEYFRAMES
 from pipeline.folders.keyframes import delete_keyframes
 from pipeline.folders.walk import FILES as WALK_FILES
@@ -28,7 +28,7 @@ from pipeline.merging import MergedClouds
 from pipeline.placement.agreement import Agreement
 from pipeline.placement.outcome import NodeRegistration, NodeVerdict
 from pipeline.reconstruct import Reconstruction
-from pipeline.sources import FileSource
+from pipeline.sources import Calibrated, FileSource, RigFolder
 from pipeline.spec import Spec
 from pipeline.stages import dressed
 from pipeline.types import PointCloud, PointSource, RgbdFrame, SurfaceResult
@@ -43,18 +43,22 @@ REPORT, PICTURE, TASK = "report.html", "picture.jpg", "task.json"
 """Report of one rig; of one of many rigs also a picture of its surface, and the record of its inputs."""
 MOMENTS = "moments.csv"
 DELIVERY_FILES = (MOMENTS, "delivery.html", "delivery.gif")
-FILES = (
-    METRICS, TASK, "config.json", "poses.json", *WALK_FILES, *CLOUD_FILES, *MESH_FILES, MEASURING,
-    *BASELINE_FILES, REPORT, PICTURE, *DELIVERY_FILES,
-)  # fmt: skip
-"""All files that ``reconstruct`` and ``deliver`` write into a run folder."""
+SETTINGS = "config.json"
+FILES = (METRICS, SETTINGS, "poses.json", *WALK_FILES, *CLOUD_FILES, *MESH_FILES, MEASURING)
+OTHER_FILES = (TASK, *BASELINE_FILES, REPORT, PICTURE, *DELIVERY_FILES)
+"""Files that every run writes, and those that some runs of ``reconstruct`` and ``deliver`` write."""
 IMPORTED = "imported"
 """Folder of a run with the rig that was imported from its recording."""
-CLEARED = (*FILES, KEYFRAMES, IMPORTED)
-"""What a run deletes of an earlier one; the imported rig only if it imports one itself."""
 
 
-def keep_images(folder: Path, source: FileSource) -> None:
+def is_imported(source: FileSource) -> bool:
+    """Return whether a source is a recording that is given as a rig, and is imported before it is used."""
+    if isinstance(source, Calibrated):
+        return is_imported(source.source)
+    return isinstance(source, RigFolder) and not is_rig(Path(source.path)) and is_recording(Path(source.path))
+
+
+def check_run_folder(folder: Path, source: FileSource) -> None:
     """Check that neither ``clear_run_folder`` nor an import would delete images in a run folder.
 
     Raises:
@@ -65,17 +69,22 @@ def keep_images(folder: Path, source: FileSource) -> None:
             f"{folder} is a rig or a recording, and the results would replace some of its files; try another "
             "place for --out"
         )
-    keep_inputs([folder / name for name in CLEARED], source.paths)
+    cleared = (*FILES, *OTHER_FILES, KEYFRAMES, *([IMPORTED] if is_imported(source) else []))
+    check_inputs_stay([folder / name for name in cleared], source.paths)
 
 
 def clear_run_folder(folder: Path) -> None:
     """Delete the files and keyframes of an earlier run, complete or interrupted, the metrics first.
 
+    Those that only some runs write are deleted if the folder has the settings of a run: others may be the
+    user's.
+
     Raises:
         InputError: the folder cannot be written.
     """
+    others = OTHER_FILES if (folder / SETTINGS).is_file() else ()
     try:
-        for name in FILES:
+        for name in (*others, *FILES):
             (folder / name).unlink(missing_ok=True)
         delete_keyframes(folder)
         delete_unfinished(folder)
@@ -109,7 +118,7 @@ def write_run_folder(
     Raises:
         InputError: the folder cannot be written.
     """
-    files = [folder / "config.json", folder / "poses.json"]
+    files = [folder / SETTINGS, folder / "poses.json"]
     write_json(files[0], config or config_of(reconstruction.spec))
     write_json(files[1], metrics["poses"])
     if reconstruction.rig.walk is not None:

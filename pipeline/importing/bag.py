@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from packetmesh.progress import Progress
+from packetmesh.progress import Progress, part
 from pipeline.importing.bag_depth import BagScale, place_of_depth
 from pipeline.importing.bag_messages import color_of
 from pipeline.importing.bag_reader import BagReader, opened_bag
@@ -16,8 +16,12 @@ from pipeline.importing.bag_times import moments_from_middle, moments_of, times_
 from pipeline.importing.bag_topics import Topic, iterate_scan, message_of, of_separate_cameras, pairs_of
 from pipeline.importing.bag_transforms import Transforms
 from pipeline.importing.rig_folder import NodeImages
+from pipeline.importing.sequence import left_out_note
 from pipeline.io.images import NoDepthError
 from pipeline.types import FloatArray, IntArray
+
+MOST_BLANK = 300
+"""Most moments without depth that are read before the search for others ends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +59,7 @@ def iterate_bag(path: Path, frames: int, depth_scale: float | None) -> Generator
             NoDepthError if every moment has a depth image without depth.
     """
     with opened_bag(path) as reader:
-        scanned = yield from iterate_scan(reader)
+        scanned = yield from part(iterate_scan(reader), "messages", 0.0, 0.8, detail=True)
         transforms = scanned.transforms
         pairs, left_out = pairs_of(path, reader, scanned.colors, scanned.depths)
         pairs, smaller = of_separate_cameras(pairs)
@@ -66,53 +70,58 @@ def iterate_bag(path: Path, frames: int, depth_scale: float | None) -> Generator
         poses, why = _poses(transforms, [color.frame for color, _ in pairs])
         notes += why
 
-        def nodes_at(moment: IntArray) -> list[BagNode]:
-            nodes = []
+        def check_depth(moment: IntArray) -> None:
+            for (_, depth), at in zip(pairs, moment[1::2].tolist(), strict=True):
+                message = message_of(reader, depth.name, depth.recorded_ns, at)
+                BagScale.of(reader, depth.name, depth_scale).read(message)
+
+        if len(pairs) == 1:
+            choosing = _iterate_moments(moments_of(path, times_s), frames, check_depth)
+        else:
+            choosing = _iterate_moments(moments_from_middle(path, times_s), 1, check_depth)
+        chosen, blank = yield from part(choosing, "depth", 0.8, 1.0)
+        nodes = []
+        for moment in chosen:
             for index, (pair, T_world_color) in enumerate(zip(pairs, poses, strict=True)):
                 at = moment[2 * index : 2 * index + 2]
                 images, units = _node(reader, pair, at, depth_scale, T_world_color, transforms)
                 nodes.append(BagNode(float(times_s[2 * index][at[0]]), images, units))
-            return nodes
-
-        if len(pairs) == 1:
-            chosen = _iterate_moments(moments_of(path, times_s), frames, nodes_at)
-        else:
-            chosen = _iterate_moments(moments_from_middle(path, times_s), 1, nodes_at)
-        nodes, blank = yield from chosen
         notes += [f"{node.images.depth_name}: {note}" for node in nodes for note in node.images.notes]
         notes += [*blank, *_repeated([node.images for node in nodes])]
         return BagNodes(tuple(nodes), len(times_s[0]), tuple(dict.fromkeys(notes)))
 
 
 def _iterate_moments(
-    moments: IntArray, count: int, nodes_at: Callable[[IntArray], list[BagNode]]
-) -> Generator[Progress, None, tuple[list[BagNode], tuple[str, ...]]]:
-    """Read the nodes of ``count`` evenly spread moments in which all depth images have depth, and a note.
+    moments: IntArray, count: int, check_depth: Callable[[IntArray], None]
+) -> Generator[Progress, None, tuple[IntArray, tuple[str, ...]]]:
+    """Choose ``count`` evenly spread moments in which all depth images have depth; also returns a note.
+
+    The depth of a moment is read once. After ``MOST_BLANK`` moments without, those known to have it remain.
 
     Args:
         moments: (N, topics) indices of messages; of one moment the first counts.
         count: number of moments; all if there are fewer.
-        nodes_at: reads the nodes of a moment.
+        check_depth: raises a NoDepthError for a moment in which a depth image has no depth.
 
     Raises:
-        InputError: an image cannot be read; NoDepthError if every moment has a depth image without depth.
+        InputError: an image cannot be read; NoDepthError if no moment that was tried has depth in all images.
     """
-    total = len(moments)
+    left, good, blank = np.arange(len(moments)), set[int](), 0
     while True:
-        nodes = []
-        for at in np.linspace(0, len(moments) - 1, min(count, len(moments))).round().astype(int):
-            try:
-                nodes += nodes_at(moments[at])
-            except NoDepthError:
-                if len(moments) == 1:
-                    raise
-                moments = np.delete(moments, at, axis=0)
-                yield Progress("depth", 1.0)
-                break
-        else:
-            left_out = total - len(moments)
-            note = f"{left_out} moments with a depth image without any depth were left out"
-            return nodes, (note,) if left_out else ()
+        chosen = left[np.linspace(0, len(left) - 1, min(count, len(left))).round().astype(int)]
+        unknown = [at for at in chosen.tolist() if at not in good]
+        if not unknown:
+            note = left_out_note(blank, "moment", "with a depth image without any depth")
+            return moments[chosen], note
+        yield Progress(f"depth of moment {len(good) + blank}", (len(good) + blank) / len(moments))
+        try:
+            check_depth(moments[unknown[0]])
+            good.add(unknown[0])
+        except NoDepthError:
+            blank += 1
+            left = left[left != unknown[0]] if blank < MOST_BLANK else np.array(sorted(good))
+            if not len(left):
+                raise
 
 
 def _poses(transforms: Transforms, frames: list[str]) -> tuple[list[FloatArray | None], tuple[str, ...]]:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import cv2
 import numpy as np
@@ -133,22 +133,35 @@ def first_depth_values(folder: Path, images: Iterable[AnyImage]) -> NDArray[Any]
     return values
 
 
-@contextmanager
-def entered(unreadable: dict[int, str], index: int) -> Iterator[None]:
-    """Enter the error of a frame's image in ``unreadable`` and raise it again."""
-    try:
-        yield
-    except InputError as error:
-        unreadable[index] = str(error)
-        raise
+class Unusable:
+    """Errors of the images of a recording that could not be used, entered when these are read."""
 
+    def __init__(self) -> None:
+        """Begin without any."""
+        self._errors: dict[str, dict[int, str]] = {"depth": {}, "colour": {}}
 
-def unreadable_note(what: str, unreadable: Mapping[int, str]) -> tuple[str, ...]:
-    """Return a note on the images (``what``) that could not be read, from their errors by frame, if any."""
-    if not unreadable:
-        return ()
-    first = unreadable[min(unreadable)]
-    return (f"{len(unreadable)} {what} images were left out, the first because: {first}",)
+    @contextmanager
+    def entered(self, what: Literal["depth", "colour"], index: int) -> Iterator[None]:
+        """Enter the error of a frame's image and raise it again; an image without depth is no error."""
+        try:
+            yield
+        except NoDepthError:
+            raise
+        except InputError as error:
+            self._errors[what][index] = str(error)
+            raise
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A sentence on the depth images and one on the colour images, if there are any."""
+        return tuple(self._note(what, errors) for what, errors in self._errors.items() if errors)
+
+    @staticmethod
+    def _note(what: str, errors: Mapping[int, str]) -> str:
+        first = errors[min(errors)]
+        if len(errors) == 1:
+            return f"1 {what} image could not be used: {first}"
+        return f"{len(errors)} {what} images could not be used, the first because: {first}"
 
 
 @lru_cache(maxsize=2)

@@ -17,7 +17,7 @@ from pipeline.importing.depth_units import depth_in
 from pipeline.importing.kinds import kind_of
 from pipeline.importing.reading import MOST_CANDIDATES, check_bag_intrinsics, check_scale, read_sequence
 from pipeline.importing.rig_folder import NodeImages, check_new, new_folder, write_node
-from pipeline.importing.sequence import SAME_VIEW_REMEDY, Candidate, Sequence
+from pipeline.importing.sequence import SAME_VIEW_REMEDY, Candidate, Sequence, left_out_note
 from pipeline.importing.stored import read_color_of
 from pipeline.importing.upright import upright
 from pipeline.io.images import NoDepthError, ReadDepth
@@ -163,7 +163,7 @@ def _chosen(sequence: Sequence, frames: int) -> tuple[Sequence, tuple[int, ...],
             kept = sequence.candidates[:at] + sequence.candidates[at + 1 :]
             sequence = replace(sequence, candidates=kept)
             continue
-        notes = (f"{left_out} frames without any depth were left out",) if left_out else ()
+        notes = left_out_note(left_out, "frame", "without any depth")
         return replace(sequence, notes=(*sequence.notes, *notes)), chosen, middle
 
 

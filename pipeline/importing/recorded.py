@@ -16,10 +16,9 @@ from pipeline.importing.depth_units import depth_in, weighted_depth_in
 from pipeline.importing.depth_views import (
     DepthCamera,
     DepthView,
-    entered,
+    Unusable,
     first_with_depth,
     frame_of,
-    unreadable_note,
     view_of,
 )
 from pipeline.importing.kinds import kind_of
@@ -43,10 +42,7 @@ class FolderRecording:
     """Name of the kind of recording."""
     folder: Path
     sequence: Sequence
-    unreadable: dict[int, str] = field(default_factory=dict, compare=False)
-    """Error of each frame whose depth image could not be read, entered when it is read."""
-    unreadable_colors: dict[int, str] = field(default_factory=dict, compare=False)
-    """Error of each frame whose colour image could not be used, entered when it is read."""
+    unusable: Unusable = field(default_factory=Unusable, compare=False)
 
     @property
     def name(self) -> str:
@@ -67,8 +63,7 @@ class FolderRecording:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes; none on missing poses, because poses can be tracked and a camera may stand still."""
-        colors = unreadable_note("colour", self.unreadable_colors)
-        return (*self.sequence.notes, *unreadable_note("depth", self.unreadable), *colors)
+        return (*self.sequence.notes, *self.unusable.notes)
 
     def view(self, index: int) -> DepthView:
         """Read the depth of a frame; it is all NaN without any depth, or if the image cannot be read.
@@ -77,12 +72,11 @@ class FolderRecording:
         """
         candidate, weight = self.sequence.candidates[index], None
         try:
-            read, weight = weighted_depth_in(candidate, self.sequence)
-            z_m = read.depth.z_m
-            depth_camera = self._depth_camera_of(candidate, z_m.shape)
-        except InputError as error:
-            if not isinstance(error, NoDepthError):
-                self.unreadable[index] = str(error)
+            with self.unusable.entered("depth", index):
+                read, weight = weighted_depth_in(candidate, self.sequence)
+                z_m = read.depth.z_m
+                depth_camera = self._depth_camera_of(candidate, z_m.shape)
+        except InputError:
             z_m, weight = np.full(self._depth_shape, np.nan, np.float32), None
             depth_camera = self._depth_camera_of(candidate, self._depth_shape)
         return view_of(z_m, depth_camera, weight)
@@ -95,7 +89,7 @@ class FolderRecording:
         """
         candidate = self.sequence.candidates[index]
         camera = candidate.camera or self.sequence.camera
-        with entered(self.unreadable_colors, index):
+        with self.unusable.entered("colour", index):
             rgb = _color_of(candidate, camera)
         depth = depth_in(candidate, self.sequence).depth
         depth_camera = None

@@ -21,10 +21,9 @@ from pipeline.importing.bag_transforms import Transforms
 from pipeline.importing.depth_views import (
     DepthCamera,
     DepthView,
-    entered,
+    Unusable,
     first_with_depth,
     frame_of,
-    unreadable_note,
     view_of,
 )
 from pipeline.importing.reading import MOST_FRAMES, of_many
@@ -53,10 +52,7 @@ class BagRecording:
     scale: BagScale
     found: tuple[str, ...]
     """Notes on the whole bag, one sentence each."""
-    unreadable: dict[int, str] = field(default_factory=dict, compare=False)
-    """Error of each frame whose depth image could not be read, entered when it is read."""
-    unreadable_colors: dict[int, str] = field(default_factory=dict, compare=False)
-    """Error of each frame whose colour image could not be used, entered when it is read."""
+    unusable: Unusable = field(default_factory=Unusable, compare=False)
 
     kind = "bag"
 
@@ -66,8 +62,7 @@ class BagRecording:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        colors = unreadable_note("colour", self.unreadable_colors)
-        return (*self.found, *unreadable_note("depth", self.unreadable), *colors)
+        return (*self.found, *self.unusable.notes)
 
     def view(self, index: int) -> DepthView:
         """Read the depth of a frame; it is all NaN without any depth, or if the image cannot be read.
@@ -75,10 +70,9 @@ class BagRecording:
         ``notes`` has the number of those that cannot be read.
         """
         try:
-            z_m = self._depth(index).depth.z_m
-        except InputError as error:
-            if not isinstance(error, NoDepthError):
-                self.unreadable[index] = str(error)
+            with self.unusable.entered("depth", index):
+                z_m = self._depth(index).depth.z_m
+        except InputError:
             z_m = np.full(self.depth_shape, np.nan, np.float32)
         return view_of(z_m, self.depth_camera or DepthCamera(self.camera, np.eye(4)))
 
@@ -88,7 +82,7 @@ class BagRecording:
         Raises:
             InputError: an image cannot be read, or does not fit its camera.
         """
-        with entered(self.unreadable_colors, index):
+        with self.unusable.entered("colour", index):
             rgb = color_of(self.color.message(int(self.moments[index, 0])), self.color.topic)
             _check_size(self.color.topic, rgb.shape, (self.camera.height_px, self.camera.width_px))
         T = None if self.T_world_camera is None else self.T_world_camera[index]
@@ -97,7 +91,7 @@ class BagRecording:
     def _depth(self, index: int) -> ReadDepth:
         read = self.scale.read(self.depth.message(int(self.moments[index, 1])))
         shape = read.depth.z_m.shape
-        _check_size(self.depth.topic, shape, self.depth_shape, "the first image of this topic")
+        _check_size(self.depth.topic, shape, self.depth_shape, "the first image of this topic with depth")
         return read
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import secrets
 import shutil
 from collections.abc import Iterator
@@ -42,17 +43,26 @@ class NodeImages:
 
 
 def check_new(out: Path) -> None:
-    """Raise an InputError for a folder that is neither new nor empty."""
-    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
-        what = f"The folder {out} is not empty" if out.is_dir() else f"{out} exists already"
-        raise InputError(f"{what}; try another name")
+    """Raise an InputError for a folder that is neither new nor empty; what was left by a kill is nothing."""
+    if out.is_dir():
+        if len(list(out.iterdir())) > len(_unfinished(out, out.resolve().name)):
+            raise InputError(f"The folder {out} is not empty; try another name")
+    elif out.exists():
+        raise InputError(f"{out} exists already; try another name")
+
+
+def _unfinished(folder: Path, name: str) -> list[Path]:
+    """Return the hidden folders in a folder that ``new_folder`` left when it was killed."""
+    hidden = re.compile(rf"\.{re.escape(name)}-[0-9a-f]{{8}}")
+    return [path for path in folder.glob(".*") if hidden.fullmatch(path.name)]
 
 
 @contextmanager
 def new_folder(out: Path) -> Iterator[Path]:
     """Create a hidden folder whose contents become those of ``out`` if the body succeeds, else deleted.
 
-    An empty folder ``out`` stays the same folder: it may be the working folder of this process.
+    Those that killed processes left are deleted. An empty folder ``out`` stays the same folder: it may be the
+    working folder of this process.
 
     Raises:
         InputError: a folder or a file in it cannot be written.
@@ -61,6 +71,8 @@ def new_folder(out: Path) -> Iterator[Path]:
     exists = out.is_dir()
     hidden = (out if exists else out.parent) / f".{out.name}-{secrets.token_hex(4)}"
     try:
+        for left in _unfinished(hidden.parent, out.name):
+            shutil.rmtree(left)
         hidden.mkdir(parents=True)
         yield hidden
         if exists:

@@ -93,8 +93,15 @@ class Sequence:
         known = tuple(one for one in self.candidates if one.T_world_camera is not None)
         if len(known) in (0, len(self.candidates)):
             return self
-        note = f"{len(self.candidates) - len(known)} frames without a pose were left out"
-        return replace(self, candidates=known, notes=(*self.notes, note))
+        note = left_out_note(len(self.candidates) - len(known), "frame", "without a pose")
+        return replace(self, candidates=known, notes=(*self.notes, *note))
+
+
+def left_out_note(count: int, noun: str, which: str) -> tuple[str, ...]:
+    """Return a sentence on how many frames, moments or others (``noun``) were left out, if any."""
+    if not count:
+        return ()
+    return (f"1 {noun} {which} was left out" if count == 1 else f"{count} {noun}s {which} were left out",)
 
 
 def named_inside(folder: Path, name: str, file: str) -> Path:

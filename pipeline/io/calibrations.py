@@ -14,6 +14,7 @@ from typing import TypedDict, cast
 from packetmesh.errors import InputError
 from packetmesh.files import remedy
 from pipeline.io.extrinsics import write_extrinsics
+from pipeline.io.images import images_in
 from pipeline.io.intrinsics import write_intrinsics
 from pipeline.io.poses import write_pose
 from pipeline.types import AnyPath, CameraIntrinsics, FloatArray
@@ -64,29 +65,52 @@ class CalibratedNode:
 def write_calibration(folder: AnyPath, nodes: Mapping[str, CalibratedNode]) -> None:
     """Write a calibration folder, for ``load_rig(..., calibration=folder)``.
 
-    A node's older camera and poses are deleted where it has none now; its depth correction stays.
+    New intrinsics replace all of a node's earlier calibration, whose pose, depth camera and depth correction
+    belong to another lens. A pose without intrinsics replaces only the pose.
 
     Args:
         folder: created if it is missing.
         nodes: calibrations by the nodes' names, node_00 and so on.
 
     Raises:
-        InputError: the folder cannot be written.
+        InputError: the folder cannot be written, is a rig with images, or has a calibration of other nodes.
 
     >>> import packetmesh as pm
     >>> camera = pm.load_demo("office").frames[0].intrinsics
     >>> pm.write_calibration("calibration", {"node_00": pm.CalibratedNode(camera)})
     """
+    check_calibration_folder(folder, nodes)
     for name, node in nodes.items():
         own = Path(folder) / name
-        delete_files(own, (file for part, file in FILES.items() if part != "depth_correction"))
         if node.intrinsics is not None:
+            delete_files(own, FILES.values())
             write_intrinsics(own / "intrinsics.json", node.intrinsics, node.focal_sd)
         if node.T_world_camera is not None:
             write_pose(own / "pose.txt", node.T_world_camera)
         if node.depth_intrinsics is not None and node.T_color_depth is not None:
             write_intrinsics(own / "depth_intrinsics.json", node.depth_intrinsics)
             write_extrinsics(own / "extrinsics.json", node.T_color_depth)
+
+
+def check_calibration_folder(folder: AnyPath, nodes: Iterable[str]) -> None:
+    """Check that a calibration of these nodes can be written to a folder.
+
+    Raises:
+        InputError: a node there has images, as in a rig, or another node has a calibration.
+    """
+    folder = Path(folder)
+    names = set(nodes)
+    others = {one.name for one in folder.glob("node_*") if node_files(one)} - names
+    if any(images_in(folder / name, stem) for name in names | others for stem in ("color", "depth")):
+        raise InputError(
+            f"{folder} has the images of a rig, whose cameras a calibration would replace; try another "
+            "folder, and load the rig with it as calibration"
+        )
+    if others:
+        raise InputError(
+            f"{folder} already holds the calibration of {min(others)}, which is not among the new ones; try "
+            "an empty folder"
+        )
 
 
 def delete_files(folder: Path, names: Iterable[str]) -> None:

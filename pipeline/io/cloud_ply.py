@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from dataclasses import dataclass
 from typing import Literal
 
@@ -20,6 +21,7 @@ TYPES = {
     "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
     "double": "f8", "float64": "f8",
 }  # fmt: skip
+_LINE_END = re.compile(rb"\r\n|\r|\n|\Z")
 _SPLAT = ("f_dc_0", "f_dc_1", "f_dc_2")
 _SPLAT_FACTOR = 0.5 / np.sqrt(np.pi)
 """Constant spherical harmonic; a splat's mean colour is 0.5 plus this times its first coefficient."""
@@ -103,9 +105,16 @@ def _after(body: bytes, elements: list[_Element], order: Literal["a", "<", ">"])
     if not elements:
         return body
     if order == "a":
-        rows = body.lstrip().splitlines(keepends=True)
-        return b"".join(rows[sum(element.count for element in elements) :])
+        return _without_lines(body.lstrip(), sum(element.count for element in elements))
     return body[sum(element.count * _row(element, order).itemsize for element in elements) :]
+
+
+def _without_lines(text: bytes, count: int) -> bytes:
+    """Return a text without its first ``count`` lines; all are gone if there are fewer."""
+    start = 0
+    for _, end in zip(range(count), _LINE_END.finditer(text), strict=False):
+        start = end.end()
+    return text[start:]
 
 
 def _row(element: _Element, order: Literal["a", "<", ">"]) -> np.dtype:

@@ -7,6 +7,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -19,6 +20,7 @@ from pipeline.io.depth_scale import NO_VALUE, check_median, doubts, known_in, us
 from pipeline.io.raw_images import SIGNATURES, raw_values
 from pipeline.types import AnyPath, ByteArray, DepthMap
 
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".tif", ".tiff", ".npy", ".pfm", ".exr")
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _JPEG_SIGNATURE = b"\xff\xd8"
 _JPEG_END = b"\xff\xd9"
@@ -26,6 +28,11 @@ _PNM_SIGNATURES = (b"P5", b"P6")
 _PNM_SPACE = rb"(?:\s|#[^\n]*+\n)++"
 _PNM_HEADER = re.compile(rb"P[56]" + (_PNM_SPACE + rb"(\d{1,9})") * 3 + rb"\s")
 """Width, height and largest value, with comments between them."""
+
+
+def images_in(folder: Path, stem: str) -> list[Path]:
+    """Return the images of this stem, such as color.png and color.jpg, by name."""
+    return [file for file in sorted(folder.glob(f"{stem}.*")) if file.suffix.lower() in IMAGE_SUFFIXES]
 
 
 def read_color(path: AnyPath) -> ByteArray:

@@ -200,7 +200,7 @@ def read_mesh(path: AnyPath) -> Surface:
 
 
 def scene_in(data: bytes, suffix: str) -> trimesh.Scene:
-    """Load a model from memory with trimesh, Z up; no other file is opened.
+    """Load a model from memory with trimesh, Z up, without the lines of a GLB file; no other file is opened.
 
     Raises:
         Exception: of any type, if the file is damaged.
@@ -209,12 +209,14 @@ def scene_in(data: bytes, suffix: str) -> trimesh.Scene:
         return trimesh.load_scene(io.BytesIO(data), file_type=suffix[1:], process=False)
     document = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
     _check_accessors(document)
-    scene = trimesh.load_scene(io.BytesIO(data), file_type="glb", process=False)
+    loaded = load_glb(io.BytesIO(data))
     if document.get("asset", {}).get("generator") not in _SRGB_WRITERS:
-        stored = load_glb(io.BytesIO(data), skip_materials=True)["geometry"]
-        for name, part in scene.geometry.items():
-            if part.visual.kind == "vertex":  # trimesh has rounded its colours to 8 bits of linear light
-                part.visual.vertex_colors = srgb_of(stored[name]["vertex_colors"])
+        for part in loaded["geometry"].values():
+            if "vertex_colors" in part:  # as stored; a part of the scene has 8 bits of linear light
+                part["vertex_colors"] = srgb_of(part["vertex_colors"])
+    lines = [name for name, part in loaded["geometry"].items() if "entities" in part]
+    scene = trimesh.load_scene(loaded)
+    scene.delete_geometry(lines)
     scene.apply_transform(T_GLTF_WORLD.T)
     return scene
 

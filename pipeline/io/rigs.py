@@ -21,15 +21,13 @@ from pipeline.io.depth_correction import (
 )
 from pipeline.io.depth_to_color import register_depth
 from pipeline.io.extrinsics import read_extrinsics_noted
-from pipeline.io.images import read_color, read_depth_noted, write_color, write_depth_mm
+from pipeline.io.images import images_in, read_color, read_depth_noted, write_color, write_depth_mm
 from pipeline.io.intrinsics import read_focal_sd, read_intrinsics, write_intrinsics
 from pipeline.io.poses import read_pose_noted, write_pose
 from pipeline.io.same_view import depth_camera_of, same_view_note
 from pipeline.io.truth import INTRINSICS_NAME, MESH_NAME, POSE_NAME, read_truth, write_truth
 from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.types import MAX_NODES, AnyPath, CameraIntrinsics, DepthMap, RgbdFrame, Rig
-
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".tif", ".tiff", ".npy", ".pfm", ".exr")
 
 
 def load_frame(
@@ -269,7 +267,7 @@ def load_node(folder: Path, over: NodeFiles, depth_scale: float | None) -> RgbdF
     """
     files: NodeFiles = {"intrinsics": _intrinsics_in(folder), **node_files(folder), **over}
     for stem in ("color", "depth"):
-        names = [file.name for file in _images_in(folder, stem)]
+        names = [file.name for file in images_in(folder, stem)]
         if len(names) > 1 and f"{stem}.png" not in names:
             raise InputError(f"The node {folder} has several images, {', '.join(names)}; try to keep one")
     color, depth = (_image_in(folder, stem) for stem in ("color", "depth"))
@@ -284,9 +282,5 @@ def _intrinsics_in(folder: Path) -> Path:
 
 def _image_in(folder: Path, stem: str) -> Path:
     """Return the PNG with this stem, or the only image with another suffix if there is no PNG."""
-    usual, others = folder / f"{stem}.png", _images_in(folder, stem)
+    usual, others = folder / f"{stem}.png", images_in(folder, stem)
     return others[0] if len(others) == 1 and not usual.exists() else usual
-
-
-def _images_in(folder: Path, stem: str) -> list[Path]:
-    return [file for file in sorted(folder.glob(f"{stem}.*")) if file.suffix.lower() in IMAGE_SUFFIXES]

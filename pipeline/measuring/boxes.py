@@ -57,9 +57,11 @@ def box_of_planes(surface: MeasuredSurface, planes: tuple[Plane, Plane, Plane]) 
     left, _, right = np.linalg.svd(normals)
     inward = -left @ right
     corner_m = np.linalg.solve(normals, [plane.normal @ plane.point_m for plane in planes])
-    others = [np.concatenate([other.rows for other in planes if other is not plane]) for plane in planes]
-    deep_m = [(surface.vertices_m[rows] - corner_m) @ axis for rows, axis in zip(others, inward, strict=True)]
-    outside = {bool(np.median(one_m) > 0.0) for one_m in deep_m}
+    deep_m = [
+        [(surface.vertices_m[other.rows] - corner_m) @ axis for other in planes if other is not plane]
+        for plane, axis in zip(planes, inward, strict=True)
+    ]
+    outside = {bool(np.median(one_m) > 0.0) for pair in deep_m for one_m in pair}
     if len(outside) == 2:
         raise InputError(
             "The three planes are no faces of one box: some are seen from outside it, others from inside; "
@@ -67,7 +69,9 @@ def box_of_planes(surface: MeasuredSurface, planes: tuple[Plane, Plane, Plane]) 
         )
     side = 1.0 if outside == {True} else -1.0
     ragged_m = 0.5 * lookup_of(surface).spacing_m
-    lengths_m = np.array([np.percentile(side * one_m, EXTENT[1]) for one_m in deep_m]) + ragged_m
+    lengths_m = (
+        np.array([np.percentile(side * np.concatenate(pair), EXTENT[1]) for pair in deep_m]) + ragged_m
+    )
     sds_m = np.array([np.hypot(np.sqrt(plane.covariance[0, 0]), ragged_m) for plane in planes])
     guesses_m = np.array([_guess_half_m(plane.range_m, plane.confidence) * plane.guessed for plane in planes])
     return _box(surface, corner_m, side * inward, lengths_m, sds_m, guesses_m)

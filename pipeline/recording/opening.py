@@ -156,12 +156,12 @@ def iterate_still(recording: Recording, frames: int) -> Generator[Progress, None
     vote = voted(stack, view.noise)
     if not vote.depth.valid.any():
         raise InputError(f"No pixel of {recording.name} keeps its depth; try recording.frames=1")
-    photographs, damaged = _photographs(recording, numbers)
+    photographs = _photographs(recording, numbers)
     depth, sd_m = _on_color(vote, view, photographs[0])
     shares = float(vote.moving.mean()), float(vote.flickering.mean())
     averaging = Averaging(sd_m, len(numbers), available, *shares)
     sentence = _sentence(averaging, len(recording.times_s))
-    notes = (*recording.notes, sentence, *photographs[0].notes, *damaged)
+    notes = (*recording.notes, sentence, *photographs[0].notes)
     rgb = _median_color([frame.rgb for frame in photographs])
     return replace(photographs[0], name=NAME, rgb=rgb, depth=depth, averaging=averaging, notes=notes)
 
@@ -188,21 +188,21 @@ def _iterate_stack(
     return numbers, stack[: len(numbers)], first
 
 
-def _photographs(recording: Recording, numbers: Sequence[int]) -> tuple[list[RgbdFrame], list[str]]:
-    """Read ``PHOTOGRAPHS`` of some frames, evenly chosen; returns a note on each that cannot be read.
+def _photographs(recording: Recording, numbers: Sequence[int]) -> list[RgbdFrame]:
+    """Read ``PHOTOGRAPHS`` of some frames, evenly chosen, without those that cannot be read.
 
     Raises:
         InputError: none of them can be read.
     """
-    found, notes = list[RgbdFrame](), list[str]()
+    found, errors = list[RgbdFrame](), list[str]()
     for number in spread(numbers, PHOTOGRAPHS):
         try:
             found.append(recording.frame(number))
         except InputError as error:
-            notes.append(f"frame {number} gives no colours: {error}")
+            errors.append(f"frame {number} gives no colours: {error}")
     if not found:
-        raise InputError(notes[0])
-    return found, notes
+        raise InputError(errors[0])
+    return found
 
 
 def _median_color(photographs: list[ByteArray]) -> ByteArray:

@@ -31,8 +31,6 @@ class Photographs:
     """The chosen frames, with their poses."""
     colors: ByteArray
     """(N, 3) RGB of the map's points."""
-    notes: tuple[str, ...]
-    """A sentence on each frame that cannot be read."""
 
 
 def iterate_photographs(
@@ -42,7 +40,7 @@ def iterate_photographs(
     keyframes: Sequence[int],
     points: PointCloud,
 ) -> Generator[Progress, None, Photographs]:
-    """Read the photographs of a walk one by one; only the views are kept.
+    """Read the photographs of a walk one by one, except those that cannot be read; the views are kept.
 
     Args:
         recording: the frames.
@@ -55,7 +53,7 @@ def iterate_photographs(
         InputError: no view can be read.
     """
     numbers = sorted({*views, *spread(list(keyframes), MOST_COLORING)})
-    blend, kept, notes = Blend(points), [], []
+    blend, kept, errors = Blend(points), [], []
     for count, number in enumerate(numbers):
         yield Progress(f"colours by frame {number}", count / len(numbers))
         T = T_world_camera[number]
@@ -63,14 +61,14 @@ def iterate_photographs(
         try:
             frame = replace(recording.frame(number), T_world_camera=T, pose_known=True)
         except InputError as error:
-            notes.append(f"frame {number} gives no colours: {error}")
+            errors.append(f"frame {number} gives no colours: {error}")
             continue
         blend.add(frame)
         if number in views:
             kept.append(frame)
     if not kept:
-        raise InputError(notes[0])
-    return Photographs(tuple(kept), blend.colors, tuple(notes))
+        raise InputError(errors[0])
+    return Photographs(tuple(kept), blend.colors)
 
 
 def measured_in(frame: RgbdFrame, points_m: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:

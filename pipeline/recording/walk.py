@@ -69,7 +69,7 @@ def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
     seen = yield from part(reading, "photographs", 0.95, 1.0, detail=True)
     given_poses = given.T_world_camera or [None] * len(poses)
     corrected = path_note(poses, given_poses, "that of the given poses")
-    notes = (*recording.notes, *given.notes, *corrected, *turned, *seen.notes)
+    notes = (*recording.notes, *given.notes, *corrected, *turned)
     if checkpoint is not None:
         checkpoint.delete()
     colored = replace(points, colors=seen.colors)

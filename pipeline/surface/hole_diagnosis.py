@@ -354,8 +354,8 @@ def _gap_sentences(place: _Place, ball_m: float, found: _Findings) -> tuple[str,
         remedy = "Take more smoothing passes or fewer points, so that the layers become one."
     else:
         sentence = (
-            f"{gap}, less than the {width} of {ball} but somewhere along the loop it finds no three points "
-            "to rest on."
+            f"{gap}, less than the {width} of {ball}, but somewhere along the loop the ball finds no three "
+            "points to rest on."
         )
     if found.known.past_share > MOST:
         sentence += f" A camera looks through {found.known.past_share:.0%} of it: it may be a true opening."

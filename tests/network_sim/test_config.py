@@ -34,6 +34,7 @@ from packetmesh.settings_help import describe
         ("nodes.duty_cycle=0", "nodes.duty_cycle"),
         ("nodes.duty_cycle=1.1", "between 0.0 and 1"),
         ("nodes.duty_cycle=0.004", "try nodes.duty_period_s=25"),
+        ("nodes.duty_cycle=1e-11", "try a larger nodes.duty_cycle"),
         ("nodes.deadline_s=0", "nodes.deadline_s"),
         ("uplink.rate_bps=0", "uplink.rate_bps"),
         ("uplink.loss=2", "uplink.loss"),

@@ -91,7 +91,7 @@ def test_a_node_that_overlaps_nothing_keeps_its_believed_pose_and_says_so(rig):
     assert not placement.registrations[0].result.converged
     np.testing.assert_allclose(placement.T_world_camera[1], away, atol=1e-9)
     assert all(verdict.placed for verdict in placement.verdicts)
-    assert all("by its given pose alone" in sentence for sentence in placement.sentences)
+    assert all("that no other placed camera confirms" in sentence for sentence in placement.sentences)
     assert len(placement.sentences) == 2
 
 

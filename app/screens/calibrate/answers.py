@@ -33,19 +33,16 @@ class Answers:
             on_depth: called when the depth job has ended.
         """
         self._session, self._on_trust, self._on_depth = session, on_trust, on_depth
-        self._shown: Hashable = None
-        """Key of the calibration that is shown; None if it is not that of the current settings."""
         self._trust: tuple[Hashable, TrustView] | None = None
         self._off: tuple[Hashable, DepthErrorView] | None = None
         self._requested_trust: tuple[Hashable, ...] = ()
         self._requested_depth: tuple[Hashable, ...] = ()
         self._judging = False
 
-    def follow(self) -> None:
-        """Take the calibration that the session has just received as the one that is shown."""
-        session = self._session
-        other = session.results.shows_other("calibrate", session.spec)
-        self._shown = None if other else session.spec.key("calibrate")
+    @property
+    def _shown(self) -> Hashable:
+        """Key of the calibration that is shown."""
+        return self._session.results.shown_key("calibrate")
 
     def trust_in(self, camera: CameraView) -> TrustView | None:
         """Return the newest verdict if it is about this camera of the shown calibration, else None."""

@@ -19,7 +19,7 @@ need calibration, or use your own photographs."""
 )
 
 NO_RIG = Markdown(
-    "The cameras have no common poses: only the one that is chosen above is drawn, around the board."
+    "No poses of several cameras are known: only the camera that is chosen above is drawn, around the board."
 )
 
 PictureName = Literal[

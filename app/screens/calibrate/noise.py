@@ -20,7 +20,7 @@ level."""
 )
 THIS, OTHER = "this lens", f"this lens with {MORE}"
 READY = Markdown("Drag the slider to start.")
-STOPPED = Markdown("Stopped. Drag the slider to start again.")
+STOPPED = Markdown("Stopped or failed. Drag the slider to start again.")
 REST_S = 0.25
 """Time that the slider must be still before the experiment starts, seconds."""
 

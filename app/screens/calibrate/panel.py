@@ -151,6 +151,8 @@ class CalibratePanel(Panel):
             self.ui.post(self._use_own, None)
         if not self.session.results.fresh("calibrate", spec):
             self._noise.forget()
+        elif self._view is not None:
+            self._show_view()  # its verdict may not have been requested while other settings were chosen
 
     def on_action(self, action: str) -> None:
         """Ask again for a cancelled verdict on *Retry*."""
@@ -187,7 +189,6 @@ class CalibratePanel(Panel):
 
     def _take(self, view: CalibrationView, all_there: bool) -> None:
         self._view = view
-        self._answers.follow()
         if view.cameras:
             self._camera.offer(tuple(camera.name for camera in view.cameras), all_there)
         self._whole |= {camera.name: camera for camera in view.cameras if not camera.dropped}

@@ -18,7 +18,7 @@ from app.web.zips import opened_zip
 from app.window.ui import Ui
 from packetmesh.errors import InputError
 from packetmesh.files import atomic_path, path_below, unpacked
-from pipeline.calibration.shots import BOARD_FILE
+from pipeline.calibration.shots import BOARD_FILE, moment_of
 from pipeline.config import Pattern
 
 TEXT = Markdown(
@@ -145,10 +145,11 @@ def keep_photographs(file: viser.UploadedFile, folder: Path, node: str) -> list[
             f"{file.name} has {len(file.content) >> 20} MB; the app takes up to {UPLOAD_LIMIT_BYTES >> 20} "
             f"MB, so {INSTEAD}."
         )
-    photographs = {_free_place(folder, _place(file.name, node), file.content): file.content}
     if file.name.lower().endswith(".zip"):
         photographs = _unpacked(file, node)
-    elif not file.name.lower().endswith(ENDINGS):
+    elif file.name.lower().endswith(ENDINGS):
+        photographs = {_free_place(folder, _place(file.name, node), file.content): file.content}
+    else:
         raise InputError(f"{file.name} is no photograph; try PNG or JPEG, or a ZIP of them.")
     there = len(list(folder.glob("*/*")))
     if there + len(photographs) > MOST_FILES:
@@ -170,7 +171,9 @@ def _unpacked(file: viser.UploadedFile, node: str) -> dict[str, bytes]:
             if _path(one.filename).name.startswith("."):
                 continue
             place, content = _place(one.filename, node), unpacked(archive, one)
-            if found.setdefault(place, content) != content:
+            if found.setdefault(place, content) != content and place == BOARD_FILE:
+                raise InputError(f"{file.name} has several {BOARD_FILE} that differ; leave one.")
+            if found[place] != content:
                 raise InputError(
                     f"{file.name} has several files for {place}, one of them {one.filename}; give each "
                     "photograph its own name, and each camera its own folder: node_00, node_01 and so on."
@@ -190,16 +193,20 @@ def _place(name: str, node: str) -> str:
 
 
 def _free_place(folder: Path, place: str, content: bytes) -> str:
-    """Return a place below ``folder``, with a number if it has another photograph: a telephone may name each
-    of its pictures image.jpg.
+    """Return the place of a photograph below ``folder``. One without a number in its name gets that of a
+    moment without a photograph: a telephone may name each of its pictures image.jpg. One with a number
+    replaces that of its name.
     """
-    path, free = PurePosixPath(place), place
-    for number in count(2):
-        there = path_below(folder, free)
-        if not there.exists() or there.read_bytes() == content:
-            break
-        free = str(path.with_stem(f"{path.stem}-{number}"))
-    return free
+    path, there = PurePosixPath(place), path_below(folder, place)
+    if moment_of(path.stem) != path.stem:
+        return place
+    beside = {other.stem: other for other in there.parent.glob("*")}
+    for stem, other in beside.items():
+        if stem.startswith(path.stem) and other.read_bytes() == content:
+            return str(path.with_name(other.name))
+    taken = {moment_of(stem) for stem in beside}
+    number = next(number for number in count(1) if str(number) not in taken)
+    return str(path.with_stem(f"{path.stem}-{number}"))
 
 
 def _path(name: str) -> PurePosixPath:

@@ -52,8 +52,10 @@ class Checked(NamedTuple):
     spread_m: float
     """Largest point error between the pose and those of further registrations; infinite if one failed, NaN if
     another pose had the better score."""
-    settled: bool
+    settled: bool = False
     """Whether these registrations agree; then the pose is sure, unless ``doubts`` name a rival."""
+    undecided: bool = False
+    """Whether those with few points disagree, so that more points may decide."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,38 +78,34 @@ class Checks:
             answer: the answer to check.
             tried: all registrations so far, at least one.
         """
-        if self._bare and (before := self._scored_better(answer, tried)) is not None:
-            return Checked(answer, (self._rival_text(answer, before),), float("nan"), settled=False)
         spread_m = self._spread_m(answer)
-        if spread_m <= self._most_m:
-            return self.repeated(way, answer, spread_m)
-        return self._checked(way, answer, spread_m)
+        if spread_m > self._most_m and self._scored_better(answer, tried) is None:
+            return Checked(answer, (_apart(spread_m),), spread_m, undecided=bool(np.isfinite(spread_m)))
+        return self.complete(way, answer, spread_m, tried)
 
-    def repeated(self, way: Way, answer: Candidate, spread_m: float) -> Checked:
-        """Check an answer, or one nearby that fits better, again with more points if its draws disagree.
+    def complete(self, way: Way, answer: Candidate, spread_m: float, tried: Sequence[Candidate]) -> Checked:
+        """Check an answer, or one nearby that fits better, with as many points as are needed.
 
         Args:
             way: where the start pose came from.
             answer: the answer to check.
             spread_m: distance of the poses of its draws of few points.
+            tried: all registrations so far, at least one.
         """
+        if (before := self._scored_better(answer, tried)) is not None:
+            return Checked(answer, (self._rival_text(answer, before),), float("nan"))
         at = answer.T_target_source, answer.evidence
         slide = better_slide(self.source, self.target, *at, self.judge, self.config)
         if slide is not None:
             answer, spread_m = slide, self._spread_m(slide)
-        return self._checked(way, *self._repeated(answer, spread_m))
-
-    def _checked(self, way: Way, answer: Candidate, spread_m: float) -> Checked:
-        """Return an answer, or the rival that fits better, with its doubts."""
+        answer, spread_m = self._repeated(answer, spread_m)
         doubts: tuple[str, ...] = ()
         if spread_m <= self._most_m and np.isnan(answer.evidence.color_correlation):
             best, doubts = self._unless_rivalled(way, answer)
             if best is not answer:
                 answer, spread_m = best, self._spread_m(best)
-        if np.isinf(spread_m):
-            doubts = (*doubts, "registered again, the source finds no pose")
-        elif spread_m > self._most_m:
-            doubts = (*doubts, f"registered again, the source ends up to {length(spread_m)} away")
+        if spread_m > self._most_m:
+            doubts = (*doubts, _apart(spread_m))
         return Checked(answer, doubts, spread_m, settled=spread_m <= self._most_m)
 
     def _repeated(self, answer: Candidate, spread_m: float) -> tuple[Candidate, float]:
@@ -202,6 +200,8 @@ class Checks:
 
     def _scored_better(self, answer: Candidate, tried: Sequence[Candidate]) -> Candidate | None:
         """Return the tried registration with the best score if it led elsewhere than the answer."""
+        if not self._bare:
+            return None
         best = max(tried, key=lambda one: one.evidence.score)
         elsewhere = not same(best.T_target_source, answer.T_target_source, self.source, self.target)
         return best if elsewhere and best.evidence.score > answer.evidence.score else None
@@ -222,3 +222,10 @@ class Checks:
         turned = turned_deg >= LEAST_TURN_DEG
         how = f"turned by {turned_deg:.0f} degrees" if turned else f"{length(apart_m)} away"
         return f"{how}, the source fits as well"
+
+
+def _apart(spread_m: float) -> str:
+    """Return the doubt about an answer whose registrations are ``spread_m`` apart."""
+    if np.isinf(spread_m):
+        return "registered again, the source finds no pose"
+    return f"registered again, the source ends up to {length(spread_m)} away"

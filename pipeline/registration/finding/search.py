@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from packetmesh.errors import ReconstructionError
 from pipeline.config import RegistrationConfig
@@ -31,6 +29,8 @@ class Found:
     failed, NaN if the pose was in doubt before these."""
     settled: bool = False
     """Whether no other start can change the answer: it is sure, or in doubt only because of a rival."""
+    undecided: bool = False
+    """Whether its draws of few points disagree, so that more points may decide."""
 
 
 def search(
@@ -79,30 +79,31 @@ def search(
             "No start pose leads to a registration: the clouds have too little in common, or the points of "
             "one leave the pose open; try a closer start pose, or clouds that show more of the place"
         )
-    answers += _with_more_points(answers, checks)
-    return replace(max(answers, key=_rank), tried=tuple(tried))
+    best = max(_decided(answers, tried, checks), key=_rank)
+    return replace(best, tried=tuple(tried))
 
 
 def _found(way: Way, candidate: Candidate, tried: Sequence[Candidate], checks: Checks) -> Found:
     """Return a candidate with its verdict, or a better one that its checks find."""
     if not verdict_on(candidate.evidence, tried=True).sure:
         return Found(way, candidate, verdict_on(candidate.evidence), ())
-    return _checked(way, checks(way, candidate, tried))
+    return _of_check(way, checks(way, candidate, tried))
 
 
-def _checked(way: Way, checked: Checked) -> Found:
+def _of_check(way: Way, checked: Checked) -> Found:
     """Return a checked answer with its verdict."""
-    verdict = verdict_on(checked.candidate.evidence, checked.doubts, tried=checked.settled)
-    return Found(way, checked.candidate, verdict, (), checked.spread_m, checked.settled)
+    answer, doubts, spread_m, settled, undecided = checked
+    verdict = verdict_on(answer.evidence, doubts, tried=settled)
+    return Found(way, answer, verdict, (), spread_m, settled, undecided)
 
 
-def _with_more_points(answers: Sequence[Found], checks: Checks) -> Iterator[Found]:
-    """Yield the best answer whose draws of few points disagree, checked with more points, if there is one."""
-    apart = [found for found in answers if np.isfinite(found.spread_m)]
-    if apart:
-        best = max(apart, key=_rank)
-        checked = checks.repeated(best.way, best.candidate, best.spread_m)
-        yield _checked(best.way, checked)
+def _decided(answers: Sequence[Found], tried: Sequence[Candidate], checks: Checks) -> list[Found]:
+    """Return the answers with the best undecided one, if there is one, after a complete check."""
+    best = max((found for found in answers if found.undecided), key=_rank, default=None)
+    if best is None:
+        return list(answers)
+    complete = _of_check(best.way, checks.complete(best.way, best.candidate, best.spread_m, tried))
+    return [complete if found is best else found for found in answers]
 
 
 def _rank(found: Found) -> tuple[bool, int, bool, float]:

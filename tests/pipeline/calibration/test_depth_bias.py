@@ -8,17 +8,21 @@ from scipy.stats import sem
 
 from lab.worlds.printed import printed, sheet_px
 from packetmesh.errors import InputError
-from pipeline.calibration import depth_samples
+from pipeline.calibration import depth_from_images, depth_samples
 from pipeline.calibration.board import Board
 from pipeline.calibration.depth_bias import fit_depth
+from pipeline.calibration.depth_from_images import with_depth
 from pipeline.calibration.depth_samples import board_depth_samples
+from pipeline.calibration.detection import whole
 from pipeline.calibration.estimate import calibrate
+from pipeline.calibration.from_images import CameraReport
 from pipeline.io.depth_correction import (
     DepthCorrection,
     map_means,
     read_depth_correction,
     write_depth_correction,
 )
+from pipeline.io.images import write_depth_mm
 from pipeline.kernels.geometry import apply, inverse
 from pipeline.types import DepthMap
 from tests.pipeline.calibration.depth_views import (
@@ -233,6 +237,35 @@ def test_what_counts_as_paper_is_white_on_the_printed_sheet(board, white, near_b
         assert printed(board)[v, u].min() > 128
     monkeypatch.setattr(depth_samples, "INK_PX", 0.0)
     assert 1.0 - board_depth_samples(lens, depths, board).ink.mean() == pytest.approx(white, abs=0.03)
+
+
+@pytest.mark.parametrize("rows", [8, 9])
+def test_white_of_a_charuco_board_is_white_in_the_layout_of_old_programs(rows, near_boards):
+    """With an even number of rows of corners, both layouts are the same."""
+    boards, lens, depths = near_boards
+    board = Board("charuco", 11, rows, 0.035, "4X4_100")
+    paper = (found := board_depth_samples(lens, depths, board, [view.name for view in lens.views])).select(
+        ~found.ink
+    )
+    rays = RAYS[paper.pixels[:, 1], paper.pixels[:, 0]]
+    sheet = board.charuco(legacy=True).generateImage((12 * 40, (rows + 1) * 40), marginSize=0)
+    for view, T in enumerate(boards):
+        points_m = apply(inverse(T), (rays * paper.true_m[:, None])[paper.view == view])[:, :2]
+        u, v = np.floor(40.0 * ((points_m - board.points_m[0, :2]) / board.spacing_m + 1.0)).astype(int).T
+        assert len(u) > 20
+        assert sheet[v, u].min() > 128
+
+
+def test_the_layout_in_the_photographs_is_that_of_the_ink(near_boards, tmp_path, monkeypatch):
+    _, lens, depths = near_boards
+    board = Board("charuco", 11, 9, 0.035, "4X4_100")
+    found = {view.name: replace(whole(board, view.points_px, True), legacy=True) for view in lens.views}
+    files = {name: tmp_path / f"{name}.png" for name in found}
+    for path, depth in zip(files.values(), depths, strict=True):
+        write_depth_mm(path, depth)
+    monkeypatch.setattr(depth_from_images, "fit_depth", lambda found: found)
+    told = with_depth(CameraReport(board, found, (), lens, ()), files).depth
+    np.testing.assert_array_equal(told.ink, board_depth_samples(lens, depths, board, list(found)).ink)
 
 
 def test_bad_input_is_refused_in_a_sentence():

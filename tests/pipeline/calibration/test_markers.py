@@ -53,6 +53,7 @@ def test_the_layout_of_old_programs_is_found(columns, rows):
     board = Board("charuco", columns, rows, 0.03)
     picture, corners = drawn(board, legacy=True)
     found = detect(picture, board)
+    assert found.legacy is (rows % 2 == 1)
     assert len(found.indices) == columns * rows
     assert off_px(found, corners).max() < 0.5
 

@@ -16,7 +16,7 @@ from pipeline.calibration.shots import board_beside, node_shots
 from pipeline.io.extrinsics import read_extrinsics
 from pipeline.io.images import write_color
 from pipeline.io.intrinsics import read_intrinsics
-from pipeline.io.poses import read_pose
+from pipeline.io.poses import read_pose, write_pose
 from pipeline.io.rigs import load_rig
 from pipeline.kernels.geometry import LEVEL_POSE, inverse, rigid, rotation_angle_rad, rotation_exp
 from pipeline.types import CameraIntrinsics
@@ -96,6 +96,14 @@ def test_depth_is_corrected_by_the_same_boards(report, tmp_path):
     assert max(after_m) < 0.3 * max(before_m)
 
 
+def test_a_calibration_of_more_cameras_is_not_mixed_with_a_new_one(report, tmp_path):
+    write_pose(tmp_path / "node_07" / "pose.txt", LEVEL_POSE)
+    (tmp_path / "metrics.json").touch()
+    with pytest.raises(InputError, match="already holds the calibration of node_07"):
+        write_rig_folder(report, tmp_path)
+    assert {file.name for file in tmp_path.iterdir()} == {"node_07", "metrics.json"}
+
+
 def test_without_a_rig_the_first_camera_stands_level(report, tmp_path):
     write_rig_folder(report, tmp_path)
     np.testing.assert_array_equal(read_pose(tmp_path / "node_00" / "pose.txt"), LEVEL_POSE)
@@ -125,7 +133,9 @@ def test_an_impossible_camera_names_its_worst_image_as_without_takes_it(tmp_path
     monkeypatch.setattr(estimate, "MOST_RMS_PX", 1e-6)
     with pytest.raises(ReconstructionError) as told:
         drain(iterate_rig_calibration(node_shots([tmp_path]), board))
-    word = re.search(r"--without (node_00/color_\d\.png), ", str(told.value))[1]
+    word = "/".join(
+        re.fullmatch(r"(node_00): .* the worst image, (color_\d\.png) \(.*", str(told.value)).groups()
+    )
     with pytest.raises(InputError, match="is found in 2 of 3 images, 1 left out"):
         drain(iterate_rig_calibration(node_shots([tmp_path]), board, without=[word]))
 

@@ -49,6 +49,8 @@ def test_a_flat_board_is_left_flat():
 
 def test_what_cannot_be_bent_is_told():
     given = views_of(BOARD.points_m, 6)
+    with pytest.raises(InputError, match="take more, or assume that the board is flat"):
+        board_warp(given[:3], SIZE, BOARD, 2)
     with pytest.raises(InputError, match="fisheye"):
         board_warp(given, SIZE, BOARD, 2, "fisheye")
     part = [View("part", given[0].points_px[:20], given[0].board_m[:20]), *given[1:]]

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.folders.inputs import keep_inputs
-from pipeline.folders.run import clear_run_folder, keep_images
+from pipeline.folders.inputs import check_inputs_stay
+from pipeline.folders.run import check_run_folder, clear_run_folder
 from pipeline.sources import Calibrated, Demo, ImagePair, Recorded, RigFolder
 
 OF_EARLIER_RUNS = (
@@ -21,6 +21,7 @@ OF_EARLIER_RUNS = (
     "picture.jpg",
     "task.json",
     "trajectory.json",
+    "config.json",
     "metrics.json",
 )
 
@@ -35,6 +36,12 @@ def test_baselines_reports_and_moments_of_an_earlier_run_are_deleted(tmp_path):
     touch(*(tmp_path / name for name in (*OF_EARLIER_RUNS, "notes.txt", "imported/node_00/color.png")))
     clear_run_folder(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["imported", "notes.txt"]
+
+
+def test_a_file_of_the_user_stays_where_no_run_was(tmp_path):
+    touch(tmp_path / "picture.jpg", tmp_path / "report.html", tmp_path / "sensor.ply")
+    clear_run_folder(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["picture.jpg", "report.html"]
 
 
 def polycam(folder: Path) -> Path:
@@ -52,7 +59,7 @@ REFUSED = {
     "another recording": lambda at: (Demo("office"), polycam(at / "scan")),
     "a rig": lambda at: (touch(at / "rig/node_00/color.png"), (Demo("office"), at / "rig"))[1],
     "keyframes of the run": lambda at: (RigFolder(str(at / "run/keyframes")), at / "run"),
-    "a rig in its import": lambda at: (RigFolder(str(at / "run/imported/scan")), at / "run"),
+    "a recording in its import": lambda at: (RigFolder(str(polycam(at / "run/imported/scan"))), at / "run"),
     "a camera of its name": lambda at: (ImagePair("c.png", "d.png", str(at / "config.json")), at),
     "a calibration": lambda at: (Calibrated(Demo("office"), str(at / "keyframes/cameras")), at),
 }
@@ -62,10 +69,14 @@ REFUSED = {
 def test_a_run_does_not_delete_images(tmp_path, case):
     source, out = REFUSED[case](tmp_path)
     with pytest.raises(InputError, match=r"would replace .*; try another place for --out$"):
-        keep_images(out, source)
+        check_run_folder(out, source)
 
 
 ALLOWED = {
+    "a rig that the run imported": lambda at: (
+        touch(at / "run/imported/node_00/color.png"),
+        (RigFolder(str(at / "run/imported")), at / "run"),
+    )[1],
     "a new folder": lambda at: (Recorded(str(polycam(at / "scan"))), at / "run"),
     "a new folder in the recording": lambda at: (Recorded(str(polycam(at / "scan"))), at / "scan" / "run"),
     "the folder of the rig": lambda at: (RigFolder(str(at / "run/rig")), at / "run"),
@@ -76,13 +87,13 @@ ALLOWED = {
 @pytest.mark.parametrize("case", ALLOWED)
 def test_a_folder_of_its_own_is_written(tmp_path, case):
     source, out = ALLOWED[case](tmp_path)
-    keep_images(out, source)
+    check_run_folder(out, source)
 
 
 def test_a_file_is_recognised_by_any_path(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "link.ply").symlink_to("cloud.ply")
-    keep_inputs([Path("mesh.ply")], [Path("cloud.ply")])
+    check_inputs_stay([Path("mesh.ply")], [Path("cloud.ply")])
     for same in ("cloud.ply", "../" + tmp_path.name + "/cloud.ply", "link.ply"):
         with pytest.raises(InputError, match=r"would replace cloud\.ply, an input"):
-            keep_inputs([Path(same)], [Path("cloud.ply")])
+            check_inputs_stay([Path(same)], [Path("cloud.ply")])

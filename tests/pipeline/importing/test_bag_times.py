@@ -9,6 +9,7 @@ import pytest
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.importing import iterate_import
+from pipeline.importing.bag import _iterate_moments
 from pipeline.importing.bag_times import moments_from_middle, moments_of, times_of
 from pipeline.io.images import NoDepthError
 from pipeline.io.rigs import load_rig
@@ -125,8 +126,42 @@ def test_moments_without_depth_are_not_chosen(tmp_path, blank, chosen):
     report, frames = imported(tmp_path, Images(colors(9)), Images(depth))
     assert order_of(frames, colors(9))[1] == chosen
     notes = [note for note in report.notes if "without any depth" in note]
-    expected = f"{len(blank)} moments with a depth image without any depth were left out"
+    what = "1 moment" if len(blank) == 1 else f"{len(blank)} moments"
+    expected = f"{what} with a depth image without any depth {'was' if len(blank) == 1 else 'were'} left out"
     assert notes == ([expected] if blank else [])
+
+
+@pytest.mark.parametrize("frames", [20, 200])
+def test_the_depth_of_a_moment_is_read_once(frames):
+    """The second half of 1800 moments is blank; after 300 of them those known to have depth remain."""
+    read = []
+
+    def check_depth(moment):
+        read.append(int(moment[1]))
+        if moment[1] >= 900:
+            raise NoDepthError("blank")
+
+    moments = np.repeat(np.arange(1800)[:, None], 2, axis=1)
+    shares = []
+    steps = _iterate_moments(moments, frames, check_depth)
+    chosen, (note,) = drain(steps, lambda step: shares.append(step.fraction))
+    assert len(read) == len(set(read)) <= 1200
+    assert shares == sorted(shares)
+    assert len(chosen) == frames
+    assert chosen.max() < 900
+    assert note.startswith("300 moments with")
+
+
+def test_a_camera_that_is_always_blank_is_named_before_the_whole_bag_is_read():
+    read = []
+
+    def check_depth(moment):
+        read.append(moment)
+        raise NoDepthError("A depth image of /right has no depth anywhere")
+
+    with pytest.raises(NoDepthError, match="/right"):
+        drain(_iterate_moments(np.zeros((5000, 4), int), 1, check_depth))
+    assert len(read) == 300
 
 
 def test_a_bag_without_any_depth_is_refused(tmp_path):

@@ -112,7 +112,7 @@ def test_cameras_take_the_moment_nearest_to_the_middle_in_which_both_have_depth(
     infos = {f"/cam{k}/camera_info": Info(k=K, frame=f"optical{k}") for k in range(2)}
     report, frames = imported(tmp_path, images, infos)
     assert [float(np.median(frame.depth.z_m)) for frame in frames] == pytest.approx([2.002, 2.002])
-    assert "1 moments with a depth image without any depth were left out" in report.notes
+    assert "1 moment with a depth image without any depth was left out" in report.notes
     assert report.depth_scale is None
     assert any(note.startswith("Depth: 1 or 1000 units in a metre") for note in report.notes)
 

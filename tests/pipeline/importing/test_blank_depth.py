@@ -36,7 +36,7 @@ def test_a_blank_depth_image_is_left_out(tmp_path, kind, blind):
     WRITERS[kind](tmp_path / "recording", written)
     blank(tmp_path / "recording", [blind])
     report = drain(iterate_import(tmp_path / "recording", tmp_path / "rig"))
-    assert "1 frames without any depth were left out" in report.notes
+    assert "1 frame without any depth was left out" in report.notes
     expected = [frame for k, frame in enumerate(written.frames) if k != blind]
     for frame, own in zip(load_rig(tmp_path / "rig").frames, expected, strict=True):
         np.testing.assert_array_equal(frame.rgb, own.rgb)

@@ -303,3 +303,11 @@ def test_a_wrong_scale_of_a_recording_is_said_by_its_values(tmp_path):
     write_redwood(tmp_path / "recording", Rig("five", frames))
     report, _ = imported(tmp_path)
     assert sum("try --depth-scale 5000" in note for note in report.notes) == 1
+
+
+def test_what_a_killed_import_left_in_its_folder_is_no_obstacle_and_goes(tmp_path):
+    write_tum(tmp_path / "recording", orbit(3))
+    left = tmp_path / "rig" / ".rig-0123abcd" / "node_00"
+    left.mkdir(parents=True)
+    drain(iterate_import(tmp_path / "recording", tmp_path / "rig"))
+    assert sorted(path.name for path in (tmp_path / "rig").iterdir()) == ["node_00", "node_01", "node_02"]

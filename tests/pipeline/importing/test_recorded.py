@@ -107,7 +107,7 @@ def test_images_are_read_only_when_they_are_requested(tmp_path):
     assert len(recording.notes) == len(recording.sequence.notes)
     assert not recording.view(2).depth.valid.any()
     assert last.name in recording.notes[-1]
-    assert recording.notes[-1].startswith("1 depth images were left out")
+    assert recording.notes[-1].startswith("1 depth image could not be used: ")
 
 
 def test_depth_in_fewer_pixels_than_the_first_one_keeps_its_view(tmp_path):
@@ -331,7 +331,7 @@ def test_a_view_that_cannot_be_read_has_no_weight(tmp_path):
     assert view.depth.z_m.shape == (30, 40)
     assert not view.depth.valid.any()
     assert view.weight is None
-    assert any("1 depth images were left out" in note for note in recording.notes)
+    assert any("1 depth image could not be used" in note for note in recording.notes)
 
 
 def test_confidence_moves_with_the_depth_of_a_bent_lens():
@@ -435,7 +435,7 @@ def test_photographs_that_cannot_be_used_are_counted_and_the_first_is_named(tmp_
         with pytest.raises(InputError):
             recording.frame(k)
     (note,) = (note for note in recording.notes if "colour images" in note)
-    assert note.startswith("2 colour images were left out, the first because: The colour image")
+    assert note.startswith("2 colour images could not be used, the first because: The colour image")
     assert f"{cut.name} is truncated or damaged" in note
 
 

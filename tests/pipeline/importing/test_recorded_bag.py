@@ -248,9 +248,7 @@ def test_a_damaged_depth_image_is_left_out_and_named(tmp_path, number):
     before = recording.notes
     assert [recording.view(k).depth.valid.any() for k in range(3)] == [k != number for k in range(3)]
     assert recording.notes[:-1] == before
-    assert recording.notes[-1].startswith(
-        "1 depth images were left out, the first because: An image of /depth"
-    )
+    assert recording.notes[-1].startswith("1 depth image could not be used: An image of /depth")
     with pytest.raises(InputError, match="shorter than its size"):
         recording.frame(number)
     assert_frame(recording, 2, written.frames[2])
@@ -282,8 +280,8 @@ def test_images_of_another_size_are_compared_with_what_they_must_fit(tmp_path):
         recording.frame(1)
     assert not recording.view(1).depth.valid.any()
     of_depth, of_colors = recording.notes[-2:]
-    assert "/depth/image has 80 x 60 pixels and the first image of this topic 40 x 30" in of_depth
-    assert of_colors.startswith(f"1 colour images were left out, the first because: {says}")
+    assert "/depth/image has 80 x 60 pixels and the first image of this topic with depth 40 x 30" in of_depth
+    assert of_colors.startswith(f"1 colour image could not be used: {says}")
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -12,6 +12,7 @@ from pipeline.io.depth_correction import DepthCorrection, write_depth_correction
 from pipeline.io.extrinsics import read_extrinsics, write_extrinsics
 from pipeline.io.images import write_color, write_depth_mm
 from pipeline.io.intrinsics import write_intrinsics
+from pipeline.io.poses import read_pose, write_pose
 from pipeline.io.rigs import load_rig, save_rig
 from pipeline.kernels.geometry import look_at, rigid, rotation_exp
 from pipeline.sources import Calibrated, Demo, ImagePair, RigFolder
@@ -69,13 +70,40 @@ def test_a_depth_correction_is_applied_once_whoever_brings_it(rig, calibration):
 
 
 def test_a_calibration_without_poses_does_not_keep_older_ones(tmp_path):
-    """The bias of the depth sensor is written apart and stays."""
+    """The bias of the depth sensor was measured with the older lens."""
     separate = CalibratedNode(BETTER, POSE, depth_intrinsics=CAMERA, T_color_depth=np.eye(4))
     write_calibration(tmp_path, {"node_00": separate})
     write_depth_correction(tmp_path / "node_00" / "depth_correction.json", DepthCorrection((16, 12)))
     assert len(calibration_files(tmp_path, ["node_00"])["node_00"]) == 5
     write_calibration(tmp_path, {"node_00": CalibratedNode(BETTER)})
-    assert calibration_files(tmp_path, ["node_00"])["node_00"].keys() == {"intrinsics", "depth_correction"}
+    assert calibration_files(tmp_path, ["node_00"])["node_00"].keys() == {"intrinsics"}
+
+
+def test_a_pose_alone_leaves_the_rest_of_an_earlier_calibration(tmp_path):
+    write_calibration(tmp_path, {"node_00": CalibratedNode(BETTER, np.eye(4))})
+    write_depth_correction(tmp_path / "node_00" / "depth_correction.json", DepthCorrection((16, 12)))
+    write_calibration(tmp_path, {"node_00": CalibratedNode(None, POSE)})
+    kept = calibration_files(tmp_path, ["node_00"])["node_00"]
+    assert kept.keys() == {"intrinsics", "pose", "depth_correction"}
+    np.testing.assert_array_equal(read_pose(kept["pose"]), POSE)
+
+
+@pytest.mark.parametrize("has", ["color.png", "depth.npy"])
+def test_a_rigs_own_cameras_are_not_replaced(has, tmp_path):
+    """An image is enough: intrinsics may come from a calibration elsewhere."""
+    node = tmp_path / "node_00"
+    write_pose(node / "pose.txt", POSE)
+    (node / has).touch()
+    with pytest.raises(InputError, match="has the images of a rig"):
+        write_calibration(tmp_path, {"node_00": CalibratedNode(BETTER)})
+    assert {file.name for file in node.iterdir()} == {"pose.txt", has}
+
+
+def test_nodes_of_a_larger_calibration_are_not_mixed_with_new_ones(calibration):
+    before = {path: path.read_bytes() for path in calibration.rglob("*.*")}
+    with pytest.raises(InputError, match="already holds the calibration of node_01, which is not among"):
+        write_calibration(calibration, {"node_00": CalibratedNode(CAMERA, POSE)})
+    assert {path: path.read_bytes() for path in calibration.rglob("*.*")} == before
 
 
 def test_the_truth_of_a_demo_stays(tmp_path):

@@ -1,12 +1,14 @@
 """Clouds of other programs: names of fields, headers, units of LAS files, widths of sweeps, degrees."""
 
 import logging
+import tracemalloc
 
 import laspy
 import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
+from pipeline.io.cloud_ply import parse_ply
 from pipeline.io.clouds import read_cloud
 
 RNG = np.random.default_rng(3)
@@ -74,6 +76,23 @@ def test_rows_before_the_vertices_of_a_text_are_skipped(tmp_path, newline):
     text = with_a_camera(("1 2 3", "4 5 6")).replace("\n", newline)
     (tmp_path / "a.ply").write_bytes(text.encode())
     assert read_cloud(tmp_path / "a.ply").points_m.tolist() == [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
+
+
+def test_rows_before_the_vertices_of_a_text_are_not_collected():
+    """A list of the lines would have 20 times the text's size."""
+    text = with_a_camera((*["9"] * 20_000, "1 2 3"), count=1, cameras=20_001).encode()
+    tracemalloc.start()
+    try:
+        assert parse_ply("a.ply", text).tolist() == [(1.0, 2.0, 3.0)]
+        assert tracemalloc.get_traced_memory()[1] < 10 * len(text)
+    finally:
+        tracemalloc.stop()
+
+
+def test_more_rows_before_the_vertices_than_the_text_has_leave_no_vertex(tmp_path):
+    (tmp_path / "a.ply").write_text(with_a_camera(("1 2 3",), count=1, cameras=10**30).rstrip())
+    with pytest.raises(InputError, match="ends after 0 of its 1 points"):
+        read_cloud(tmp_path / "a.ply")
 
 
 @pytest.mark.parametrize(("rows", "there"), [((), 0), (("1 2 3",), 1)])

@@ -130,6 +130,31 @@ def test_colours_of_others_are_read_as_they_were_meant(tmp_path, write):
     np.testing.assert_array_equal(read_cloud(tmp_path / "mesh.glb").colors, GREY.colors)
 
 
+@pytest.mark.parametrize("colored", [True, False])
+def test_lines_and_points_are_beside_the_triangles_of_a_modeller(tmp_path, colored):
+    """Points may have colours or none; lines, which are no part of a surface, are left out."""
+
+    def by_a_modeller(document):
+        document["asset"]["generator"] = "a modeller"
+
+    mesh = trimesh.Trimesh(GREY.vertices_m, GREY.triangles, process=False)
+    light = np.repeat(np.rint(255.0 * LINEAR).astype(np.uint8)[:, None], 3, axis=1)
+    points = trimesh.PointCloud(GREY.vertices_m, light if colored else None)
+    for name, parts in (
+        ("model", [mesh, trimesh.load_path(GREY.vertices_m[:3]), points]),
+        ("points", points),
+    ):
+        glb = export_glb(trimesh.Scene(parts), tree_postprocessor=by_a_modeller)
+        (tmp_path / f"{name}.glb").write_bytes(glb)
+    np.testing.assert_array_equal(read_mesh(tmp_path / "model.glb").triangles, GREY.triangles)
+    assert len(read_cloud(tmp_path / "model.glb")) == 6 + 6
+    colors = read_cloud(tmp_path / "points.glb").colors
+    if colored:
+        np.testing.assert_allclose(colors[3:].astype(float), GREY.colors[3:], atol=1)
+    else:
+        assert colors is None
+
+
 def test_an_stl_keeps_its_triangles_and_joins_its_vertices_but_has_no_colours(tmp_path, sphere):
     colors = np.full((len(sphere.vertices), 3), 77, np.uint8)
     write_mesh(tmp_path / "mesh.stl", Surface(sphere.vertices, sphere.faces, colors))

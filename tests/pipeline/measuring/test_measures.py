@@ -289,6 +289,17 @@ def test_planes_seen_from_both_sides_of_a_box_are_none(inward):
         measures.box_of_planes(*corner(*inward))
 
 
+def test_the_floor_in_front_of_a_small_box_is_no_face_of_it():
+    """It has many more points than the two faces, which are seen from outside, and it is seen from inside."""
+    x, y, z = np.eye(3)
+    floor = sheet(40, 40, 0.05, (0.05, -2.05, 0.0), x, y)
+    surface = measured(joined(floor, sheet(8, 8, 0.05, x=z, y=y), sheet(8, 8, 0.05, x=x, y=z)))
+    places = ([1.0, -1.0, 0.0], [0.0, 0.2, 0.2], [0.2, 0.0, 0.2])
+    planes = tuple(plane_at(surface, np.array(place)) for place in places)
+    with pytest.raises(InputError, match="some are seen from outside it, others from inside"):
+        measures.box_of_planes(surface, planes)
+
+
 def test_the_area_of_a_hole():
     vertices_m, triangles, normals = sheet(20, 20, 0.05)
     middle_m = vertices_m[triangles].mean(axis=1)

@@ -40,7 +40,6 @@ class Session:
         """The calibration of these photographs has come."""
         self.want(views)
         self.results.put("calibrate", self.spec.key("calibrate"), None)
-        self.answers.follow()
 
     def ask(self):
         """As the screen does whenever it shows a view of the camera."""

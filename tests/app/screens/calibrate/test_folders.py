@@ -25,7 +25,7 @@ from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.calibration.board import Board
 from pipeline.calibration.lens import FREE
-from pipeline.calibration.shots import NodeShots
+from pipeline.calibration.shots import NodeShots, node_shots
 from pipeline.sources import Calibrated, Demo
 from tests.app.fakes import Impatient, ui_of
 
@@ -216,15 +216,24 @@ def test_photographs_of_two_cameras_do_not_replace_each_other(tmp_path):
 
 
 def test_photographs_of_one_name_are_all_kept(tmp_path):
-    """A telephone names each picture that it takes for a page image.jpg."""
-    contents = [b"0", b"1", b"0", b"2", b"1"]
-    kept = [
-        keep_photographs(SimpleNamespace(name="image.jpg", content=content), tmp_path, "node_00")
-        for content in contents
-    ]
-    names = ["image.jpg", "image-2.jpg", "image.jpg", "image-3.jpg", "image-2.jpg"]
-    assert kept == [[f"node_00/{name}"] for name in names]
-    assert [(tmp_path / "node_00" / name).read_bytes() for name in names] == contents
+    """A telephone names each picture that it takes for a page image.jpg; a number says the moment."""
+
+    def keep(name, content):
+        return keep_photographs(SimpleNamespace(name=name, content=content), tmp_path, "node_00")[0]
+
+    names = [keep("image.jpg", content) for content in (b"0", b"1", b"0", b"2")]
+    assert names == [f"node_00/image-{number}.jpg" for number in (1, 2, 1, 3)]
+    assert keep("color_05.png", b"5") == keep("color_05.png", b"5, again") == "node_00/color_05.png"
+    assert keep("color_04.png", b"4") == "node_00/color_04.png"
+    assert keep("image.jpg", b"3") == "node_00/image-6.jpg"
+    shots = {shot.moment: shot.color.read_bytes() for shot in node_shots([tmp_path])[0].shots}
+    assert shots == {"1": b"0", "2": b"1", "3": b"2", "4": b"4", "5": b"5, again", "6": b"3"}
+
+
+def test_a_zip_has_one_board(tmp_path):
+    boards = packed({"a/board.json": b"{}", "b/board.json": b'{"rows": 9}', "a/color_00.png": b"0"})
+    with pytest.raises(InputError, match=r"several board\.json that differ; leave one"):
+        keep_photographs(boards, tmp_path, "node_00")
 
 
 def test_a_camera_is_found_by_its_name_alone():

@@ -19,6 +19,7 @@ from pipeline.registration.finding.search import search
 from pipeline.registration.finding.starts import Start, by_surfaces, default_gates_m
 from pipeline.registration.finding.surface import Surface
 from pipeline.registration.finding.verdict import verdict_on
+from pipeline.registration.global_start import default_voxel_m
 from pipeline.types import PointCloud
 from tests.pipeline.registration.finding.places import T_TRUE, pair, room
 
@@ -150,36 +151,56 @@ def test_where_few_points_lead_apart_more_points_decide(monkeypatch, clouds, ans
     doubtful = checks("given", rough, [rough])
     assert not doubtful.settled
     assert doubtful.spread_m == pytest.approx(0.05, abs=0.01)
-    checked = checks.repeated("given", rough, doubtful.spread_m)
+    assert doubtful.undecided
+    checked = checks.complete("given", rough, doubtful.spread_m, [rough])
     assert checked.settled
     assert checked.spread_m < 0.01
     assert point_error_m(checked.candidate.T_target_source, T_TRUE, source.points_m) < 0.01
 
 
-@pytest.mark.parametrize(("apart_with_more_m", "word"), [(0.001, "sure"), (1.0, "doubtful")])
-def test_of_answers_whose_draws_disagree_only_the_best_is_repeated_with_more_points(
-    monkeypatch, clouds, apart_with_more_m, word
+@pytest.mark.parametrize(
+    ("few_m", "more_m", "word", "repetitions"),
+    [(1.0, 0.001, "sure", [1]), (1.0, 1.0, "doubtful", [2]), (0.03, 1.0, "doubtful", [2, 2])],
+)
+def test_of_answers_whose_few_points_disagree_only_the_best_is_repeated_with_more(
+    monkeypatch, clouds, few_m, more_m, word, repetitions
 ):
-    """With so many points a registration takes a second; each gate of each start has an answer."""
+    """With so many points a registration takes a second, and each gate of each start has an answer. Where few
+    points agree within half a fiftieth of the extent, each is repeated, and none again in the end."""
     few, repeated = doubts.QUICK_POINTS, []
 
     def spread_m(checks, answer, points=few):
-        return 1.0 if points == few else apart_with_more_m
+        return few_m if points == few else more_m
 
     def again(checks, answer, seed, points):
         repeated.append(points)
         return answer.T_target_source
 
+    source, target = clouds
+    judge, start = Judge(Surface(source), Surface(target)), Start("given", lambda: [np.eye(4)])
+    voxel_m = default_voxel_m(target)
+    assert 0.3 * voxel_m < 0.03 < 0.5 * voxel_m
     monkeypatch.setattr(Checks, "_spread_m", spread_m)
     monkeypatch.setattr(Checks, "_again", again)
     monkeypatch.setattr(doubts, "QUICK_POINTS", 500)
     monkeypatch.setattr(doubts, "MORE_POINTS", (1000, 1500))
-    found = found_from(*clouds)
-    assert len(found.tried) > 1
-    assert repeated == ([1000] if word == "sure" else [1000, 1500])
+    found = search(source, target, [start], judge, CONFIG, gates_m=(0.3, 0.6))
+    assert len(found.tried) == 2
+    assert repeated == [points for count in repetitions for points in (1000, 1500)[:count]]
     assert (found.verdict.word, found.settled) == (word, word == "sure")
-    assert found.spread_m == apart_with_more_m
-    assert error_m(found, clouds[0]) < 0.01
+    assert found.spread_m == more_m
+    assert error_m(found, source) < 0.01
+
+
+def test_a_complete_check_knows_an_answer_elsewhere_with_a_better_score(clouds, answer):
+    source, target = clouds
+    checks, here = Checks(source, target, Judge(Surface(source), Surface(target)), CONFIG), answer.candidate
+    T_other = rigid(np.eye(3), [1.0, 0.0, 0.0]) @ here.T_target_source
+    better = replace(here, T_target_source=T_other, evidence=replace(here.evidence, on=here.evidence.on + 1))
+    checked = checks.complete("given", here, 0.1, [here, better])
+    assert checked.doubts == ("1 m away, the source fits as well",)
+    assert not checked.settled
+    assert not checked.undecided
 
 
 def test_more_points_replace_no_answer_whose_evidence_was_better(monkeypatch, clouds, answer):
