@@ -18,10 +18,8 @@ from packetmesh.files import file_trouble
 
 NICENESS = 5
 """Niceness of the computing processes: the server process gets the processor first."""
-OUT_OF_MEMORY = (
-    "There is not enough memory for this: "
-    "try smaller settings (fewer points, images or nodes, or a shorter run)."
-)
+TRY_SMALLER = "try smaller settings (fewer points, images or nodes, or a shorter run)."
+OUT_OF_MEMORY = f"There is not enough memory for this: {TRY_SMALLER}"
 
 
 def attend(connection: Connection, warm_up: Callable[[], Iterator[None]], threads: int) -> None:

@@ -20,7 +20,7 @@ from typing import Any, Literal
 
 import psutil
 
-from app.compute.child import attend
+from app.compute.child import TRY_SMALLER, attend
 
 logger = logging.getLogger(__name__)
 
@@ -30,10 +30,7 @@ RESPAWN_PAUSE_S = 1.0
 """Pause before a process is started that replaces one that died at its start or grew too large, seconds."""
 MEMORY_LIMIT_BYTES = 2 << 30
 """Memory limit of a process: one that holds more after a job is replaced by a new process."""
-DIED = (
-    "The computing process ended unexpectedly, perhaps out of memory: "
-    "try smaller settings (fewer points, images or nodes, or a shorter run)."
-)
+DIED = f"The computing process ended unexpectedly, perhaps out of memory: {TRY_SMALLER}"
 
 
 @dataclass(frozen=True, slots=True)

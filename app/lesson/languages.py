@@ -92,7 +92,8 @@ PHRASES = {
         guess="Take a guess: 1, 2 or 3. Or press **Skip**.",
         first="**Guess before you go on: 1, 2 or 3.** A wrong guess costs nothing. Or press **Skip**.",
         voting="The class votes: 1, 2 or 3. The teacher's guess, or **Skip**, shows the answer.",
-        computing="The answer depends on the scene: it appears when the numbers of this stop are computed.",
+        computing="The answer depends on the scene: it appears when the numbers of this stop are computed, "
+        "if they decide the question.",
         right="Right.",
         wrong="Not quite, and many think so.",
         place="({} of {})",
@@ -108,7 +109,7 @@ PHRASES = {
         voting="Der Kurs stimmt ab: 1, 2 oder 3. Wenn die Lehrkraft rät oder **Skip** drückt, erscheint die "
         "Antwort.",
         computing="Die Antwort hängt von der Szene ab: Sie erscheint, sobald die Zahlen dieser Station "
-        "berechnet sind.",
+        "berechnet sind, falls sie die Frage entscheiden.",
         right="Richtig.",
         wrong="Nicht ganz, aber das denken viele.",
         place="({} von {})",
@@ -122,7 +123,8 @@ PHRASES = {
         guess="Adivina: 1, 2 o 3. O pulsa **Skip** (saltar).",
         first="**Adivina antes de seguir: 1, 2 o 3.** Equivocarse no cuesta nada. O pulsa **Skip**.",
         voting="La clase vota: 1, 2 o 3. Cuando quien enseña responde o pulsa **Skip**, sale la respuesta.",
-        computing="La respuesta depende de la escena: sale en cuanto se calculan los números de esta parada.",
+        computing="La respuesta depende de la escena: sale en cuanto se calculan los números de esta parada, "
+        "si deciden la pregunta.",
         right="Correcto.",
         wrong="No del todo, aunque mucha gente lo cree.",
         place="({} de {})",
@@ -136,7 +138,7 @@ PHRASES = {
         guess="ลองทายดู: 1, 2 หรือ 3 หรือกด **Skip** (ข้าม)",
         first="**ทายก่อนไปต่อ: 1, 2 หรือ 3** ทายผิดก็ไม่เสียอะไร หรือกด **Skip**",
         voting="ทั้งชั้นลงคะแนน: 1, 2 หรือ 3 เมื่อผู้สอนทายหรือกด **Skip** คำตอบจะปรากฏ",
-        computing="คำตอบขึ้นอยู่กับฉาก และจะปรากฏเมื่อคำนวณตัวเลขของตอนนี้เสร็จ",
+        computing="คำตอบขึ้นอยู่กับฉาก และจะปรากฏเมื่อคำนวณตัวเลขของตอนนี้เสร็จ หากตัวเลขตัดสินคำถามได้",
         right="ถูกต้อง",
         wrong="ยังไม่ใช่ และหลายคนก็คิดเช่นนี้",
         place="({} จาก {})",

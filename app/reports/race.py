@@ -27,9 +27,9 @@ class RaceRun:
     poses: FloatArray
     """(K, 4, 4) T_world_source."""
     offs_cm: FloatArray
-    """(K,) error, centimetres; NaN if unknown."""
+    """(K,) error, centimetres; NaN, a gap in the curve, if it is out of reach or unknown."""
     offs: tuple[str, ...]
-    """(K,) the same as texts."""
+    """(K,) error as text; one out of reach as its lower limit."""
     notes: tuple[str, ...]
     """(K,) status texts."""
     arrived: bool | None

@@ -227,7 +227,12 @@ class Race {
     for (const run of this.record.runs) {
       pen.strokeStyle = run.color;
       pen.beginPath();
-      for (let step = 0; step <= this.now; step++) pen.lineTo(x(step), y(run.offs_cm[Math.min(step, run.offs_cm.length - 1)] ?? 0));
+      let known = false; // whether the step before has a number; the curve has a gap where there is none
+      for (let step = 0; step <= this.now; step++) {
+        const off = run.offs_cm[Math.min(step, run.offs_cm.length - 1)];
+        if (off !== null) pen[known ? "lineTo" : "moveTo"](x(step), y(off));
+        known = off !== null;
+      }
       pen.stroke();
     }
     pen.fillRect(x(this.now) - 1, top, 2, base - top);

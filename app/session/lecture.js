@@ -2,6 +2,8 @@
 window.packetmeshLecture = (() => {
   const REFUSED_MS = 4000;
   const VOTER = "packetmesh-voter"; // key of the browser's id
+  const bytes = [...crypto.getRandomValues(new Uint8Array(16))];
+  const fresh = bytes.map(byte => byte.toString(16).padStart(2, "0")).join(""); // id of a browser that has none
   let name = null; // name of the seat's hidden field
   let said = 0;
   let refused = 0; // timer that removes the refusal message
@@ -27,13 +29,15 @@ window.packetmeshLecture = (() => {
     say(follows ? "follow" : "roam");
   }
 
-  // The browser's random id, which it keeps: a student who reloads the page still has one vote.
+  // The browser's random id, which it keeps: a student who reloads the page still has one vote. Where the
+  // browser's storage is blocked, the id lasts as long as the page.
   function voter() {
-    if (localStorage.getItem(VOTER) === null) {
-      const bytes = [...crypto.getRandomValues(new Uint8Array(16))];
-      localStorage.setItem(VOTER, bytes.map(byte => byte.toString(16).padStart(2, "0")).join(""));
+    try {
+      if (localStorage.getItem(VOTER) === null) localStorage.setItem(VOTER, fresh);
+      return localStorage.getItem(VOTER);
+    } catch {
+      return fresh;
     }
-    return localStorage.getItem(VOTER);
   }
 
   // Take a choice in the lesson as a vote. Returns false if no vote is open.

@@ -18,7 +18,7 @@ MOST_OF_ONE_ADDRESS = 48
 MOST_WAITING, MOST_WAITING_OF_ONE = 64, 32
 BUILD_S = 5.0
 """Longest wait for a session to be built before the next one starts, seconds."""
-SILENT_S = 60.0
+NO_PAGE_S = 60.0
 """Time from the start of its session after which a browser that has not shown the page is disconnected,
 seconds. A page reports at once."""
 LOOK_S = 5.0
@@ -119,7 +119,7 @@ class Crowd:
 
     def _look(self) -> None:
         while not self._closing.wait(LOOK_S):
-            late_s = time.monotonic() - SILENT_S
+            late_s = time.monotonic() - NO_PAGE_S
             with self._lock:
                 silent = [one for one in self._inside.values() if one.began_s < late_s]
             for one in silent:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from dataclasses import dataclass
 
 MOST_BYTES = 256 << 20
 """Largest file, bytes; screens may have lower limits."""
@@ -18,12 +19,20 @@ REFUSED = (
 )
 
 
+@dataclass(slots=True)
+class _Left:
+    """What is still to come of an accepted file."""
+
+    size_bytes: int
+    parts: int
+
+
 class UploadGate:
     """Counts what one connection uploads."""
 
     def __init__(self) -> None:
-        self._left: dict[str, int] = {}
-        """Bytes still to come, by transfer."""
+        self._left: dict[str, _Left] = {}
+        """By transfer, of which a complete one stays known: it cannot begin again."""
         self._total = 0
         self._begun_s: deque[float] = deque(maxlen=MOST_A_MINUTE)
 
@@ -38,16 +47,18 @@ class UploadGate:
             return False
         self._begun_s.append(now_s)
         self._total += counted_bytes
-        self._left[transfer] = size_bytes
+        self._left[transfer] = _Left(size_bytes, parts)
         return True
 
     def awaits(self, transfer: object) -> bool:
-        """Whether a transfer is that of an accepted file, of which there is no part too many yet."""
-        return isinstance(transfer, str) and self._left.get(transfer, -1) >= 0
+        """Whether a transfer is that of an accepted file with parts still to come."""
+        return isinstance(transfer, str) and transfer in self._left and self._left[transfer].parts > 0
 
     def goes_on(self, transfer: str, size_bytes: int) -> bool:
-        """Whether a part belongs to an accepted file and keeps within the announced size."""
-        if transfer not in self._left:
+        """Whether a part belongs to an accepted file and keeps within the announced size and parts."""
+        if not self.awaits(transfer):
             return False
-        self._left[transfer] -= size_bytes
-        return self._left[transfer] >= 0
+        left = self._left[transfer]
+        left.size_bytes -= size_bytes
+        left.parts = left.parts - 1 if left.size_bytes >= 0 else 0
+        return left.size_bytes >= 0

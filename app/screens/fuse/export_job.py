@@ -82,7 +82,7 @@ def _run(lane: RaceLane, view: RaceView) -> RaceRun:
         name=lane.label,
         color=color_of(lane.rival),
         poses=np.array([view.T_world_target @ step.T_target_source for step in lane.steps]),
-        offs_cm=np.array([100.0 * step.off_m for step in lane.steps]),
+        offs_cm=lane.offs_cm,
         offs=tuple(off_text(step) for step in lane.steps),
         notes=(*notes, f"{end} after {lane.iterations} iterations · {lane.verdict}"),
         arrived=arrived,

@@ -69,7 +69,7 @@ DEGRADATIONS: dict[str, tuple[str, float, float, float, str]] = {
     "depth_bias": ("Bias (%)", 15.0, 0.5, 100.0, "RMS of a smooth relative error of the depth."),
 }
 """By field of ``Race``: label, maximum, step, shown units per unit of the field, hint."""
-UNDEGRADED = Markdown("The scanners stood inside the synthetic rooms; only a camera's cloud is degraded.")
+UNDEGRADED = Markdown("A synthetic room's scan cannot be degraded: its scanner stood inside.")
 MOST_LANES = 4
 MOST_SEED = 20
 MARKS = "①②③④"

@@ -140,13 +140,14 @@ def numbers(scene: str, race: Race, view: RaceView) -> Numbers:
         "bias": number(race.depth_bias, 0, "%", 100.0),
         "noise": number(race.noise_m, 0, "cm", 100.0),
     }
-    ends_m = {lane.rival: lane.steps[-1].off_m for lane in view.lanes}
+    ends = ((lane.rival, lane.steps[-1]) for lane in view.lanes)
+    ends_m = {rival: np.inf if step.out_of_reach else step.off_m for rival, step in ends}
     return {SCENE: scene, **values, **_verdicts(ends_m)}
 
 
 def _verdicts(ends_m: Mapping[Rival, float]) -> dict[str, str]:
     """Return the word of each question whose two errors are known: CEICP-A's weights or the plane metric;
-    CEICP or the trimmed methods without entropy."""
+    CEICP or the trimmed methods without entropy. An error is infinite if it is out of reach."""
     words = {}
     plane_m, weights_m = ends_m.get(("icp", "plane")), ends_m.get(("ceicp-a", "point"))
     if plane_m is not None and weights_m is not None:
@@ -161,7 +162,10 @@ def _verdicts(ends_m: Mapping[Rival, float]) -> dict[str, str]:
 
 
 def _which(one_m: float, other_m: float, words: tuple[str, str, str]) -> str:
-    """Return the first word if ``one_m`` is less by more than ``ALIKE_M``, the last if ``other_m`` is."""
+    """Return the first word if ``one_m`` is less by more than ``ALIKE_M``, the last if ``other_m`` is;
+    ``UNKNOWN`` if both are out of reach."""
+    if one_m == other_m == np.inf:
+        return UNKNOWN
     if abs(one_m - other_m) <= ALIKE_M:
         return words[1]
     return words[0] if one_m < other_m else words[2]

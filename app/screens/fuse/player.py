@@ -87,23 +87,19 @@ class RacePlayer:
 def error_lane(reference: Reference, lanes: Sequence[RaceLane], clock: RaceClock) -> CurvesLane:
     """Return a lane of the error of every method on one scale; curves are hidden after the clock's time, and
     have a gap where the error is out of reach."""
-    offs_cm = [
-        np.array([np.nan if step.out_of_reach else 100.0 * step.off_m for step in lane.steps])
-        for lane in lanes
-    ]
-    high_cm = round_up(max(1.0, *(float(np.nanmax(off_cm, initial=0.0)) for off_cm in offs_cm)))
+    high_cm = round_up(max(1.0, *(float(np.nanmax(lane.offs_cm, initial=0.0)) for lane in lanes)))
     curves = [
         Curve(
             mark,
             "cm",
             color_of(lane.rival),
             steps_ns,
-            off_cm,
+            lane.offs_cm,
             0.0,
             high_cm,
             OFF_DIGITS,
             lane.rival[1] == "plane",
         )
-        for mark, lane, steps_ns, off_cm in zip(MARKS, lanes, clock.steps_ns, offs_cm, strict=False)
+        for mark, lane, steps_ns in zip(MARKS, lanes, clock.steps_ns, strict=False)
     ]
     return CurvesLane(OFF_FROM[reference], curves, LANE_PX, veil=1.0, titled=True)

@@ -27,6 +27,8 @@ from app.screens.fuse.place import FIRST
 from app.screens.fuse.view import OF_NODES, Race, RaceMode, Rival, Start
 from app.window.ui import Ui
 
+DECIMALS = 9
+"""Decimals of a degradation, so that 7 % is 0.07 in an address, not 0.07000000000000002."""
 METHOD_HINT = "Method and what it minimises: distance to the paired point, or to the plane at it."
 
 
@@ -192,7 +194,7 @@ class RaceSetup:
         self._direction.value = next(name for name, way in DIRECTIONS.items() if way == race.direction)
         self._seed.value = race.seed
         for name, handle in self._worse.items():
-            handle.value = DEGRADATIONS[name][3] * getattr(race, name)
+            handle.value = round(DEGRADATIONS[name][3] * getattr(race, name), DECIMALS)
         self.choose_mode(race.mode)
         self.write_start(race.start)
 
@@ -207,7 +209,10 @@ class RaceSetup:
 
     def _read(self, race: Race) -> Race:
         """Return ``race`` with the values of the controls of clouds and methods."""
-        worse = {name: handle.value / DEGRADATIONS[name][3] for name, handle in self._worse.items()}
+        worse = {
+            name: round(handle.value / DEGRADATIONS[name][3], DECIMALS)
+            for name, handle in self._worse.items()
+        }
         return replace(
             self._between_chosen(race),
             rivals=tuple(RIVALS[slot.value] for slot in self._slots if slot.value != NOBODY),

@@ -80,8 +80,10 @@ class ShownChoice:
         """
         self._offer(single, walk)
         requested, self._requested, self._known = self._requested, "", True
-        if requested:
-            self._ui.post(self.take, requested)
+        if requested and self._label(requested) in self._handle.options:
+            self.take(requested)
+        elif requested:
+            self._ui.post(self.take, requested)  # it says that there is no such entry
 
     def _offer(self, single: bool, walk: bool) -> None:
         races = [name for name, mode in RACES.items() if mode != "nodes" or not single]
@@ -139,13 +141,18 @@ class ShownChoice:
         if not self._known:
             self._requested = place
             return
-        race = next(name for name in options if name in RACES)
-        label = {"": options[0], RACE: race, **NAMES}.get(place)
+        label = self._label(place)
         if label is None or label not in options:
-            tell_unknown(place, [name for name in (RACE, *NAMES) if NAMES.get(name, race) in options])
+            tell_unknown(place, [name for name in (RACE, *NAMES) if self._label(name) in options])
         elif self._handle.value != label and not (place == RACE and self.mode is not None):
             self._choose(label)
             self._on_change()
+
+    def _label(self, place: str) -> str | None:
+        """Return the entry of a name in the address; None if no scene has one of that name."""
+        options = self._handle.options
+        race = next(label for label in options if label in RACES)
+        return {"": options[0], RACE: race, **NAMES}.get(place)
 
     def _picked(self) -> None:
         self._requested = ""

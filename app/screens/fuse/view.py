@@ -189,6 +189,11 @@ class RaceLane:
     """Why it is not sure; empty if it is."""
 
     @property
+    def offs_cm(self) -> FloatArray:
+        """(K,) error of every step, centimetres; NaN if it is out of reach or unknown."""
+        return np.array([np.nan if step.out_of_reach else 100.0 * step.off_m for step in self.steps])
+
+    @property
     def verdict_text(self) -> str:
         """The verdict with its reasons."""
         return f"{self.verdict}: {'; '.join(self.reasons)}" if self.reasons else self.verdict

@@ -184,8 +184,10 @@ class WalkPart:
         self._picked_loop()
         self._take_waiting_look()
         loop, self._requested_loop = self._requested_loop, ""
-        if loop:
-            self._ui.post(self._take_loop, loop)
+        if loop in self._pairs():
+            self._take_loop(loop)
+        elif loop:
+            self._ui.post(self._take_loop, loop)  # it says that there is no such loop
 
     # The moment.
 

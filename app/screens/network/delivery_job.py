@@ -145,7 +145,7 @@ def reconstruction_of(store: Store, sending: Sending) -> Generator[Progress, Non
 
 
 def _lossless(store: Store, spec: Spec, sending: Sending) -> Generator[Progress, None, Lossless | None]:
-    key = ("lossless", spec.key("network"))
+    key = ("lossless", spec_key(spec, "truth"))
     try:
         return (yield from store.remember(key, partial(_measured, store, sending)))
     except ReconstructionError:

@@ -232,6 +232,9 @@ def test_only_parts_of_accepted_files_are_awaited():
     assert [gate.awaits(transfer) for transfer in ("a", "b", ["a"], None)] == [True, False, False, False]
     gate.goes_on("a", 5)
     assert not gate.awaits("a")
+    gate.begins(10, 3, "empty parts")
+    assert [gate.goes_on("empty parts", size) for size in (0, 0, 10, 0)] == [True, True, True, False]
+    assert not gate.awaits("empty parts")
 
 
 def test_an_upload_makes_room_for_another_when_it_is_a_minute_old(monkeypatch):

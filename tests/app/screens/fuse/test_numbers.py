@@ -1,6 +1,8 @@
 """What the Fuse screen says and draws of a race, without a browser."""
 
 import re
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,19 +11,23 @@ from app.drawing.colors import css
 from app.screens.fuse.capture import capture_html, capture_sentence, cell_name
 from app.screens.fuse.charts import kernel, weights
 from app.screens.fuse.draw import gizmo_pose, start_of
+from app.screens.fuse.lesson import numbers
 from app.screens.fuse.methods import color_of
 from app.screens.fuse.numbers import places_table, race_table, winner
 from app.screens.fuse.view import (
     CAPTURE_SHIFTS_M,
     CAPTURE_TURNS_DEG,
+    REACH_M,
     CaptureView,
     FuseView,
     PairHistogram,
+    Race,
     RaceLane,
     RaceStep,
     RegistrationRow,
     Start,
 )
+from app.window.tables import UNKNOWN
 
 NOTHING = np.empty((0, 3), np.float32)
 EDGES_M = np.linspace(0.0, 0.3, 31)
@@ -55,6 +61,25 @@ def lane(label, error_m, reason="converged", sigma_m=float("nan"), kernel=False,
 def test_the_winner_is_named(errors_m, sentence):
     lanes = tuple(lane(label, error_m) for label, error_m in errors_m.items())
     assert sentence in winner("cloud" if None in errors_m.values() else "truth", lanes)
+
+
+@pytest.mark.parametrize(
+    ("gaps_m", "word"),
+    [
+        ((0.30, 0.20), "weights"),
+        ((0.20, REACH_M), "plane"),
+        ((REACH_M, 0.497), "weights"),
+        ((0.200, 0.203), "alike"),
+        ((REACH_M, REACH_M), UNKNOWN),
+    ],
+)
+def test_a_question_on_two_ends_out_of_reach_has_no_answer(gaps_m, word):
+    bare = lane("", None)
+    lanes = tuple(
+        replace(bare, rival=rival, steps=(replace(bare.steps[0], gap_m=gap_m),))
+        for rival, gap_m in zip((("icp", "plane"), ("ceicp-a", "point")), gaps_m, strict=True)
+    )
+    assert numbers("office", Race(), SimpleNamespace(lanes=lanes))["more"] == word
 
 
 def test_where_nobody_knows_the_truth_nothing_speaks_of_it():

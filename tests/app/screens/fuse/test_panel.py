@@ -9,6 +9,7 @@ import viser
 
 from app.screens.fuse.labels import RACE_NAMES, RESULT
 from app.screens.fuse.panel import FusePanel
+from app.screens.fuse.place import race_text
 from app.screens.fuse.race_job import contest_of
 from app.screens.fuse.rooms import ROOMS
 from app.screens.fuse.setup import RaceSetup
@@ -95,10 +96,10 @@ def test_a_room_is_raced_without_the_degradation_of_the_race_before(requests, mo
     assert contest.source is ROOMS[mode]().source
     noise = bench.gui.find("Noise (cm)")
     assert (noise.value, noise.disabled) == (0.0, True)
-    assert "inside the synthetic rooms" in bench.gui.text()
+    assert "scan cannot be degraded" in bench.gui.text()
     bench.gui.set("Show", RACE_NAMES["nodes"])
     assert not noise.disabled
-    assert "inside the synthetic rooms" not in bench.gui.text()
+    assert "scan cannot be degraded" not in bench.gui.text()
 
 
 @pytest.mark.parametrize(
@@ -128,6 +129,25 @@ def test_the_nodes_of_an_address_wait_for_its_scene():
         assert (setup.race.source, setup.race.target) == (2, 1)
         setup.choose_nodes(names)
         assert (setup.race.source, setup.race.target) == nodes
+
+
+@pytest.mark.parametrize(
+    ("label", "shown", "text"),
+    [
+        ("Noise (cm)", 7.0, "noise_m=0.07"),
+        ("Noise (cm)", 0.7, "noise_m=0.007"),
+        ("Holes (%)", 29.0, "hole_share=0.29"),
+    ],
+)
+def test_a_slider_and_its_address_have_no_more_digits_than_were_set(requests, label, shown, text):
+    bench = requests(2)
+    bench.gui.set(label, shown)
+    bench.gui.set("Seed", 3)
+    assert text in race_text(bench.races[-1]).split()
+    bench.panel.in_address["race"].take(race_text(bench.races[-1]))
+    assert bench.gui.find(label).value == shown
+    bench.gui.set("Seed", 4)
+    assert text in race_text(bench.races[-1]).split()
 
 
 @pytest.mark.parametrize("text", ["", "seed=3", "mode=nodes", "source=1 noise_m=0.01"])

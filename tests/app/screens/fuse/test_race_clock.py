@@ -68,3 +68,4 @@ def test_a_curve_begins_where_the_distance_is_within_reach():
     said = [curves.labels(row * COUNT_NS)[1].text for row in range(3)]
     assert said == ["① –", "① 30.00 cm", "① 10.00 cm"]
     assert curves.ticks[0].text == "40 cm"
+    np.testing.assert_allclose(replace(SHORT, steps=tuple(steps)).offs_cm, [np.nan, 30.0, 10.0])

@@ -7,6 +7,7 @@ import io
 import json
 import re
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,9 +20,8 @@ from app.reports.race_animation import race_animation
 from app.screens.fuse.export import race_offers
 from app.screens.fuse.export_job import race_show
 from app.screens.fuse.methods import color_of
-from app.screens.fuse.numbers import off_text
 from app.screens.fuse.race_job import race_job
-from app.screens.fuse.view import Race, Start
+from app.screens.fuse.view import REACH_M, Race, Start
 from packetmesh.progress import drain
 from pipeline.sources import Demo
 
@@ -42,11 +42,22 @@ def show(view):
 def test_every_step_of_every_method_is_there_with_its_error(view, show):
     for lane, run in zip(view.lanes, show.runs, strict=True):
         assert len(run.poses) == len(run.notes) == len(run.lens) == len(lane.steps)
-        np.testing.assert_allclose(run.offs_cm, [100.0 * step.off_m for step in lane.steps])
-        assert list(run.offs) == [off_text(step) for step in lane.steps]
+        assert len(run.offs_cm) == len(run.offs) == len(lane.steps)
         assert run.color == color_of(lane.rival)
         assert run.notes[-1].endswith(f"after {lane.iterations} iterations · {lane.verdict}")
     assert show.steps == max(len(lane.steps) for lane in view.lanes)
+
+
+def test_a_page_draws_no_error_that_is_out_of_reach_and_gives_its_lower_limit(view):
+    errors = ((None, REACH_M), (None, 0.3), (0.7, np.nan), (None, np.nan))
+    (lane, *_), some = view.lanes, view.lanes[0].steps[0]
+    steps = [replace(some, point_error_m=error_m, gap_m=gap_m) for error_m, gap_m in errors]
+    lanes = (replace(lane, steps=tuple(steps)),)
+    show = race_show(replace(view, reference="cloud", lanes=lanes), "a race")
+    assert show.runs[0].offs == ("≥ 50 cm", "30.00 cm", "70.00 cm", "–")
+    np.testing.assert_allclose(show.runs[0].offs_cm, [np.nan, 30.0, 70.0, np.nan])
+    record = json.loads(re.search(r'id="record">(.*?)</script>', race_page(show))[1])
+    assert record["runs"][0]["offs_cm"] == pytest.approx([None, 30.0, 70.0, None])
 
 
 def test_the_page_holds_the_race_and_asks_for_nothing(show):

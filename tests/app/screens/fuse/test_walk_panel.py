@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 
 import cv2
@@ -10,7 +9,7 @@ import numpy as np
 import pytest
 import viser
 
-from app.compute.state import Spec
+from app.compute.state import Results, Spec
 from app.dock.dock import Dock
 from app.lesson.files import SCENE
 from app.screens.fuse.labels import RACES, RESULT, WALK
@@ -19,6 +18,7 @@ from app.screens.fuse.walk_draw import WalkDrawing
 from app.screens.fuse.walk_job import view_of
 from app.screens.fuse.walk_lesson import NUMBERS, WalkLook
 from app.screens.fuse.walk_part import NO_LOOP
+from app.session.history import History
 from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from pipeline.sources import Demo, Recorded
@@ -136,10 +136,40 @@ def test_an_address_with_an_unknown_loop_shows_the_rest_of_its_walk(store, recor
     part = bench.panel._walk
     assert part._view.frame_at(part._dock.now_ns) == LOST[0]
     assert part._pictures.files
-    ((take, text),) = posted
-    with contextlib.nullcontext() if chosen else pytest.raises(InputError, match="5-7, but no loop"):
-        take(text)
     assert bench.panel.in_address["loop"].place() == chosen
+    assert len(posted) == (not chosen)
+    for take, text in posted:
+        with pytest.raises(InputError, match="5-7, but no loop"):
+            take(text)
+    server.stop()
+
+
+@pytest.mark.parametrize(("key", "text"), [("loop", "0-39"), ("show", "result")])
+def test_a_recording_that_comes_back_by_undo_can_be_left_again_by_redo(store, recording, key, text):
+    posted = []
+    server = viser.ViserServer(port=0, verbose=False)
+    ui = ui_of(server.scene, post=lambda *call: posted.append(call))
+    bench = Bench(FusePanel, ui, store, steps=("scene",), spec=Spec(recording))
+    bench.panels = [bench.panel]
+    bench.panel.on_show()
+    bench.advance()
+    history = History(bench)
+    history.begin()
+    bench.panel.in_address[key].take(text)
+    history.follow(by_hand=True)
+    bench.want(Spec(Demo("box-on-table")))
+    history.follow(by_hand=True)
+    bench.steps = ()  # the recording's walk is still to come
+    bench.results = Results()
+    history.undo()
+    bench.steps = ("scene",)
+    bench.advance()
+    history.follow(by_hand=True)
+    for function, *arguments in posted:
+        function(*arguments)
+        history.follow(by_hand=True)
+    assert bench.panel.in_address[key].place() == text
+    assert history.has_steps == (True, True)
     server.stop()
 
 

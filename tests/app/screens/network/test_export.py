@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 from app.compute.state import Sent, Spec
+from app.screens.network import delivery_job as job
 from app.screens.network.delivery_job import delivery_job, reconstruction_of, sending_of
 from app.screens.network.export import delivery_offers, network_offers
 from app.screens.network.export_job import (
@@ -53,6 +54,12 @@ def test_a_walk_is_compared_with_the_surface_of_its_keyframes(view, store):
     result = drain(reconstruction_of(store, walked))
     assert result.rig.walk is None
     assert result.after.quality.no_hit_ray_share == view.lossless.no_hit_share
+
+
+def test_images_before_coding_are_reconstructed_once_for_all_networks(view, store):
+    other = replace(SPEC, sent=Sent(with_settings(PRESETS["office"], ["run.seed=7"]), "raw", 2))
+    sending = None  # nothing is computed from it
+    assert drain(job._lossless(store, other, sending)) == view.lossless
 
 
 def test_mesh_and_clouds_are_those_of_the_moment(view, store, tmp_path):

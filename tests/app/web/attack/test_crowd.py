@@ -123,7 +123,7 @@ def test_a_browser_whose_session_fails_is_turned_away_and_the_next_one_comes_in(
 
 
 def test_a_session_that_shows_no_page_goes(crowd, monkeypatch):
-    monkeypatch.setattr(crowds, "SILENT_S", 0.2)
+    monkeypatch.setattr(crowds, "NO_PAGE_S", 0.2)
     monkeypatch.setattr(crowds, "LOOK_S", 0.05)
     watched = Crowd()
     house = House(watched)
