@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from pipeline.folders.run import FILES
+from pipeline.folders.run import FILES, OTHER_FILES
 from pipeline.io.rigs import save_rig
 from tests.app.commands import check_one_sentence, run
 from tests.pipeline.delivery.small import small_rig
@@ -76,7 +76,7 @@ def test_the_hand_out_stands_alone(delivered):
 
 
 def test_a_later_run_deletes_each_of_its_files(delivered):
-    assert {path.name for path in delivered[0].iterdir()} <= set(FILES)
+    assert {path.name for path in delivered[0].iterdir()} <= {*FILES, *OTHER_FILES}
 
 
 def test_the_settings_are_kept_so_that_the_network_can_run_again(capsys, delivered):
