@@ -41,12 +41,11 @@ def times_of(topics: Sequence[Timed]) -> tuple[list[FloatArray], tuple[str, ...]
     if not unstamped:
         return [topic.stamps_s for topic in topics], ()
     first = unstamped[0]
-    value = float(first.stamps_s.min())
-    what = (
-        f"All headers of {first.name} have the time {value:g} s"
-        if value
-        else f"Some headers of {first.name} have no time"
-    )
+    least_s, most_s = float(first.stamps_s.min()), float(first.stamps_s.max())
+    if least_s == most_s:
+        what = f"All headers of {first.name} have " + (f"the time {most_s:g} s" if most_s else "no time")
+    else:
+        what = f"Some headers of {first.name} have no time"
     note = f"{what}: the times at which the messages came into the bag are used"
     return [np.array(topic.recorded_ns, np.float64) * 1e-9 for topic in topics], (note,)
 

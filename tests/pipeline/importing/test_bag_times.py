@@ -85,6 +85,7 @@ def test_one_header_without_a_time_is_no_statement_on_all_headers():
         return SimpleNamespace(name="/rgb", stamps_s=np.array(stamps_s), recorded_ns=np.array([5, 6, 7]))
 
     assert times_of([topic([1.0, 0.0, 3.0])])[1][0].startswith("Some headers of /rgb have no time: ")
+    assert times_of([topic([0.0, 0.0, 0.0])])[1][0].startswith("All headers of /rgb have no time: ")
     assert times_of([topic([1.0, 2.0, 3.0])])[1] == ()
 
 
