@@ -111,10 +111,10 @@ def _read(path: Path) -> dict[str, Any]:
 
 @cache
 def trial_digest(module: str, data: tuple[Path, ...] = (), root: Path = ROOT) -> str:
-    """Return twelve digits that change with everything that a trial depends on besides its task.
+    """Return twelve hexadecimal digits that change with everything that a trial depends on besides its task.
 
     That is the code of its module and of all our modules that it imports, directly or not, without comments
-    and docstrings; the versions of Python and the libraries; and the data.
+    and docstrings; the versions of Python and of ``LIBRARIES``; and the data. A process computes it once.
 
     Args:
         module: module that defines the trial's function.
@@ -132,7 +132,7 @@ def trial_digest(module: str, data: tuple[Path, ...] = (), root: Path = ROOT) ->
 
 
 def _imported(module: str, root: Path) -> dict[str, ast.Module]:
-    """Return the syntax trees of a module and of every module of ours that it needs, by name."""
+    """Return the syntax trees of a module and of every module of ours that it imports, by name."""
     found: dict[str, ast.Module] = {}
     waiting = [module]
     while waiting:
@@ -159,7 +159,7 @@ def _source(module: str, root: Path) -> Path | None:
 
 
 def library_versions(libraries: Iterable[str] = LIBRARIES) -> dict[str, str]:
-    """Return the versions of Python and of the installed ones of these libraries."""
+    """Return the versions of Python and of those of these libraries that are installed, by name."""
     versions = {"python": platform.python_version()}
     for library in libraries:
         with suppress(metadata.PackageNotFoundError):

@@ -18,22 +18,25 @@ class Benchmark:
     """One measured case, with its peers in the same run."""
 
     ours_s: float
-    """Median of the rounds, seconds."""
+    """Time of PacketMesh, seconds; the median if the case has rounds."""
     peers: dict[str, float]
-    """Median seconds of other programs on the same input."""
+    """Median seconds of the other programs on the same input, by name; empty without peers."""
     peak_memory_bytes: int
-    """Peak memory of the measuring process, including its libraries."""
+    """Peak memory of the measuring process (ours, if each program has its own), including its libraries."""
     peer_memory_bytes: dict[str, int] = field(default_factory=dict)
-    """Peak memory of the peers, if each has its own process."""
+    """Peak memory of each peer, if each program has its own process."""
     errors_m: dict[str, float] = field(default_factory=dict)
-    """Errors of the answers, ours and the peers', if the truth is known."""
+    """Error of each program's answer, ours and the peers', metres; empty if the truth is not known."""
     runs: tuple[dict[str, Any], ...] = ()
-    """Every single measurement, with values that only this case measures."""
+    """Rows of the case's own record, for example one for each round, stage, or program and group."""
     notes: tuple[str, ...] = ()
     """Lines printed below the times."""
 
     def record(self) -> dict[str, Any]:
-        """Return plain values; ``ratio`` is our time over the fastest peer's, ``ratios`` over each peer's."""
+        """Return plain values, with our time over each peer's (``ratios``) and the fastest's (``ratio``).
+
+        Without peers ``ratio`` is None.
+        """
         ratios = {name: self.ours_s / peer_s for name, peer_s in self.peers.items()}
         return asdict(self) | {"ratio": max(ratios.values(), default=None), "ratios": ratios}
 
@@ -42,7 +45,8 @@ def run_alone(function: Callable[..., Answer], *arguments: Any, timeout_s: float
     """Run a function in a fresh process that does nothing else, and return its result.
 
     Raises:
-        TimeoutError: it took longer than ``timeout_s`` and was stopped.
+        TimeoutError: it took longer than ``timeout_s``; all child processes of this process are then killed.
+        BrokenProcessPool: its process ended before it returned.
     """
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as process:
         work = process.submit(function, *arguments)

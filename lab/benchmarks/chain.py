@@ -1,4 +1,4 @@
-"""The whole chain on the nodes of a demo scene, images in memory."""
+"""Time and memory of the whole chain on the nodes of a demo scene, with the images in memory."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ROUNDS = 7
 
 
 def benchmark(nodes: int) -> Benchmark:
-    """Reconstruct the first ``nodes`` nodes of the living room."""
+    """Reconstruct the first ``nodes`` nodes of the living room, and measure the whole and each stage."""
     rig = load_demo("living-room")
     part = Rig(rig.name, rig.frames[:nodes])
     reconstruct(part, PRESETS["packetmesh"])  # loads and compiles what is only done at first use

@@ -1,4 +1,4 @@
-"""The shipped depth network: time, size, cost of its 8 bits, and its hole filling compared with peers."""
+"""The shipped depth network: time, size, error due to its 8 bits, and hole filling compared with peers."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ WARM_UP = 5
 
 @dataclass(frozen=True, slots=True)
 class NetworkSpeed:
-    """The shipped network on one image."""
+    """Speed of the shipped network on one image, its size, and errors stored in its file."""
 
     elapsed_s: float
     """Median for a frame of 640 x 480, including its resizing."""
     slowest_s: float
     rounds: int
     provider: str
-    """Execution provider that really ran it."""
+    """Execution provider of onnxruntime that ran it."""
     file_bytes: int
     abs_rel: float | None
-    """From the file's metadata: AbsRel of the quantised network on held-out rooms."""
+    """AbsRel of the quantised network on validation rooms, from the file's metadata; None without it."""
     quantisation_cost: float | None
-    """AbsRel that quantisation added to the float network's, from the metadata; None without them."""
+    """AbsRel that quantisation added to that of the float network, from the metadata; None without it."""
 
 
 def benchmark() -> Benchmark:
     """Measure the shipped network, and the filling of hidden holes by us and by the usual peers.
 
-    The times are those of filling one frame; the errors are medians over the real frames' hidden pixels, or
-    over the demo scenes' if there are no real frames.
+    The times are those of filling one frame. The errors are medians over the hidden pixels. Both are of the
+    real frames, or of the demo scenes if there are no real frames.
     """
     network = DepthNetwork()
     speed = network_speed(network, load_demo("living-room").frames[0].rgb)

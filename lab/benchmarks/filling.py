@@ -1,4 +1,4 @@
-"""Hole filling: sensor depth is hidden, filled by us and by the usual peers, and compared."""
+"""Errors of hole filling: sensor depth is hidden, filled by us and by the usual peers, and compared."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ class HoleCase:
     hole: BoolArray
     """(H, W) pixels to be filled and evaluated."""
     truth_m: FloatArray
-    """(H, W) reference depth in the hole."""
+    """(H, W) depth, metres; in the hole it is the reference."""
     measured: bool = True
-    """Whether the sensor had measured the hole; otherwise it is one of its own holes."""
+    """True if the sensor measured the hole's depth, which was then hidden; False for its own holes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ def hidden_cases(site: Site, seed: int = 0) -> Iterator[HoleCase]:
 
 
 def disc_cases(site: Site, seed: int = 0) -> Iterator[HoleCase]:
-    """Yield the images with one hidden disc of every size that fits; the hidden depth is the reference."""
+    """Yield every image once for each size of disc that fits, with one such disc hidden as the reference."""
     for place, rng, example in _drawn(site, seed):
         yield from discs(place, site.group, example.rgb, example.sensor, rng)
 
@@ -137,7 +137,7 @@ def without(hole: BoolArray, place: str, group: str, rgb: ByteArray, depth: Dept
 
 
 def chain_filling(infer: Callable[[ByteArray], DepthMap], completes: bool) -> Filler:
-    """Fill depth as the chain does with the depth that ``infer`` returns, with or without completion."""
+    """Return a filler that works as the chain does on the depth of ``infer``, with or without completion."""
     config = DepthConfig(least_confidence=0.0)  # every hidden pixel counts
 
     def fill(sensor: DepthMap, rgb: ByteArray) -> DepthMap:
@@ -149,12 +149,12 @@ def chain_filling(infer: Callable[[ByteArray], DepthMap], completes: bool) -> Fi
 
 
 def flat(rgb: ByteArray) -> DepthMap:
-    """Return one depth everywhere: shows what alignment and judgement alone achieve."""
+    """Return a depth of 1 m everywhere, to show what alignment and judgement alone achieve."""
     return DepthMap(np.ones(rgb.shape[:2], np.float32))
 
 
 def pixel_filling(network: DepthNetwork) -> Filler:
-    """Fit inferred depth by a robust line through the pixels that both have (SPEC 4.6), and nothing else."""
+    """Return a filler that maps inferred depth by one robust line through the sensor's pixels (SPEC 4.6)."""
     return lambda sensor, rgb: align_depth(network.infer(rgb), sensor, "affine_depth").depth
 
 
@@ -170,7 +170,10 @@ def programs(network: DepthNetwork) -> dict[str, Filler]:
 
 
 def compare_fillings(cases: Iterable[HoleCase], programs: dict[str, Filler]) -> tuple[Filling, ...]:
-    """Run every program on every case, and sum up by group; the first case warms the programs up."""
+    """Run every program on every case, and sum up by group.
+
+    Every program runs twice on the first case, where the second run counts. The first program must be ours.
+    """
     judged: dict[str, list[tuple[str, FloatArray]]] = {}
     seconds: dict[tuple[str, str], list[float]] = {}
     for number, case in enumerate(cases):

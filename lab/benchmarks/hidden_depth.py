@@ -16,10 +16,10 @@ LARGEST_HOLE = 0.05
 EDGE_STEP = 1.08
 """Ratio of the depths within 5 x 5 pixels that makes a depth edge."""
 BLOB_RADII = (0.015, 0.05)
-"""Half axes of a blob, in shares of the image's diagonal."""
+"""Least and largest half axis of a blob, in shares of the image's diagonal."""
 LARGEST_SHARE = 0.9
 LEAST_OF_DISC = 0.8
-"""Share of a disc's pixels that have depth to hide."""
+"""Least share of a disc's pixels that have depth to hide."""
 MOST_MISSES = 100
 
 
@@ -60,13 +60,14 @@ def hide(sensor: DepthMap, rng: np.random.Generator, share: float) -> BoolArray:
 
 
 def disc(sensor: DepthMap, radius_px: float, rng: np.random.Generator) -> BoolArray | None:
-    """Return the pixels with depth in a random disc inside the image that has depth in four fifths of its
-    pixels.
+    """Return the pixels with depth in a random disc.
+
+    The disc is inside the image and has depth in at least four fifths of its pixels.
 
     Args:
         sensor: (H, W) depth with its own holes.
         radius_px: radius of the disc.
-        rng: draws its place among all possible ones.
+        rng: draws its place, evenly among all possible ones.
 
     Returns:
         (H, W) True for pixels to hide; None if there is no place.
@@ -88,7 +89,10 @@ def disc(sensor: DepthMap, radius_px: float, rng: np.random.Generator) -> BoolAr
 
 
 def hole_shapes(valid: BoolArray) -> list[BoolArray]:
-    """Return the holes of 4 pixels to 5 % of the image, each cut out, without the sensor's blind margin."""
+    """Return the holes of 4 pixels to 5 % of the image, each as a mask of its bounding box.
+
+    The margin around the bounding box of all valid pixels is no hole.
+    """
     field = cv2.boundingRect(valid.astype(np.uint8))
     inside = valid[field[1] : field[1] + field[3], field[0] : field[0] + field[2]]
     count, labels, boxes, _ = cv2.connectedComponentsWithStats((~inside).astype(np.uint8), connectivity=8)
@@ -142,13 +146,13 @@ def stamp(
 
 
 def moved(shapes: list[BoolArray], rng: np.random.Generator) -> BoolArray:
-    """Return one of the shapes, perhaps mirrored across and upside down."""
+    """Return a random one of the shapes, mirrored at random left to right and upside down."""
     flips = rng.choice([-1, 1], 2)
     return shapes[rng.integers(len(shapes))][:: flips[0], :: flips[1]]
 
 
 def blob(size_px: tuple[int, int], rng: np.random.Generator) -> BoolArray:
-    """Return a rotated ellipse with half axes of 1.5 to 5 % of the diagonal of an image of (H, W) pixels."""
+    """Return the mask of a random ellipse with half axes of 1.5 to 5 % of the (H, W) image's diagonal."""
     axes_px = np.hypot(*size_px) * rng.uniform(*BLOB_RADII, 2)
     reach_px = int(np.ceil(axes_px.max()))
     y, x = np.mgrid[-reach_px : reach_px + 1, -reach_px : reach_px + 1]

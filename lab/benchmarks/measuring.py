@@ -13,13 +13,13 @@ from packetmesh.progress import drain
 
 ROOMS = 20
 FOLDER = Path("runs/measuring")
-"""Folder of the rooms' measures, which are not computed again."""
+"""Folder of the stored rows of the rooms; a room that has them is not measured again."""
 BATCH = 4
-"""Rooms that are tried at a time: some have no two views that overlap as asked."""
+"""Rooms in a batch; batches follow until enough rooms have two views with the required overlap."""
 
 
 def benchmark(rooms: int = ROOMS) -> Benchmark:
-    """Measure in the first held-out rooms that two cameras can see; the time is that of a length.
+    """Measure in the first held-out rooms with two usable views; the time is the median time of a length.
 
     Args:
         rooms: number of rooms.
@@ -43,7 +43,7 @@ def benchmark(rooms: int = ROOMS) -> Benchmark:
 
 
 def _line(group: Row) -> str:
-    """Return one kind of measure as a sentence."""
+    """Return the results of one kind of measure as a line of text."""
     low, high = group["coverage_ci95"]
     unit, times = UNITS.get(group["kind"], (" mm", 1000.0))
     ratio = group["error_over_raw"]

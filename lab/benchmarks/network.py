@@ -21,8 +21,8 @@ LONGEST_FIRST: tuple[SchemeName, ...] = ("baseline", "pdc", "greedy")
 """Schemes from the longest run to the shortest, so that all cores finish at about the same time."""
 SATURATED: Counts = {"ieee802154": (1, 2, 5, 20, 50), "ieee80211b": (1, 5, 20, 50)}
 SATURATED_S: dict[MacKind, float] = {"ieee802154": 60.0, "ieee80211b": 10.0}
-"""Simulated time. In IEEE 802.15.4 little happens, so the time is long compared with a run's set-up, which
-ns-3's clock excludes."""
+"""Simulated seconds. IEEE 802.15.4 has few events in a second, so its runs are longer: compared with them,
+the set-up of a run, which only our clock includes, must be short."""
 
 
 def benchmark(
@@ -31,7 +31,7 @@ def benchmark(
     runs: int = RUNS,
     saturated_s: Mapping[MacKind, float] = SATURATED_S,
 ) -> Benchmark:
-    """Measure every scheme with ``objects`` vehicles, five runs of five hours each, and saturated nodes.
+    """Measure ``runs`` runs of ``horizon_s`` of every scheme with ``objects`` vehicles, and saturated nodes.
 
     The time is that of the study, including the start of the processes; the memory is that of its largest
     process. ns-3 has no such study, so it is a peer of the saturated nodes only.

@@ -22,10 +22,11 @@ from network_sim.mac.saturation import saturation
 from packetmesh.errors import PacketMeshError
 
 TOLERANCE = 0.05
+"""Largest relative difference of throughputs that agree."""
 RADIUS_M = 10.0
 SEED = 1
 ROUNDS = 5
-"""Rounds, of which the median time counts, in both programs."""
+"""Rounds, of which the median time counts; ``ns3_runs.py`` has as many."""
 UDP_IP_BYTES = 28
 RUNS = Path(__file__).with_name("ns3_runs.py")
 IMPORTS_NS3 = "import importlib.util, sys; sys.exit(importlib.util.find_spec('ns') is None)"
@@ -105,6 +106,7 @@ class Row:
     ns3: Run | None
     """None if it did not run; then the ratios are None, too."""
     ns3_strict: Run | None
+    """None also for IEEE 802.15.4, which has no strict run."""
     ratio: float | None
     """Throughput of network_sim over ns-3's with its defaults."""
     ratio_strict: float | None
@@ -132,7 +134,7 @@ Theirs = dict[tuple[MacKind, int, bool], Run]
 
 
 def run_ours(mac: MacKind, nodes: int, seconds: float) -> Run:
-    """Return a run in network_sim with the median time of ``ROUNDS``: the first is slow, short ones vary."""
+    """Return a run in network_sim with the median time of ``ROUNDS``, because single times vary."""
     walls_s = []
     for _ in range(ROUNDS):
         started = time.perf_counter()
@@ -150,7 +152,7 @@ def run_ours(mac: MacKind, nodes: int, seconds: float) -> Run:
 
 
 def run_ns3(python: str, counts: Counts, seconds: float) -> tuple[Theirs, dict[str, dict[str, float]]]:
-    """Do all runs in ns-3, in its own interpreter.
+    """Run all scenarios in ns-3, in its own interpreter ``python``.
 
     Returns:
         The runs; ns-3's constants like ``CONSTANTS``.
@@ -216,7 +218,7 @@ def _ratio(ours: Run, theirs: Run | None) -> float | None:
 
 
 def find_python(given: str | None = None) -> str:
-    """Return an interpreter with ns-3: ``given``, the one in the environment variable, or this one.
+    """Return the path of an interpreter with ns-3: ``given``, else ``PYTHON_VARIABLE``'s, else this one.
 
     Raises:
         PacketMeshError: it cannot import ns-3.

@@ -19,11 +19,11 @@ ROUNDS = 5
 START_S = 0.2
 """End of the stations' association, which is neither counted nor timed."""
 SPREAD_S = 0.02
-"""Time within which the nodes' first packets come, at random."""
+"""Time after ``START_S`` within which each node's first packet comes, at random."""
 WARM_UP = 0.05
-"""Share of the time after the start that is not counted, as in network_sim."""
+"""Share of the time after ``START_S`` whose packets are not counted, as in network_sim."""
 MAX_DELAY_S = 3600.0
-"""Longest time in a buffer; ns-3's default of half a second is short with 20 stations."""
+"""Longest time of a packet in a buffer; ns-3's default, half a second, is too short with 20 stations."""
 PAN = 5
 
 NODES = r"""
@@ -172,7 +172,7 @@ def install_80211b(
 def run(
     mac: str, nodes: int, payload_bytes: int, radius_m: float, seconds: float, seed: int, strict: bool
 ) -> dict:
-    """Do one run; return counts of packets after the warm-up, and its cost."""
+    """Simulate one scenario; return counts of packets after the warm-up, events, and wall seconds."""
     ns.RngSeedManager.SetSeed(seed)
     ns.cppyy.gbl.saturated.tally = ns.cppyy.gbl.saturated.Tally()
     tally = ns.cppyy.gbl.saturated.tally
@@ -201,7 +201,7 @@ def median(runs: list[dict]) -> dict:
 
 
 def constants_802154() -> dict[str, float]:
-    """Return times in microseconds, and limits."""
+    """Return ns-3's constants of IEEE 802.15.4: times in microseconds, and limits."""
     devices, helper = install_802154(place(1, 10.0), [0.0], False)
     mac, csma, symbol_us = devices.Get(1).GetMac(), devices.Get(1).GetCsmaCa(), 16
     limits = csma.GetMacMinBE(), csma.GetMacMaxBE(), csma.GetMacMaxCSMABackoffs(), mac.GetMacMaxFrameRetries()
@@ -222,7 +222,10 @@ def constants_802154() -> dict[str, float]:
 
 
 def constants_80211b() -> dict[str, float]:
-    """Return times in microseconds, and limits; a data frame carries 1000 bytes over UDP."""
+    """Return ns-3's constants of IEEE 802.11b: times in microseconds, and limits.
+
+    A data frame carries 1000 bytes over UDP.
+    """
     devices, _ = install_80211b(place(1, 10.0), [0.0], False)
     phy, mac = devices.Get(1).GetPhy(), devices.Get(1).GetMac()
     slot_us, sifs_us = (time_.GetNanoSeconds() / 1e3 for time_ in (phy.GetSlot(), phy.GetSifs()))
@@ -254,7 +257,7 @@ def constants_80211b() -> dict[str, float]:
 
 
 def main() -> None:
-    """Run the scenarios in the argument and print the results."""
+    """Run the scenarios in the argument, ``ROUNDS`` times each, and print those of median time."""
     ns.cppyy.cppdef(NODES)
     ns.Config.SetDefault("ns3::WifiMacQueue::MaxDelay", ns.TimeValue(ns.Seconds(MAX_DELAY_S)))
     runs = [median([run(**scenario) for _ in range(ROUNDS)]) for scenario in json.loads(sys.argv[1])]

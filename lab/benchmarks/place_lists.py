@@ -26,7 +26,7 @@ from pipeline.io.clouds import read_cloud
 from pipeline.types import FloatArray, PointCloud
 
 LISTS = Path("runs/problems")
-"""Folder of the lists of ``lab.benchmarks.problem_lists``; those with ``--lidar`` hold a LiDAR pair too."""
+"""Folder that ``lab.benchmarks.problem_lists`` writes; with ``--lidar`` it has a LiDAR pair's list, too."""
 Row = dict[str, Any]
 
 
@@ -39,9 +39,9 @@ class ListTask:
 
 
 def benchmark(folder: Path = LISTS) -> Benchmark:
-    """Solve every problem below a folder by ours and by all peers that need no colour.
+    """Solve every problem below a folder by ours and by all installed peers that need no colour.
 
-    A folder that is missing is made, with the lists of rooms but without the LiDAR pair.
+    If the folder is missing, it is written, with the list of rooms but without the LiDAR pair.
 
     Raises:
         InputError: the folder holds no lists.
@@ -66,7 +66,7 @@ def benchmark(folder: Path = LISTS) -> Benchmark:
 
 
 def solve(task: ListTask) -> Row:
-    """Solve one problem from the moved source alone; right is what the benchmark counts as solved."""
+    """Solve one problem without a start pose; an answer is right if its error is below ``SOLVED``."""
     source, target = (read_cloud(path) for path in (task.problem.source, task.problem.target))
     moved = source.transformed(task.problem.T_moved)
     T, verdict, elapsed_s = _answer(task.program, moved, target)
@@ -103,7 +103,7 @@ def summary(rows: list[Row]) -> Iterator[Row]:
 def _answer(
     program: str, source: PointCloud, target: PointCloud
 ) -> tuple[FloatArray | None, str | None, float]:
-    """Return pose, verdict (None of a peer) and seconds."""
+    """Return the (4, 4) pose (None if none was found), the verdict (None for a peer), and the seconds."""
     if program == OURS_GEOMETRY:
         found = place_clouds(source, target)
         return found.T_target_source, found.verdict, found.elapsed_s

@@ -19,8 +19,8 @@ from packetmesh.progress import drain
 PER_OVERLAP = 75
 """Held-out pairs of each overlap."""
 MIXED, LOOKED_AT = 2200, 200
-"""Held-out pairs of any overlap, for the verdict; the first had a part in a threshold (of the draws) and are
-left out."""
+"""Held-out pairs of any overlap, for the verdict, and how many of the first of them are left out, because
+they were used to choose a threshold of the search."""
 OWN = (OURS, OURS_GEOMETRY)
 DIFFERENT = "different rooms"
 NOTHING = "no overlap"
@@ -30,9 +30,9 @@ Row = dict[str, Any]
 
 
 def benchmark(per_overlap: int = PER_OVERLAP) -> Benchmark:
-    """Place pairs of four overlaps by every program.
+    """Place pairs of four overlaps by every program, ``per_overlap`` of each.
 
-    Pairs and answers that are in ``runs/places`` are not made again.
+    Pairs and answers that are in ``runs/places`` are not computed again.
     """
     pairs = list(bench_pairs(per_overlap))
     rows = _answers(OWN, solve_own, pairs)
@@ -50,7 +50,8 @@ def benchmark(per_overlap: int = PER_OVERLAP) -> Benchmark:
 def verdicts(count: int = MIXED) -> Benchmark:
     """Place pairs of any overlap, or of different rooms, by ours, and compare its verdict with the truth.
 
-    All cores work, because no other program's times stand next to these.
+    All cores work, because these times are not compared with those of other programs. The memory is that of
+    this process, without the workers.
     """
     rows = _answers(OWN, solve_own, list(mixed_pairs(HELD_OUT, count))[LOOKED_AT:], processes=None)
     seconds = {name: _median_s(some) for name, some in grouped(rows, "program").items()}
@@ -74,7 +75,7 @@ def by_overlap(rows: Iterable[Row]) -> list[Row]:
 
 
 def by_verdict(rows: Iterable[Row]) -> list[Row]:
-    """Return counts per program for all pairs, for those without a right answer, and for bins of overlap."""
+    """Return counts per program: for all pairs, different rooms, no overlap, and each bin of overlap."""
     groups = []
     for program, own in grouped(rows, "program").items():
         bins: dict[str, list[Row]] = {"all": own, DIFFERENT: [], NOTHING: []}
@@ -98,8 +99,10 @@ def _answers(
     pairs: Sequence[tuple[int, float | None]],
     processes: int | None = 1,
 ) -> list[Row]:
-    """Return every program's rows on held-out pairs; with one process, so that times can be compared, or with
-    one for each core (None)."""
+    """Return every program's rows on held-out pairs, computed in ``processes`` processes.
+
+    With one, times can be compared; None takes one process per core.
+    """
     tasks = [PlacesTask(name, HELD_OUT, index, overlap) for index, overlap in pairs for name in programs]
     return drain(iterate_trials("places", solve, tasks, CACHE / "answers", processes=processes))
 

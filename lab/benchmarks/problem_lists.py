@@ -25,11 +25,11 @@ ROOMS = range(300, 305)
 CONDITION = "nodes-sensor"
 ROOM_POINTS = 20_000
 TURN_DEG, SHIFT_OF_EXTENT = 45.0, 0.2
-"""Largest rotation, and largest shift over the cloud's extent."""
+"""Largest rotation, and largest shift as a share of the cloud's extent."""
 
 
 def motions(cloud: PointCloud, count: int, seed: int) -> list[FloatArray]:
-    """Return (4, 4) motions about a cloud's middle, with rotations and shifts uniform up to the largest."""
+    """Return (4, 4) motions about a cloud's middle, with angles and shifts uniform from 0 to the largest."""
     rng = np.random.default_rng(seed)
     center_m, extent_m = cloud.points_m.mean(axis=0), middle_extent_m(cloud.points_m)
     result = []

@@ -41,10 +41,11 @@ class Problem:
     list_name: str
     id: str
     source: str
-    """File of the source cloud."""
+    """Path of the source cloud."""
     target: str
+    """Path of the target cloud."""
     overlap: float
-    """0 to 1."""
+    """Overlap of the clouds, 0 to 1; NaN if unknown."""
     motion: tuple[float, ...]
     """(12,) the first three rows of the matrix that moves the source away."""
 
@@ -70,7 +71,7 @@ def scaled_displacement(T_left: FloatArray, points_m: FloatArray) -> float:
 
 
 def read_problems(folder: Path) -> list[Problem]:
-    """Return every line of every list below a folder; clouds are next to their list.
+    """Return the problems of all lists below a folder; the clouds are in the folder of their list.
 
     Raises:
         InputError: no list, or an invalid line; the sentence names file and line.
@@ -82,6 +83,7 @@ def read_problems(folder: Path) -> list[Problem]:
 
 
 def _list(path: Path) -> Iterator[Problem]:
+    """Yield the problems of one list."""
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     header = lines[0].split() if lines else []
     missing = [column for column in COLUMNS if column not in header]
@@ -103,7 +105,7 @@ def _list(path: Path) -> Iterator[Problem]:
 def iterate_problems(
     folder: Path, store: Path, scheduler: str | None = None
 ) -> Generator[Progress, None, list[dict[str, Any]]]:
-    """Solve every problem below ``folder``; those in ``store`` are not solved again.
+    """Solve every problem below ``folder``; those whose rows are in ``store`` are not solved again.
 
     Returns:
         A row for each problem and method: list, id, overlap, gate, error before and after, seconds, reason.
@@ -118,9 +120,11 @@ def iterate_problems(
 
 
 def solve(problem: Problem) -> list[dict[str, Any]]:
-    """Solve one problem by every method from the same start.
+    """Solve one problem by our method and by the installed peers; return a row for each.
 
-    The peers' gate is the one with which `packetmesh register` arrives; its search counts in our time only.
+    All start at the identity; ours, like `packetmesh register`, also searches for other start poses and for
+    the gate. The peers get the gate that it found; the search counts in our time only. If ours cannot use the
+    clouds or finds no start, the only row is ours, with an error of None.
     """
     source, target = read_cloud(problem.source), read_cloud(problem.target)
     moved = source.transformed(problem.T_moved)
@@ -156,7 +160,7 @@ def solve(problem: Problem) -> list[dict[str, Any]]:
 def summary(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return, per list and method: problems, median and upper quartile of the error, share solved, seconds.
 
-    A problem without an answer counts as not solved and keeps its start error.
+    A row without an error counts as not solved, with the error before the registration.
     """
     groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for row in rows:
@@ -186,7 +190,7 @@ def write_problems(
     motions: Sequence[Sequence[FloatArray]],
     overlaps: Sequence[float],
 ) -> Path:
-    """Write a list of problems with its clouds, in the form that ``read_problems`` takes.
+    """Write a list of problems with its clouds, in the form that ``read_problems`` reads; return its path.
 
     Args:
         folder: folder for the clouds as PLY and ``NAME_local.txt``.

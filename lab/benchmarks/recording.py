@@ -17,13 +17,13 @@ from lab.walks.surfaces import F_SCORES, Row
 from packetmesh.progress import drain
 
 WALKS, FRAMES, WIDTH_PX = 10, 600, 320
-"""Rooms, frames of each walk, 30 a second, and width of the images."""
+"""Number of walks, frames of each walk (30 a second), and width of the images."""
 FAST = 5
 """Step between the frames of a fast walk."""
 ERRORS = ("ate_m", "ate_share", "rpe_m", "without_pose", "map_median_m", "without_surface")
 """Values whose largest is the worst."""
 MOSTLY_KNOWN = ("ate_m", "ate_share", "rpe_m")
-"""Errors that say little if most frames have no pose."""
+"""Errors that say little if most frames have no pose, and then count as missing."""
 GAINS = ("frames_s", *F_SCORES)
 """Values whose smallest is the worst."""
 TIMED = (
@@ -34,18 +34,18 @@ TIMED = (
 def benchmark(
     every: int = 1, walks: int = WALKS, frames: int = FRAMES, width_px: int = WIDTH_PX, folder: Path = CACHE
 ) -> Benchmark:
-    """Follow the camera of every walk by every program, at every frame or at every so many.
+    """Follow the camera of held-out walks by every program, with each ``every``-th frame.
 
-    Walks and answers that are in the folder are not made again.
+    Walks and answers that are in the folder are not computed again.
     """
     return compared(held_out_walks(walks, frames, width_px, folder), every, folder)
 
 
 def compared(paths: Sequence[Path], every: int, folder: Path) -> Benchmark:
-    """Follow the camera of some walks by every program; answers that are in ``folder`` are not made again.
+    """Follow the camera of some walks by every program; answers in ``folder`` are not computed again.
 
     Args:
-        paths: rendered walks, or recordings with poses, which are the truth then.
+        paths: rendered walks, or recordings whose own poses are taken as the truth.
         every: step between frames.
         folder: folder of the answers.
 
@@ -71,9 +71,9 @@ def compared(paths: Sequence[Path], every: int, folder: Path) -> Benchmark:
 def summary(rows: Iterable[Row]) -> list[Row]:
     """Return counts, and median and worst value of each measure, per program.
 
-    A walk without a value counts as worse than all others, as does the trajectory of one that has hardly any
-    poses; if it is the median or the worst, that is None. Programs without a map have None for all that is
-    measured on maps.
+    A missing value counts as worse than all others; a median or worst value that is missing is None. The
+    errors ``MOSTLY_KNOWN`` count as missing on a walk most of whose frames have no pose, and all measures of
+    the map are missing for programs without a map.
     """
     groups = []
     for program, some in _by_program(rows):
@@ -99,7 +99,7 @@ def _answers(
     every: int,
     folder: Path,
 ) -> list[Row]:
-    """Return every program's rows, one process at a time so that times can be compared."""
+    """Return every program's rows, computed one after the other so that times can be compared."""
     tasks = [WalkTask(name, walk, every) for walk in walks for name in programs]
     return drain(iterate_trials("recordings", measure, tasks, folder / "answers", processes=1))
 

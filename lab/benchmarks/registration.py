@@ -1,4 +1,4 @@
-"""Time of registering two clouds, by us and by the peers' programs in the same run."""
+"""Time and memory of registering two clouds, by PacketMesh and by other programs in the same run."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MAX_ITERATIONS = 300
 """Iteration limit, which none of them reaches."""
 ROUNDS = 15
 Drawn: TypeAlias = Literal["ours", "both", "none"]
-"""Programs that register only the points that ours draws by default: only ours, all, or none."""
+"""Programs that register only as many points as ours draws by default: ours, ours and the others, or none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,10 @@ class SpeedPair:
 
 
 def speed_pair(points: int = POINTS, seed: int = 0) -> SpeedPair:
-    """Return the living room from its first camera and from ``MOTION`` next to it, ``points`` each."""
+    """Return two clouds of ``points`` points of the living room.
+
+    The target is seen by the scene's first camera, the source by a camera at ``MOTION`` from it.
+    """
     scene = build_demo("living-room")
     renderer = Renderer(scene)
     clouds = []
@@ -71,11 +74,11 @@ def thinned(pair: SpeedPair) -> SpeedPair:
 
 
 def benchmark(points: int, drawn: Drawn) -> Benchmark:
-    """Run ours and every rival in turn, round by round, each after a warm-up run of its own.
+    """Run ours and every installed rival in turn, round by round, each after a warm-up run of its own.
 
-    Without the warm-up the time depends on the program before: its threads continue to spin for a while after
-    its end, and its data are in the caches. Each program's memory is that of a process that does nothing
-    else, including libraries and clouds.
+    Without the warm-up the time depends on the previous program, whose threads continue to spin for a while
+    after its end and whose data are in the caches. Each program's memory is that of a process that does
+    nothing else, including libraries and clouds.
 
     Args:
         points: number of points of each cloud.
@@ -107,9 +110,9 @@ class _Registered:
     """Time and error of one registration."""
 
     elapsed_s: float
-    """Time from points to pose."""
+    """Seconds from points to pose."""
     error_m: float
-    """Point error."""
+    """Point error of the pose, metres."""
 
 
 def _run_again(name: str, pair: SpeedPair, most: int) -> _Registered:
@@ -119,7 +122,7 @@ def _run_again(name: str, pair: SpeedPair, most: int) -> _Registered:
 
 
 def _run(name: str, pair: SpeedPair, most: int) -> _Registered:
-    """Register copies of the clouds, for which nothing is prepared; ours draws at most ``most`` points."""
+    """Register copies of the clouds, so that nothing is cached; ours draws at most ``most`` points."""
     source, target = (PointCloud(cloud.points_m.copy()) for cloud in (pair.source, pair.target))
     if name == OURS:
         config = RegistrationConfig(gate_m=GATE_M, max_iterations=MAX_ITERATIONS, max_points=most)

@@ -47,7 +47,7 @@ BALLS: dict[str, tuple[float, ...]] = {
     "4 r_F": (4.0,),
     "r_F, 1.5, 2.5 and 4 r_F": (1.0, 1.5, 2.5, 4.0),
 }
-"""Multiples of r_F."""
+"""Radii of the balls by name, as multiples of r_F, the cloud's mean point distance."""
 HEADLINE = "r_F, 1.5, 2.5 and 4 r_F"
 ROUGH_BALLS = ("1.5 r_F", "4 r_F")
 MANY_POINTS_BALLS = ("1.5 r_F", HEADLINE)
@@ -57,7 +57,7 @@ SLOW_S = 20.0
 MOST_S = 150.0
 """A program that takes longer for all its rounds is stopped and left out, seconds."""
 CLOSE_SHARE = 0.5
-"""A point is covered if the mesh is within this share of r_F."""
+"""A point is covered if its distance from the mesh is at most this share of r_F."""
 
 Ball = Callable[[FloatArray, FloatArray, Sequence[float]], tuple[FloatArray, IntArray]]
 
@@ -76,11 +76,11 @@ class SurfaceRun:
     """Median of the rounds."""
     rounds: int
     first_use_s: float
-    """Time of the process's first surface, of 100 points; compiled code comes from its cache."""
+    """Time of the process's first surface, of 100 points; compiled code is read from its cache, if there."""
     peak_memory_bytes: int
     """Peak memory of a process that does nothing else, including libraries and cloud."""
     added_memory_bytes: int
-    """The peak minus the memory before the start."""
+    """The peak minus the memory before the first round."""
     triangles: int
     used_share: float
     """Share of the points that are corners of a triangle."""
@@ -134,10 +134,10 @@ def available_programs() -> tuple[str, ...]:
 
 
 def room_cloud(points: int, smoothed: bool = True) -> PointCloud:
-    """Return about ``points`` of the living room's fused cloud, thinned by voxels and smoothed as in the
-    chain.
+    """Return about ``points`` points of the living room's fused cloud, thinned by voxels and smoothed.
 
-    Rendered depth with the sensor's noise, filled by the network's; three nodes at their true poses.
+    The depth is rendered with the sensor's noise and filled with the network's. The nodes are at their true
+    poses. The points are smoothed as in the chain, or not at all without ``smoothed``.
     """
     rig = load_demo("living-room")
     assert rig.truth is not None
@@ -156,7 +156,7 @@ def room_cloud(points: int, smoothed: bool = True) -> PointCloud:
 def terrain(points: int, seed: int = 0, point_distance_m: float = 0.01, noise_m: float = 0.001) -> PointCloud:
     """Return exactly ``points`` on rolling ground, whose area grows with their number, with true normals.
 
-    Waves of 1 m length and 10 cm height; a jittered grid, and noise along z.
+    The ground has waves of 1 m length and 10 cm height. The points are on a jittered grid, with noise in z.
     """
     side = int(np.ceil(np.sqrt(points)))
     rng = np.random.default_rng(seed)
@@ -195,7 +195,7 @@ def time_alone(
 
 
 def measure(program: str, path: Path, multiples: Sequence[float], rounds: int) -> SurfaceRun:
-    """Measure time, memory and quality in this process."""
+    """Measure time, memory and quality in this process; the names of cloud and balls are left empty."""
     points_m, normals = np.load(path)
     r_F_m, _ = spacing(points_m)
     radii_m = tuple(factor * r_F_m for factor in multiples)
@@ -257,7 +257,7 @@ def benchmark() -> Benchmark:
 
 
 def measure_speed() -> Iterator[SurfaceRun]:
-    """Yield every ball by every available program on the room, and ours on a terrain of many points."""
+    """Yield the runs of all programs on the room, smoothed and not, and of ours on terrain of many points."""
     programs = available_programs()
     room = room_cloud(POINTS)
     cases = [(room, ROOM, balls, programs) for balls in BALLS]

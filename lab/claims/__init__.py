@@ -1,1 +1,1 @@
-"""The thesis's claims tested by our own computations: the printed value, a tolerance, and our result."""
+"""The thesis's claims and ours, tested by computation: the printed value, a tolerance, and our result."""

@@ -25,7 +25,8 @@ class Outcome:
     """The result of our computation of a claim."""
 
     ours: dict[str, float]
-    """Measured values by name; shares from 0 to 1, lengths in metres."""
+    """Measured values by name: shares from 0 to 1, lengths in metres, others in the unit of the name.
+    F-scores, shares of rays and their changes are in points of 100 in D01, D04, D05, D07 and D08."""
     ci95: dict[str, tuple[float, float]]
     """95 % intervals of the values that vary between cases."""
     reproduced: bool | None
@@ -38,7 +39,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """A claim with its outcome."""
+    """A claim with its outcome; fields as in ``Claim`` and ``Outcome``."""
 
     id: str
     claim: str
@@ -81,8 +82,8 @@ class Claim:
     prepare_full: Callable[[Path, str | None], Generator[Progress, None, Any]] | None = None
     """Runs all trials, if ``prepare`` runs only a subset."""
     by_definition: bool = False
-    """Whether a test cannot say anything about the world: settings, file formats, sums of printed numbers.
-    Only a failed test of it is a finding."""
+    """Whether the claim is true by definition: it states a setting, a file format or a sum of printed
+    numbers. Only its failure is a finding."""
 
     def judge(self, *prepared: Any) -> Verdict:
         """Run the experiment and compare its result with the claim."""
@@ -110,14 +111,17 @@ class Claim:
 
 
 def is_beyond(name: str) -> bool:
-    """Whether a claim of that name is ours and not the thesis's."""
+    """Return whether the claim with the id ``name`` is ours and not the thesis's."""
     return name.startswith("D")
 
 
 def bootstrap_ci95(
     values: FloatArray, seed: int = 0, resamples: int = 2000, statistic: Callable[..., Any] = np.mean
 ) -> tuple[float, float]:
-    """Return the 95 % percentile interval of a statistic of (N, ...) ``values`` over N cases."""
+    """Return the 95 % bootstrap percentile interval of a statistic of (N, ...) ``values`` over N cases.
+
+    ``statistic`` is called with (resamples, N, ...) resampled values and ``axis=1``.
+    """
     values = np.asarray(values, float)
     rows = np.random.default_rng(seed).integers(0, len(values), (resamples, len(values)))
     low, high = np.percentile(statistic(values[rows], axis=1), (2.5, 97.5))
@@ -125,7 +129,8 @@ def bootstrap_ci95(
 
 
 def mean_curve(label: str, x: Iterable[float], columns: Iterable[FloatArray], resamples: int = 2000) -> Curve:
-    """Return the means of (N,) values at each ``x``, with their bootstrap intervals as a band."""
+    """Return a line through the means of the ``columns``, (N,) values at each ``x``; its band is their 95 %
+    bootstrap intervals."""
     points = [(float(column.mean()), *bootstrap_ci95(column, resamples=resamples)) for column in columns]
     means, low, high = zip(*points, strict=True)
     return Curve(label, tuple(float(value) for value in x), means, low, high)

@@ -15,14 +15,17 @@ MODES: tuple[OutlierMode, ...] = ("thesis", "depth_normalised", "robust")
 
 
 def brute_force_keep(points_m: FloatArray, neighbours: int, t: float) -> np.ndarray:
-    """Return (N,) the printed formulae over all pairs: keep d <= mu + t sigma, d the mean of N distances."""
+    """Return (M,) whether the printed formulae keep each of (M, 3) points, computed over all pairs.
+
+    A point is kept if d <= mu + t sigma; d is its mean distance to the ``neighbours`` nearest points.
+    """
     distance_m = np.linalg.norm(points_m[:, None] - points_m[None], axis=2)
     nearest_m = np.sort(distance_m, axis=1)[:, 1 : neighbours + 1].mean(axis=1)
     return nearest_m <= nearest_m.mean() + t * nearest_m.std()
 
 
 def with_gross_outliers(cloud: PointCloud, rng: np.random.Generator) -> tuple[FloatArray, np.ndarray]:
-    """Return (N, 3) the cloud's points with 1 % of them moved along their rays, and which ones."""
+    """Return the cloud's (N, 3) points, about 1 % of them moved along their rays, and (N,) which ones."""
     moved = rng.random(len(cloud)) < OUTLIER_SHARE
     factor = np.where(moved, rng.uniform(0.4, 1.6, len(cloud)), 1.0)
     return cloud.points_m * factor[:, None], moved

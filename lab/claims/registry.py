@@ -45,16 +45,17 @@ CLAIMS = {claim.id: claim for claim in sorted(_ALL, key=lambda claim: claim.id)}
 def run_claims(
     only: Iterable[str] = (), folder: Path | None = None, scheduler: str | None = None, full: bool = False
 ) -> Iterator[Progress | Verdict]:
-    """Compute the named claims, or all, and yield progress in between.
+    """Judge the named claims, or all: yield progress while trials run, and the verdict of each claim.
 
     Args:
         only: names of claims; empty for all.
-        folder: folder of the trials, so that an interrupted run resumes; None stores nothing.
+        folder: folder that keeps the trials, so that an interrupted run resumes; None stores nothing.
         scheduler: address of a Dask scheduler for the trials; None takes this machine's cores.
-        full: also the trials that claims leave out by default; takes hours.
+        full: run also the trials that claims leave out by default; takes hours.
 
     Raises:
         InputError: a name is not a claim, the folder cannot be written, or there is no such scheduler.
+        PacketMeshError: a process that ran trials was killed.
     """
     names = list(only) or list(CLAIMS)
     unknown = [name for name in names if name not in CLAIMS]

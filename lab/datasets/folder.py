@@ -15,17 +15,17 @@ COLOR_FOLDERS = ("color", "rgb", "image")
 
 
 def find(root: Path) -> list[Load]:
-    """Return the pairs in ``root`` and in all folders below it.
+    """Return the pairs in ``root`` and in all folders below it; log how many pictures have no depth.
 
-    ``color/NAME`` (or rgb/, image/) with ``depth/NAME.png``, ``NAME_rgb`` (or _color) with
-    ``NAME_depth.png``, and ``color.png`` with ``depth.png``.
+    These are pairs: ``color/NAME`` (or rgb/, image/) and ``depth/NAME.png``, ``NAME_rgb`` (or NAME_color) and
+    ``NAME_depth.png``, ``color.png`` and ``depth.png``. A picture may be a JPEG instead of a PNG file.
     """
     folders = [root, *sorted(path for path in root.rglob("*") if path.is_dir())]
     return [partial(load_pair, *pair) for folder in folders for pair in _pairs(folder)]
 
 
 def _pairs(folder: Path) -> list[tuple[Path, Path]]:
-    """Return image and depth of each pair in this folder."""
+    """Return the paths of image and depth of each pair in this folder."""
     candidates = []
     for picture in _pictures(folder):
         stem, _, ending = picture.stem.rpartition("_")

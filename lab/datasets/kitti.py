@@ -36,11 +36,11 @@ _LINE = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """One image of one drive; ``picture``, ``improved`` and ``laser`` are None without such a file."""
+    """One image of one drive; ``picture``, ``improved`` and ``laser`` are its files, None if missing."""
 
     root: Path
     drive: str
-    """``2011_09_26/2011_09_26_drive_0002_sync``."""
+    """Folder below ``root``, such as ``2011_09_26/2011_09_26_drive_0002_sync``."""
     camera: int
     """2 is the left colour camera, 3 the right one."""
     number: int
@@ -59,7 +59,7 @@ class _Place:
 
     @property
     def cameras(self) -> Path:
-        """Calibration of the cameras, one per day."""
+        """Calibration file of the cameras; each day has one."""
         return self.root / Path(self.drive).parent / "calib_cam_to_cam.txt"
 
     @property
@@ -68,7 +68,7 @@ class _Place:
 
 
 def find(root: Path) -> list[Load]:
-    """Return the frames in ``LIST``, or without it those of the left colour camera in all drives of ``root``.
+    """Return the frames that the file ``LIST`` names, or without it the left colour camera's in all drives.
 
     If any frame has the improved ground truth, only those that have it are returned, as in published tables
     (652 of the 697 test frames); otherwise the truth is the laser's points.

@@ -24,9 +24,10 @@ _NUMBER = r"(-?[\d.]+(?:e[-+]?\d+)?)"
 
 ARCHIVE, ARCHIVE_PICTURE = "motorcycle_disp.npz", "motorcycle_left.png"
 MOTORCYCLE = (994.978, 0.193001, 31.086)
-"""Focal length, baseline and offset of the quarter-size images in scikit-image (data.stereo_motorcycle)."""
+"""Focal length (pixels), baseline (metres) and offset (pixels) of the quarter-size images in scikit-image
+(data.stereo_motorcycle)."""
 MOTORCYCLE_CENTER_PX = (311.193, 254.877)
-"""The left camera's principal point, from the same source."""
+"""The left camera's principal point (x, y), from the same source."""
 
 
 def find(root: Path) -> list[Load]:
@@ -65,7 +66,7 @@ def _load_motorcycle(file: Path) -> Pair:
 def depth_m(disparity_px: FloatArray, focal_px: float, baseline_m: float, doffs_px: float) -> FloatArray:
     """Return (H, W) float32 metres; NaN where the disparity is not finite or gives no positive depth.
 
-    Z = focal baseline / (disparity + doffs), where doffs is the difference of the two principal points.
+    Z = focal baseline / (disparity + doffs); doffs is the right minus the left principal point, along x.
     """
     shifted = np.asarray(disparity_px, np.float64) + doffs_px
     known = np.isfinite(disparity_px) & (shifted > 0)

@@ -1,4 +1,4 @@
-"""Grey images of the Netpbm family: PGM of 8 bits and PFM."""
+"""Reader of grey images of the Netpbm family: PGM of 8 bits, and PFM."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _HEADER = re.compile(rb"(P5|Pf)\s+(\d+)\s+(\d+)\s+(255|-?\d+(?:\.\d*)?)\s")
 
 
 def read_netpbm(file: Path) -> np.ndarray:
-    """Return (H, W) uint8 of a PGM file, or float32 of a PFM file, whose rows are stored from the bottom up.
+    """Return (H, W) uint8 of a PGM file, or float32 of a PFM file; rows from the top in both cases.
 
     Raises:
-        InputError: the file is missing, truncated, too large, or neither PGM nor PFM.
+        InputError: the file is missing, truncated, too large, or neither PGM of 8 bits nor grey PFM.
     """
     data = read_bytes(file, MAX_IMAGE_BYTES, "grey image")
     header = _HEADER.match(data)

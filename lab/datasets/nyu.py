@@ -22,15 +22,16 @@ from pipeline.types import BoolArray
 LABELLED = "nyu_depth_v2_labeled.mat"
 WIDTH_PX, HEIGHT_PX = 640, 480
 CROP = np.s_[45:471, 41:601]
-"""Rows and columns that evaluations use since Eigen et al., NIPS 2014: without the white border."""
+"""Rows and columns that evaluations use since Eigen et al., NIPS 2014; they exclude the white border."""
 PARTNERS = [(r"rgb_(\d+)", r"sync_depth_\1"), (r"(.+)_colors", r"\1_depth"), (r"(.+)", r"\1")]
-"""Patterns of image names and of their depth files; the first match counts."""
+"""Patterns of image names, each with the name of the depth file; the first pattern that matches counts."""
 
 
 def find(root: Path) -> list[Load]:
     """Return the frames of the labelled .mat file at or in ``root``, or of image folders below it.
 
-    With a ``splits.mat`` next to it, only the standard 654 test images of the labelled 1449 are returned.
+    With a ``splits.mat`` in the same folder, only the standard 654 test images of the labelled 1449 are
+    returned.
 
     Raises:
         InputError: h5py is missing, or a .mat file is damaged.
@@ -76,7 +77,7 @@ def _from_files(picture: Path, depth: Path) -> Pair:
 
 
 def _from_mat(mat: Path, row: int) -> Pair:
-    """Return a pair with raw depth, if the file has it: the other depth was in-painted, not measured."""
+    """Return a pair with raw depth if the file has it, because the other depth is in-painted."""
     try:
         with _h5py().File(mat, "r") as file:
             z_m = np.transpose(file["rawDepths" if "rawDepths" in file else "depths"][row]).astype(np.float32)

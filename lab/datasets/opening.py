@@ -19,7 +19,7 @@ SETS: dict[str, Callable[[Path], list[Load]]] = {
     "middlebury": middlebury.find,
     "sr300": sr300.find,
 }
-"""The function that finds the pairs of each kind of set in a folder."""
+"""For each kind of set, the function that finds its pairs in a folder."""
 EXPECTED = {
     "nyu": "nyu_depth_v2_labeled.mat, or pictures *.jpg beside 16-bit depth *.png",
     "kitti": "DATE/DATE_drive_NUMBER_sync/image_02/data with ground-truth PNG or velodyne files",
@@ -33,7 +33,9 @@ EXPECTED = {
 
 
 def open_set(spec: str) -> Iterator[Pair]:
-    """Read the pairs of a set one by one; only the test pairs, if the set has a split.
+    """Read the pairs of a set one by one; only the test pairs, if the folder lists them.
+
+    NYU Depth v2 lists them in ``splits.mat``, KITTI in ``test_files.txt``.
 
     Args:
         spec: ``kind=path`` with a kind of ``SETS`` and the set's folder (or NYU's .mat file).

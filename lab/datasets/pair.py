@@ -18,15 +18,15 @@ class Pair:
     """One image and its true depth, on the same pixel grid."""
 
     picture: Path
-    """The file; for one of many images in a file, its number is appended."""
+    """Path of the image; for one of many images in a file, the file's path and the image's number."""
     rgb: ByteArray
     """(H, W, 3) RGB; grey images have three equal channels."""
     truth_m: FloatArray
     """(H, W) float32, metres along the optical axis, NaN where unknown."""
     judged: BoolArray | None = None
-    """(H, W) the pixels that this set's evaluations use; None for all pixels."""
+    """(H, W) True at the pixels that this set's evaluations use; None for all pixels."""
     camera: CameraIntrinsics | None = None
-    """Camera of the image, if the set's reader knows it."""
+    """Camera of the image; None if the set's reader does not know it."""
 
     def __post_init__(self) -> None:
         """Raise InputError for depth of another size than the picture's."""
@@ -39,14 +39,14 @@ class Pair:
 
 
 Load = Callable[[], Pair]
-"""Reads the files of a pair."""
+"""Reads the files of a pair; raises an InputError if one is unusable."""
 
 
 def load_pair(picture: Path, depth: Path, units_per_metre: float = 1000.0) -> Pair:
     """Return an image with its 16-bit depth image, whose value 0 means unknown.
 
     Raises:
-        InputError: one cannot be read, or they differ in size.
+        InputError: one of them cannot be read, or they differ in size.
     """
     return Pair(picture, read_color(picture), read_depth(depth, units_per_metre).z_m)
 

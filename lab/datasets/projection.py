@@ -1,4 +1,4 @@
-"""Projection of points to a depth image; the nearest point per pixel wins."""
+"""Projection of points to a depth image that keeps the nearest point of each pixel."""
 
 from __future__ import annotations
 

@@ -48,12 +48,12 @@ def _load(extrinsics: Path, picture: Path, depth: Path) -> Pair:
 def registered(
     z_m: FloatArray, depth_camera: CameraIntrinsics, color_camera: CameraIntrinsics, T_color_depth: FloatArray
 ) -> FloatArray:
-    """Return (H, W) depth in the colour camera, NaN where it sees no depth pixel."""
+    """Return (H, W) depth, metres, on the colour camera's pixels; NaN where no depth pixel is visible."""
     return carried(z_m, lambda pixels: rays(depth_camera, pixels), color_camera, T_color_depth)
 
 
 def rays(camera: CameraIntrinsics, pixels: FloatArray) -> FloatArray:
-    """Return (N, 3) directions with z = 1 of (N, 2) positions in the depth image."""
+    """Return (N, 3) directions with z = 1, in the depth camera's frame, of (N, 2) positions in its image."""
     k1, k2, p1, p2, k3 = INVERSE_DISTORTION
     x, y = ((pixels - (camera.cx_px, camera.cy_px)) / (camera.fx_px, camera.fy_px)).T
     r2 = x * x + y * y
@@ -69,10 +69,12 @@ def rays(camera: CameraIntrinsics, pixels: FloatArray) -> FloatArray:
 
 
 def read_depth_bin(file: Path) -> FloatArray:
-    """Return (H, W) float32 metres; the file has 32-bit height and width, then 16-bit units of about 1/8 mm.
+    """Return (H, W) float32 metres, NaN below ``NEAREST_M``.
+
+    The file has 32-bit height and width, then 16-bit values in units of about 1/8 mm.
 
     Raises:
-        InputError: the file is missing, or its length does not fit its size.
+        InputError: the file is missing, or its length does not fit its height and width.
     """
     data = read_bytes(file, MAX_IMAGE_BYTES, "SR300 depth")
     height, width = np.frombuffer(data[:8].ljust(8, b"\0"), "<u4").tolist()

@@ -17,7 +17,7 @@ from pipeline.io.images import read_color, read_depth_units
 FARTHEST_M = 8.0
 """The set's toolbox (read3dPoints.m) caps depth here."""
 DEPTH_FOLDERS = ("depth_bfx", "depth")
-"""Folders of depth: merged from several frames if available, else the sensor's."""
+"""Folders of depth by preference: merged from several frames, then of a single frame."""
 
 
 def find(root: Path) -> list[Load]:
@@ -32,6 +32,7 @@ def find(root: Path) -> list[Load]:
 
 
 def _load(picture: Path, depth: Path) -> Pair:
+    """Return a pair; depth beyond ``FARTHEST_M`` is set to it, and not evaluated."""
     millimetres = unrotated(read_depth_units(depth))
     z_m = np.where(millimetres > 0, millimetres / np.float32(1000.0), np.float32(np.nan))
     capped_m = np.minimum(z_m, np.float32(FARTHEST_M))

@@ -16,7 +16,7 @@ def find(root: Path) -> list[Load]:
     """Return the frames of the sequence ``root``, or of all sequences below it.
 
     Raises:
-        InputError: a line of a list is no time and file.
+        InputError: a line of a list is not a time and a file.
     """
     pairs: list[Load] = []
     for listing in sorted(root.rglob("rgb.txt")):

@@ -1,1 +1,1 @@
-"""Lengths, heights, gaps, angles, boxes and holes measured in rendered rooms, beside their true values."""
+"""Lengths, heights, gaps, angles, boxes and holes measured in rendered rooms, and their true values."""

@@ -11,7 +11,7 @@ ROOMS = 40
 
 
 def main() -> None:
-    """Print the numbers from the tuning rooms, in which nothing is judged."""
+    """Print the numbers from the tuning rooms, which are not used for judging."""
     parser = argparse.ArgumentParser(prog="python -m lab.measuring", description=__doc__)
     parser.add_argument("constant", choices=COMMANDS)
     parser.add_argument("rooms", nargs="?", type=int, default=ROOMS)

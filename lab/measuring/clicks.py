@@ -15,12 +15,13 @@ from pipeline.measuring.marks import Mark, mark_on_ray
 from pipeline.types import BoolArray, FloatArray
 
 EDGE_PX = 4
-"""A click is at least this far from a depth edge: a hand does not aim better."""
+"""A click is at least this far from a depth edge, because a hand does not aim better."""
 EDGE_STEP = 0.05
-"""Least step of an edge, as a share of the depth, besides what a slanted surface has."""
+"""Least Laplacian of the inverse depth at an edge, as a share of the inverse depth; that of a plane is 0."""
 FLAT_PX, FLAT_M = 36, 0.0005
-"""A place is flat if the true surface within this distance is within this of one plane: a smaller patch of a
-cushion is as flat, and its normal is not that of the plane that is fitted to the cushion's top."""
+"""A place is flat if the true surface around it, up to the first distance in the image, is within the second
+of one plane. The patch is large because a small patch of a cushion is as flat, but its normal is not that of
+the plane that is fitted to the cushion's top."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,20 +30,20 @@ class Click:
 
     mark: Mark
     true_m: FloatArray
-    """(3,) true point of the same pixel."""
+    """(3,) true point of the same pixel, world frame."""
     raw_m: FloatArray | None
-    """(3,) the sensor's own measurement of it, by the true camera; None in a hole."""
+    """(3,) point by the sensor's depth at this pixel and the true camera and pose; None in a hole."""
     true_normal: FloatArray | None
-    """(3,) normal of the true surface around it; None if that is not flat."""
+    """(3,) unit normal of the true surface around it; None if that is not flat."""
     log_error: float
     """Logarithm of the true distance from the camera over that of the mark."""
 
 
 def clicks(room: Room, rng: np.random.Generator) -> Iterator[Click]:
-    """Yield clicks at random pixels of random cameras, for ever.
+    """Yield clicks at random pixels of random cameras, without end.
 
-    The ray is that of the believed camera at the pose that was found; clicks that miss the surface are no
-    clicks.
+    The ray is that of the believed camera at the pose that the chain found. Pixels near depth edges and rays
+    that miss the surface are left out.
     """
     away = [away_from_edges(view) for view in room.true]
     rays = [geometry.pixel_rays(frame.intrinsics) for frame in room.frames]
@@ -69,7 +70,7 @@ def clicks(room: Room, rng: np.random.Generator) -> Iterator[Click]:
 
 
 def away_from_edges(view: TrueView) -> BoolArray:
-    """Return (H, W) True for pixels away from depth edges."""
+    """Return (H, W) True for pixels farther than ``EDGE_PX`` from every depth edge."""
     inverse = (1.0 / view.z_m).astype(np.float32)
     bend = np.abs(cv2.Laplacian(inverse, cv2.CV_32F)) > EDGE_STEP * inverse
     side = 2 * EDGE_PX + 1

@@ -1,4 +1,4 @@
-"""What set the constants of ``pipeline.measuring``: errors in the tuning rooms, printed."""
+"""Errors in the tuning rooms, printed, by which constants of ``pipeline.measuring`` were chosen."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from pipeline.types import FloatArray
 
 CLICKS = 3000
 MOST_OF_A_ROOM = 60
-"""Guessed clicks of a room that count in a class, so that no room decides alone."""
+"""Most guessed clicks of a room that count in a class, so that no room decides alone."""
 MEASURED = 300
-"""Clicks of a room whose depth is compared."""
+"""Clicks in a room; the depths of those on measured surface are compared."""
 FACTORS = (1.0, 1.25, 1.5, 2.0)
 """Values of ``MISFIT_FACTOR`` that are tried."""
 SHARES = (1e-5, 1e-4, 1e-3)
@@ -33,7 +33,7 @@ SHARES = (1e-5, 1e-4, 1e-3)
 
 
 def guesses(rooms: int) -> None:
-    """Print the quantiles of the guesses' errors by class of confidence: ``guesses.QUANTILES``."""
+    """Print ``guesses.QUANTILES``: the quantiles of the guesses' errors, by class of confidence."""
     errors: list[list[float]] = [[] for _ in CONFIDENCES[1:]]
     for room in _rooms(rooms):
         own: list[list[float]] = [[] for _ in errors]
@@ -48,7 +48,7 @@ def guesses(rooms: int) -> None:
 
 
 def misfit(rooms: int) -> None:
-    """Print how often the depth of measured clicks is inside its interval, by ``views.MISFIT_FACTOR``."""
+    """Print the share of measured clicks whose depth is in its interval, by ``views.MISFIT_FACTOR``."""
     for factor in FACTORS:
         with _set(views, "MISFIT_FACTOR", factor):
             scores = np.concatenate([_depth_scores(room) for room in _rooms(rooms)])
@@ -59,9 +59,10 @@ def misfit(rooms: int) -> None:
 
 
 def poses(rooms: int) -> None:
-    """Print the poses' errors, which set ``poses.SLACK_OF_SCALE``, by ``edges.WEAK_SHARE``.
+    """Print the poses' errors for each value of ``edges.WEAK_SHARE``; ``poses.SLACK_OF_SCALE`` is their size.
 
-    The turn is in units of the scale's deviation, the shift in these and of the distance of what is seen.
+    The turn (rad) and the shift (as a share of the distance of what is seen) are divided by the relative
+    standard deviation of the focal length, ``FOCAL_SD``.
     """
     for share in SHARES:
         with _set(attempt, "WEAK_SHARE", share):
@@ -83,7 +84,7 @@ def _rooms(count: int) -> Iterator[Room]:
 
 
 def _depth_scores(room: Room) -> FloatArray:
-    """Return the errors of measured clicks along their rays over the standard deviations of their marks."""
+    """Return the depth errors of measured clicks, each divided by the standard deviation of its mark."""
     found = islice(clicks(room, np.random.default_rng([room.seed, 37])), MEASURED)
     return np.array([_depth_score(click) for click in found if not click.mark.guessed])
 
@@ -96,10 +97,11 @@ def _depth_score(click: Click) -> float:
 
 
 def _pose_error(room: Room) -> tuple[float, float, float]:
-    """Return the second pose's error at the middle of what it sees, for each direction, and its distance.
+    """Return the error of the second camera's pose, root mean square over the three directions.
 
     Returns:
-        Turn (rad), shift over the distance of what is seen, and squared Mahalanobis distance.
+        Turn (rad); shift at the middle of what the camera sees, over its distance from the camera; and
+        squared Mahalanobis distance of the whole error by the pose's covariance.
     """
     view, covariance = room.true[1], room.surface.pose_covariances[1]
     motion = small_motion(view.T_world_camera @ geometry.inverse(room.T_world_camera[1]))
@@ -113,7 +115,7 @@ def _pose_error(room: Room) -> tuple[float, float, float]:
 
 @contextmanager
 def _set(module: ModuleType, name: str, value: float) -> Iterator[None]:
-    """Give a module's constant another value for a while."""
+    """Give a module's constant another value within the context."""
     before = getattr(module, name)
     setattr(module, name, value)
     try:

@@ -1,4 +1,4 @@
-"""Judgement of a room's measures by their true values."""
+"""Errors and interval coverage of the measures in a room, by their true values."""
 
 from __future__ import annotations
 
@@ -30,15 +30,16 @@ from pipeline.measuring.surface import MeasuredSurface
 from pipeline.types import FloatArray
 
 LENGTHS = 30
-"""Lengths of each kind in a room: both ends measured, and at least one guessed."""
+"""Most lengths of each of two kinds in a room: with both ends measured, and with at least one guessed."""
 PLANES = 12
-"""Heights over a plane, angles of planes, and gaps of planes, in a room."""
+"""Most heights over a plane, angles of two planes, and gaps of two planes in a room, of each."""
 CORNERS = 12
-"""Angles of three points in a room."""
+"""Most angles of three points in a room."""
 PARALLEL_DEG = 0.5
-"""Planes whose true angle is smaller have a true distance."""
+"""Two planes whose true angle is smaller count as parallel, with a true distance."""
 UNITS = {"angle": ("°", 1.0), "corner": ("°", 1.0), "hole": (" cm²", 1e4)}
-"""Unit of a kind of measure and how many are 1 of its SI unit; others are in mm."""
+"""Displayed unit of a kind of measure, and the factor to it from the unit of the value (degrees, m^2). The
+other kinds are in metres and are displayed in mm."""
 SHORTEST_M = 0.1
 MOST_CLICKS = 3000
 Row = dict[str, Any]
@@ -46,13 +47,13 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class RoomTask:
-    """A room that is to be judged."""
+    """A room to judge, by its seed."""
 
     seed: int
 
 
 def judged_room(task: RoomTask) -> list[Row] | None:
-    """Return a row for every measure of a room; None if the room cannot be reconstructed."""
+    """Return a row for every measure of a room; None if ``measured_room`` returns none."""
     room = measured_room(task.seed)
     if room is None:
         return None
@@ -83,7 +84,7 @@ def judged_room(task: RoomTask) -> list[Row] | None:
 
 
 def _lengths(surface: MeasuredSurface, firsts: Sequence[Click], seconds: Sequence[Click]) -> list[Row]:
-    """Return the rows of lengths from some clicks to others, every click at most once on either side."""
+    """Return the rows of lengths from some clicks to others; each starts and ends at most one."""
     rows: list[Row] = []
     for a, b in zip(firsts, reversed(seconds), strict=False):
         true_m = float(np.linalg.norm(a.true_m - b.true_m))
@@ -95,7 +96,7 @@ def _lengths(surface: MeasuredSurface, firsts: Sequence[Click], seconds: Sequenc
         if a.raw_m is not None and b.raw_m is not None:
             raw = float(np.linalg.norm(a.raw_m - b.raw_m)) - true_m
         started = time.perf_counter()
-        for one in (a, b):  # what two clicks cost: the rays, then the interval
+        for one in (a, b):  # time of two clicks: casting their rays, then the interval
             mark_on_ray(surface, one.mark.point_m + 0.01 * one.mark.normal, -one.mark.normal)
         measure = distance(surface, a.mark, b.mark)
         elapsed_s = time.perf_counter() - started
@@ -104,7 +105,10 @@ def _lengths(surface: MeasuredSurface, firsts: Sequence[Click], seconds: Sequenc
 
 
 def _with_planes(surface: MeasuredSurface, ends: Sequence[Click], flat: Sequence[Click]) -> list[Row]:
-    """Return the rows of heights of clicks over planes, and of angles and gaps of two planes."""
+    """Return the rows of heights of clicks over planes, and of angles and gaps of two planes.
+
+    Their time is that of growing one plane.
+    """
     kinds: dict[str, list[Row]] = {"point-plane": [], "angle": [], "plane-plane": []}
     before: list[tuple[Click, Plane]] = []
 
@@ -138,7 +142,7 @@ def _with_planes(surface: MeasuredSurface, ends: Sequence[Click], flat: Sequence
 
 
 def _corners(surface: MeasuredSurface, found: Sequence[Click]) -> list[Row]:
-    """Return the rows of angles of three clicks, every click in one of them."""
+    """Return the rows of angles of three clicks; each click is in at most one angle."""
     rows: list[Row] = []
     for a, corner, b in zip(found[::3], found[1::3], found[2::3], strict=False):
         sides_m = [a.true_m - corner.true_m, b.true_m - corner.true_m]
@@ -177,9 +181,9 @@ def _row(value: Value, kind: str, true: float, elapsed_s: float) -> Row:
 
 
 def summaries(rows: Sequence[Row]) -> list[Row]:
-    """Return coverage, errors and times of every kind of measure, measured and guessed apart.
+    """Return coverage, errors and times of every kind of measure, separately for measured and guessed ones.
 
-    The interval of a coverage resamples rooms, whose measures err together.
+    The interval of a coverage resamples whole rooms, because the errors in a room are correlated.
     """
     groups: dict[tuple[str, bool], list[Row]] = {}
     for row in rows:
@@ -219,7 +223,7 @@ def _raw_error(row: Row) -> float:
 
 
 def _by_rooms(rows: Sequence[Row]) -> tuple[float, float]:
-    """Return the 95 % bootstrap interval of the coverage, with whole rooms drawn."""
+    """Return the 95 % bootstrap interval of the coverage, which resamples whole rooms."""
     rooms: dict[int, list[bool]] = {}
     for row in rows:
         rooms.setdefault(row["room"], []).append(row["covered"])

@@ -24,25 +24,25 @@ from pipeline.stages import run
 from pipeline.types import CameraIntrinsics, FloatArray, RgbdFrame, Rig
 
 TUNING, HELD_OUT = 7_900_000, 7_000_000
-"""First seeds of the rooms whose errors fitted constants, and of those that judge; no other seed is used."""
+"""First seed of the rooms whose errors chose constants, and of the rooms that only judge them."""
 OVERLAP = 0.5
-"""Share of the views that both cameras see."""
+"""Overlap of the two views (see ``OverlapMeter.share``)."""
 FOCAL_SD = 0.003
-"""Relative standard deviation of the focal lengths' errors, which the calibration states (SPEC 1.4)."""
+"""Relative standard deviation of the focal lengths' errors, which the calibration also states (SPEC 1.4)."""
 POINTS = 20_000
-"""Points of the fused cloud: few, to be quick."""
+"""Largest number of points of the fused cloud; few, to be quick."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrueView:
-    """What a camera really sees from where it really is."""
+    """The true camera, its true pose, and what it sees from there."""
 
     camera: CameraIntrinsics
     T_world_camera: FloatArray
     z_m: FloatArray
     """(H, W) true depth."""
     normals: FloatArray
-    """(H, W, 3) true normals, world frame, towards the camera; shaded: bevelled faces have bent ones."""
+    """(H, W, 3) true shading normals, world frame, towards the camera; they are bent at bevelled edges."""
 
     def points_m(self) -> FloatArray:
         """Return (H, W, 3) true points, world frame."""
@@ -56,17 +56,18 @@ class Room:
     seed: int
     frames: tuple[RgbdFrame, ...]
     T_world_camera: tuple[FloatArray, ...]
-    """Poses that the chain found."""
+    """(4, 4) poses that the chain found."""
     surface: MeasuredSurface
     true: tuple[TrueView, ...]
     scene: Scene
 
 
 def measured_room(seed: int) -> Room | None:
-    """Render and reconstruct the room of a seed; None if it has no two views, or the chain drops a camera.
+    """Render and reconstruct the room of a seed.
 
-    The believed focal lengths are wrong by ``FOCAL_SD`` (every camera by its own error), and the second pose
-    by 3 degrees and 6 cm before registration.
+    Returns None if no two views have the overlap, or if the chain fails or does not place a camera. The
+    believed focal lengths are wrong by ``FOCAL_SD`` (every camera by its own error), and the second pose by 3
+    degrees and 6 cm before registration.
     """
     rng = np.random.default_rng([seed, 23])
     scene = random_room(seed)

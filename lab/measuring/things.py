@@ -26,25 +26,27 @@ LEAST_SIDE_M = 0.08
 LEVEL = 0.99
 """Cosine of a level place's normal with the vertical."""
 LEVEL_M = 0.002
-"""Vertices of a part within this height of its highest are its top."""
+"""The vertices of a part that are at most this much below its highest one are its top."""
 SEEN_M = 0.01
-"""A camera sees a place if its true depth there is within this."""
+"""A camera sees a place if the true point at its pixel is at most this far from it."""
 AROUND_M, OFF_M = 0.03, 0.005
-"""This far outside of a top the true surface is at least this far from its plane."""
+"""Up to the first distance outside of a top, the true surface is farther than the second from its plane."""
 SEEN_SHARE = 0.97
 """Share of a top's places that one camera has to see, and of those outside that have to be off its plane."""
 GRID = 12
 STANDS_M = 0.05
-"""The true height of what a thing stands on is that of level places within this height of the measured."""
+"""The true height of what a thing stands on is the median height of the level true places that differ from
+the measured height by less than this."""
 HOLES = 12
-"""Holes in a room, the largest first."""
+"""Most holes in a room, the largest first."""
 RIM_M = 0.05
 """The true point of a rim's vertex is at most this far from it."""
 Judged = tuple[Measure, tuple[float, ...], float]
+"""A measure, the true values in its order, and the seconds that measuring took."""
 
 
 def true_boxes(room: Room) -> Iterator[Judged]:
-    """Yield the boxes of things with a level rectangular top, their true sides (m), and the time taken (s).
+    """Yield measured boxes of things with a level rectangular top, their true sides (m), and the times (s).
 
     Only tops that one camera sees whole, and around which nothing is as high, are measured, by a click on
     their middle; the sides are in the order of the measure's values.
@@ -77,7 +79,7 @@ def true_boxes(room: Room) -> Iterator[Judged]:
 
 
 def _tops(room: Room) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Yield (3,) a corner and (2, 3) the sides of every level rectangular top, without the shell."""
+    """Yield (3,) a corner and (2, 3) the sides of each level rectangular top, except those of the shell."""
     for part in room.scene.parts[6:]:
         vertices_m = geometry.apply(part.T_world_part, part.vertices_m)
         top_m = vertices_m[vertices_m[:, 2] > vertices_m[:, 2].max() - LEVEL_M]
@@ -93,7 +95,7 @@ def _tops(room: Room) -> Iterator[tuple[FloatArray, FloatArray]]:
 
 
 def _alone(view: TrueView, points_m: FloatArray, corner_m: FloatArray, sides_m: FloatArray) -> bool:
-    """Return whether a camera sees the whole of a top, and just outside of it nothing of its height."""
+    """Return whether a camera sees the whole of a top, and nothing of the same height just outside of it."""
     reach = AROUND_M / np.linalg.norm(sides_m, axis=1)
     steps = [np.linspace(-one, 1.0 + one, GRID) for one in reach]
     shares = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -112,7 +114,7 @@ def _in_camera(view: TrueView, places_m: FloatArray) -> FloatArray:
 
 
 def _seen_m(view: TrueView, layers: FloatArray, places_m: FloatArray) -> tuple[BoolArray, FloatArray]:
-    """Return (N,) whether places are in an image, and (N, K) what is at their pixels of (H, W, K) layers."""
+    """Return (N,) whether places are in an image, and (N, K) values of (H, W, K) layers at their pixels."""
     own_m = _in_camera(view, places_m)
     before = own_m[:, 2] > 0.1
     uv = geometry.project(view.camera, np.where(before[:, None], own_m, [0.0, 0.0, 1.0]))

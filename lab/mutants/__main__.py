@@ -17,15 +17,19 @@ from lab.mutants.mutations import GROUPS, Mutation, draw
 from lab.trials import ROOT
 
 PATIENCE_S = 600.0
-"""A mutant whose tests take longer counts as seen: it does not end."""
+"""Time limit of each test run; a mutant that exceeds it counts as seen, because it may never stop."""
 AIM = 0.9
+"""Least share of mutants that the tests must see."""
 WHYS = Path(__file__).with_name("whys.json")
-"""Why a mutant that survived is no fault, or why it stays unseen, by its name."""
+"""File with a sentence per surviving mutant, by name: why it is no fault, or why no test sees it."""
 PAGE = ROOT / "docs" / "mutants.md"
 
 
 def main() -> None:
-    """Run the mutants that have no answer yet, then write the page; exit with 1 below the aim."""
+    """Test the mutants that have no answer yet, then write the page; exit with 1 below ``AIM``.
+
+    Answers are found by the mutant's name only: delete them after changing a module or its tests.
+    """
     parser = argparse.ArgumentParser(prog="make mutants", description=__doc__)
     parser.add_argument("--count", type=int, default=300, help="mutants to draw")
     parser.add_argument("--seed", type=int, default=1, help="of the draw")
@@ -64,7 +68,7 @@ def _read(answers: Path) -> dict[str, bool]:
 
 
 def _copy(folder: Path) -> Path:
-    """Copy every file that git knows, so that faults are never in the working tree."""
+    """Copy every file that git tracks, so that faults are never in the working tree."""
     names = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True)
     for name in names.stdout.splitlines():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -73,7 +77,10 @@ def _copy(folder: Path) -> Path:
 
 
 def _test(copy: Path, mutation: Mutation) -> bool:
-    """Return whether a test fails with the fault in the copy; the module's own tests come first."""
+    """Return whether a test fails, or exceeds the time, with the fault in the copy.
+
+    Test files named after the module run first, then those of its group.
+    """
     module = copy / mutation.path
     code = module.read_text(encoding="utf-8")
     own = [str(path) for path in copy.glob(f"tests/**/test_{module.stem}.py")]
@@ -88,9 +95,9 @@ def _test(copy: Path, mutation: Mutation) -> bool:
 
 
 def _forget_compiled(copy: Path, code: str) -> None:
-    """Delete all compiled functions, before and after a module that has some is changed.
+    """Delete Numba's cache in the copy if the module's ``code`` has compiled functions.
 
-    Numba notices changes of a function, but not of those that it calls, which may be of any module.
+    Numba recompiles a changed function, but not its callers, which may be in any module.
     """
     if "compiled" in code or "njit" in code:
         shutil.rmtree(copy / ".numba", ignore_errors=True)

@@ -35,10 +35,10 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
     ),
 }
-"""Modules by group, and the tests that ought to see a fault in them."""
+"""By group: patterns of its modules, and paths of the tests that should see a fault in them."""
 SKIPPED = (
-    *("Bit", "Shift", "Mod", "Invert"),  # nobody writes these by mistake, and any test sees them
-    *("RemoveDecorator", "ExceptionReplacer"),  # a decorator compiles; no formula names an exception
+    *("Bit", "Shift", "Mod", "Invert"),  # unlikely mistakes, and any test sees them
+    *("RemoveDecorator", "ExceptionReplacer"),  # neither is part of a formula
 )
 """Parts of the names of operators that are left out."""
 
@@ -49,14 +49,16 @@ class Mutation:
 
     group: str
     path: str
-    """Of the module, relative to the repository."""
+    """Path of the module, relative to the repository."""
     operator: str
+    """Name of Cosmic Ray's operator."""
     occurrence: int
+    """Index among the places in the module that the operator can change."""
     line: int
 
     @property
     def name(self) -> str:
-        """Short name that stays while the module does."""
+        """Path, operator and occurrence; they denote the same fault as long as the module is unchanged."""
         return f"{self.path} {self.operator.partition('/')[2]} {self.occurrence}"
 
     def applied(self, code: str) -> str:
@@ -66,13 +68,13 @@ class Mutation:
 
 
 def draw(root: Path, count: int, seed: int) -> list[Mutation]:
-    """Return ``count`` mutations, drawn evenly from those of all groups, in the order of drawing."""
+    """Return ``count`` of all groups' mutations, drawn with equal chances, in the order of drawing."""
     everything = [one for group in GROUPS for one in mutations(root, group)]
     return random.Random(seed).sample(everything, min(count, len(everything)))
 
 
 def mutations(root: Path, group: str) -> Iterator[Mutation]:
-    """Yield all mutations of a group's modules, but those in annotations and checks of types."""
+    """Yield all mutations of a group's modules except those on the lines of ``_annotation_lines``."""
     for pattern in GROUPS[group][0]:
         for path in sorted(root.glob(pattern)):
             code = path.read_text(encoding="utf-8")
@@ -89,7 +91,7 @@ def mutations(root: Path, group: str) -> Iterator[Mutation]:
 
 
 def _annotation_lines(code: str) -> set[int]:
-    """Return the lines of signatures' annotations, of asserts and of blocks for type checkers."""
+    """Return the numbers of all lines with annotated arguments or return types, asserts or type checks."""
     lines = set[int]()
     for node in ast.walk(ast.parse(code)):
         spans = list[ast.AST | None]()

@@ -1,1 +1,1 @@
-"""Pairs of views and clouds of random rooms by their overlap, to find places and to judge verdicts."""
+"""Pairs of views or clouds of random rooms by overlap, to test the search for a pose and its verdict."""

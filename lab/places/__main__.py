@@ -9,7 +9,7 @@ from lab.places.pairs import CACHE, HELD_OUT, VALIDATION, Split, bench_pairs, mi
 
 
 def main() -> None:
-    """Render what the cache lacks."""
+    """Render the pairs that the cache lacks."""
     parser = argparse.ArgumentParser(prog="python -m lab.places", description=__doc__)
     parser.add_argument("--folder", type=Path, default=CACHE, help="folder of the cache")
     parser.add_argument("--split", choices=(VALIDATION, HELD_OUT), required=True)

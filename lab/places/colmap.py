@@ -11,14 +11,14 @@ from lab.places.pairs import PlacesPair
 from pipeline.types import ByteArray, FloatArray, RgbdFrame
 
 LEAST_MATCHES = 8
-"""Matches below which a geometry is not used."""
+"""With fewer matches, or features in an image, there is no pose."""
 
 
 def colmap_pose(pair: PlacesPair) -> FloatArray | None:
-    """Return the (4, 4) pose T_target_source; None if too few features match, or none has a depth.
+    """Return the (4, 4) pose T_target_source; None if too few features match, or no match has both depths.
 
-    All settings are pycolmap's. Its translation has an unknown length, which is set to the median of what the
-    measured depths of the inlier matches give.
+    All settings are pycolmap's defaults. Its translation has an unknown length, which is set to the median of
+    the lengths that the measured depths of the inlier matches give.
     """
     import pycolmap
 
@@ -45,12 +45,15 @@ def colmap_pose(pair: PlacesPair) -> FloatArray | None:
 
 
 def with_measured_scale(T: FloatArray, source_m: FloatArray, target_m: FloatArray) -> FloatArray | None:
-    """Return the pose with the median length of the translation over matches with both depths known.
+    """Return the (4, 4) pose with the median length of the translation over the matches with both depths.
 
     Args:
-        T: (4, 4) pose T_target_source with a unit translation, or none.
+        T: (4, 4) pose T_target_source with a unit or zero translation.
         source_m: (N, 3) points of the matches in the source's frame; NaN without a depth.
-        target_m: (N, 3) the same points in the target's frame.
+        target_m: (N, 3) the same points in the target's frame; NaN without a depth.
+
+    Returns:
+        The pose; None if no match has both depths.
     """
     known = np.isfinite(source_m).all(axis=1) & np.isfinite(target_m).all(axis=1)
     if not known.any():
@@ -62,9 +65,9 @@ def with_measured_scale(T: FloatArray, source_m: FloatArray, target_m: FloatArra
 
 
 def lifted(frame: RgbdFrame, places_px: FloatArray) -> FloatArray:
-    """Return (N, 3) points of (N, 2) places by the depth of the nearest pixel; NaN where it has none.
+    """Return the (N, 3) points, camera frame, of (N, 2) image places, by the depth of the nearest pixel.
 
-    The centre of the first pixel is (0.5, 0.5), as in COLMAP.
+    They are NaN where that pixel has no depth. The centre of the first pixel is (0.5, 0.5), as in COLMAP.
     """
     lens = frame.intrinsics
     columns, rows = np.clip(places_px.astype(int), 0, (lens.width_px - 1, lens.height_px - 1)).T

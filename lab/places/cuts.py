@@ -1,4 +1,4 @@
-"""Pairs of bare clouds cut from a random room's true surface with a wanted overlap, and their true pose."""
+"""Pairs of bare clouds cut from a random room's true surface with a given overlap, and their true pose."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ POINTS = 20_000
 NOISE_M = 0.004
 """Standard deviation of the noise of every coordinate."""
 START_DEG, START_M = 8.0, 0.14
-"""Error of the start pose in SPEC 4.11."""
+"""Rotation and distance by which the start pose is wrong in SPEC 4.11."""
 EYES = 24
 """Places in the room from which its surface is sampled."""
 RAYS = 15_000
@@ -32,14 +32,14 @@ CELL_M = 0.02
 
 @dataclass(frozen=True, slots=True)
 class CutPair:
-    """Two clouds without colours or normals; registration starts at the identity."""
+    """Two clouds without colours or normals, whose registration starts at the identity."""
 
     source: PointCloud
     target: PointCloud
     T_target_source: FloatArray
-    """(4, 4) true pose: the start's error."""
+    """(4, 4) true pose; its difference from the identity is the error of the start."""
     overlap_share: float
-    """Share of each cloud that lies on surface which the other one covers."""
+    """Share of each cloud's surface that the other cloud covers, 0 to 1."""
     room: int
     """Seed of the room."""
 
@@ -47,16 +47,17 @@ class CutPair:
 def cut_pair(
     split: Split, index: int, overlap: float, start_deg: float = START_DEG, start_m: float = START_M
 ) -> CutPair:
-    """Return two halves of a room's visible surface, cut by two upright planes.
+    """Return two overlapping parts of a room's visible surface, cut by two parallel upright planes.
 
-    Both planes are across one random level direction, and each cloud is everything on its side: points are
-    drawn independently for both, ``POINTS`` each, with ``NOISE_M`` of noise.
+    The planes are perpendicular to a random level direction. One cloud is all before the farther plane, the
+    other all behind the nearer one. The points are drawn independently for both, at most ``POINTS`` each,
+    with ``NOISE_M`` of noise.
 
     Args:
         split: ``VALIDATION`` or ``HELD_OUT`` of ``lab.places.pairs``; the rooms are those of ``pair``.
         index: number of the pair in its split.
         overlap: share of each cloud that the other one covers, 0 to 1.
-        start_deg: angle by which the start is off, about a random axis through the source's middle.
+        start_deg: angle by which the start is wrong, about a random axis through the source's middle.
         start_m: distance of the source's middle from its true place at the start.
 
     Raises:
@@ -93,7 +94,7 @@ def _visible_surface(scene: Scene, rng: Rng) -> FloatArray:
 
 
 def _halves(surface_m: FloatArray, overlap: float, rng: Rng) -> tuple[FloatArray, FloatArray]:
-    """Return the points before one plane and those behind another.
+    """Return the points before one plane and those behind another, drawn and with noise.
 
     With a share h of the surface in each half, (2 h - 1) / h of each is common, so h = 1 / (2 - overlap).
     """
@@ -104,13 +105,13 @@ def _halves(surface_m: FloatArray, overlap: float, rng: Rng) -> tuple[FloatArray
 
 
 def _drawn(points_m: FloatArray, rng: Rng) -> FloatArray:
-    """Return ``POINTS`` different points, or all, with noise."""
+    """Return ``POINTS`` different points, or all if there are fewer, with noise."""
     rows = rng.permutation(len(points_m))[:POINTS]
     return points_m[rows] + rng.normal(0.0, NOISE_M, (len(rows), 3))
 
 
 def _error(middle_m: FloatArray, turn_deg: float, shift_m: float, rng: Rng) -> FloatArray:
-    """Return a (4, 4) motion that turns about a point and moves it, both in random directions."""
+    """Return a (4, 4) motion: a turn about a random axis through a point, and a shift, randomly directed."""
     axis, way = (v / np.linalg.norm(v) for v in rng.standard_normal((2, 3)))
     rotation = rotation_exp(np.radians(turn_deg) * axis)
     return rigid(rotation, middle_m - rotation @ middle_m + shift_m * way)

@@ -13,7 +13,7 @@ from pipeline.types import FloatArray
 
 Verdict = Literal["sure", "doubtful", "none"]
 RIGHT_DEG, RIGHT_M = 1.5, 0.05
-"""An answer is right within both: the rotation, and the position of the source's camera."""
+"""Largest errors of a right answer: of the rotation, and of the position of the source's camera."""
 _SIGMAS = 1.959964
 """Standard deviations of a 95 % interval."""
 
@@ -33,7 +33,7 @@ def judged(
 ) -> dict[str, Any]:
     """Return a row: the task, the true overlap, the errors, whether the answer is right, verdict and seconds.
 
-    No answer is right on views of different rooms.
+    For views of different rooms, and without an answer (``T`` None), errors are None and ``right`` is False.
     """
     turn_deg, shift_m = pose_errors(T, pair.T_target_source)
     within = turn_deg is not None and shift_m is not None and turn_deg <= RIGHT_DEG and shift_m <= RIGHT_M
@@ -51,7 +51,7 @@ def judged(
 
 
 def pose_errors(T: FloatArray | None, T_true: FloatArray | None) -> tuple[float | None, float | None]:
-    """Return the angle in degrees and the distance in metres between two poses; None without one of them."""
+    """Return the angle in degrees and the distance in metres between two poses; None if one is missing."""
     if T is None or T_true is None:
         return None, None
     turn_rad = rotation_angle_rad(T[:3, :3].T @ T_true[:3, :3])

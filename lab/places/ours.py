@@ -1,4 +1,4 @@
-"""The pose of two views and its verdict by PacketMesh."""
+"""Pose and verdict by PacketMesh for two views or two bare clouds."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Placed:
     """An answer on a pair."""
 
     T_target_source: FloatArray | None
-    """(4, 4) pose; None with the verdict "none"."""
+    """(4, 4) pose; None if the search found none, and the verdict is then "none"."""
     verdict: Verdict
     elapsed_s: float
     """Time from images, or bare clouds, to the verdict."""
@@ -46,7 +46,7 @@ def solve_own(task: PlacesTask) -> dict[str, Any]:
 
 
 def place(views: PlacesPair, with_color: bool) -> Placed:
-    """Find the pose of two RGB-D views; without colour their images are not looked at."""
+    """Find the pose of two RGB-D views; without colour only their depth is used."""
     started = time.perf_counter()
     source, target = back_project(views.source), back_project(views.target)
     starts = [by_surfaces(source, target, from_cameras=True)]

@@ -13,7 +13,7 @@ from pipeline.types import BoolArray, CameraIntrinsics, FloatArray
 COARSE = 0.2
 """Overlap is measured on images of this size relative to the camera's: 64 x 48 of 320 x 240 pixels."""
 SAME_SURFACE_M = 0.02
-"""A point is seen by the other camera if its ray is blocked by nothing nearer than this."""
+"""A point is hidden from the other camera if its ray meets something nearer, by more than this."""
 RANGE_M = (SensorConfig().near_m, SensorConfig().far_m)
 """Depths that the sensor measures."""
 
@@ -23,7 +23,7 @@ class OverlapMeter:
 
     Args:
         caster: the room's surface.
-        intrinsics: the camera's.
+        intrinsics: the camera, at full size.
     """
 
     def __init__(self, caster: RayCaster, intrinsics: CameraIntrinsics) -> None:
@@ -31,7 +31,7 @@ class OverlapMeter:
         self._coarse = scaled(intrinsics, COARSE)
 
     def look(self, T_world_camera: FloatArray) -> Hits:
-        """Return what the (4, 4) camera sees, on the coarse image; ``t`` is the depth z."""
+        """Return what a camera at the (4, 4) pose sees, on the coarse image; ``t`` is the depth z, metres."""
         return self._caster.cast(camera_rays(self._coarse, T_world_camera))
 
     def share(self, T_a: FloatArray, a: Hits, T_b: FloatArray, b: Hits) -> float:
@@ -73,6 +73,6 @@ def in_range(z_m: FloatArray) -> BoolArray:
 
 
 def _in_image(pixels: FloatArray, intrinsics: CameraIntrinsics) -> BoolArray:
-    """Return (N,) whether pixels are in the image, whose outermost pixel centres are 0 and size - 1."""
+    """Return (N,) whether (N, 2) pixels are in the image, whose outer pixel centres are 0 and size - 1."""
     size = np.array([intrinsics.width_px, intrinsics.height_px])
     return np.all((pixels >= -0.5) & (pixels <= size - 0.5), axis=1)

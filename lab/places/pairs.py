@@ -1,4 +1,4 @@
-"""Pairs of RGB-D views of random rooms with a wanted overlap, and their true pose.
+"""Pairs of RGB-D views of random rooms with a given overlap, and their true pose.
 
 ``pair`` is deterministic in its split, index and overlap. Splits use disjoint rooms, and every index of a
 split has a room of its own: validation pairs fit thresholds, held-out pairs only judge them.
@@ -32,13 +32,13 @@ Split = Literal["validation", "held-out"]
 VALIDATION: Split = "validation"
 HELD_OUT: Split = "held-out"
 FIRST_ROOM: dict[Split, int] = {VALIDATION: 3_000_000, HELD_OUT: 4_000_000}
-"""First room seed of each split; the networks' rooms are below 3,000,000."""
+"""Seed of the first room of each split; the networks' rooms have seeds below 3,000,000."""
 NEXT_ROOM = 20_000
-"""Distance of the seeds of an index's further rooms, if no two views of the first one fit."""
+"""Step between the seeds of an index's rooms; the next room is tried if no two views of one fit."""
 ROOMS = 40
 """Rooms that are tried for an index; indices are below ``NEXT_ROOM``."""
 OTHER_ROOM = 2_000_000
-"""Distance from a room to the one that it is paired with in views of different rooms."""
+"""Difference between the seeds of the two rooms of a pair of different rooms."""
 
 CLASSES = (0.60, 0.40, 0.25, 0.15)
 """Overlaps of the benchmark."""
@@ -47,7 +47,8 @@ MIXED_FROM = 1000
 MIXED_MOST = 0.9
 """Largest overlap of the mixed pairs."""
 UNRELATED = (0.1, 0.2)
-"""Of the mixed pairs the first share is from different rooms; up to the second, the views share nothing."""
+"""Random numbers from 0 to 1 choose the mixed pairs: below the first value, views of different rooms; then,
+below the second, views of one room without overlap."""
 
 FOV_DEG = 57.0
 """Horizontal field of view of a Kinect."""
@@ -117,8 +118,8 @@ def bench_pairs(per_class: int) -> Iterator[tuple[int, float]]:
 def mixed_pairs(split: Split, count: int) -> Iterator[tuple[int, float | None]]:
     """Yield index and overlap of pairs for a verdict.
 
-    One in ten is from different rooms, one in ten has no overlap, and the others' overlap is drawn evenly
-    from 0 to 0.9.
+    On average, one in ten is from different rooms (overlap None), one in ten has no overlap, and the overlap
+    of the others is drawn evenly from 0 to 0.9.
     """
     for index in range(MIXED_FROM, MIXED_FROM + count):
         rng = np.random.default_rng([FIRST_ROOM[split], index, 11])
@@ -127,7 +128,7 @@ def mixed_pairs(split: Split, count: int) -> Iterator[tuple[int, float | None]]:
 
 
 def rooms_of(split: Split, index: int) -> Iterator[tuple[int, Rng]]:
-    """Yield the seeds of an index's rooms, with a source of randomness each."""
+    """Yield the seed of each room to try for an index, with its source of randomness."""
     for k in range(ROOMS):
         seed = FIRST_ROOM[split] + index + k * NEXT_ROOM
         yield seed, np.random.default_rng([seed, 17])
@@ -146,7 +147,7 @@ def _rendered(split: Split, index: int, overlap: float | None) -> PlacesPair:
 
 
 def _together(seed: int, rng: Rng, overlap: float) -> PlacesPair | None:
-    """Return two views of one room."""
+    """Return two views of one room; None if no two have this overlap."""
     scene = random_room(seed)
     renderer = Renderer(scene, threads=1)
     poses = two_poses(scene, CAMERA, overlap, rng, renderer)
@@ -161,7 +162,7 @@ def _together(seed: int, rng: Rng, overlap: float) -> PlacesPair | None:
 
 
 def _apart(seed: int, rng: Rng) -> PlacesPair | None:
-    """Return views of two rooms."""
+    """Return views of two rooms; None if a room has no usable view."""
     frames = []
     for name, room in (("source", seed + OTHER_ROOM), ("target", seed)):
         scene = random_room(room)

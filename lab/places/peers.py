@@ -1,7 +1,7 @@
 """Other programs that place one view or cloud relative to another without a start, with their usual settings.
 
-Every program gets the same pair and ends with the same refinement by ICP. Those whose library is not
-installed are skipped. Lengths are for rooms; for larger clouds they grow with the extent.
+Every program gets the same pair, and the same ICP refines its pose. Programs whose library is not installed
+are skipped. Lengths are for rooms; for larger clouds they grow with the extent.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class PlacePeer:
     """Name of its library's module."""
     start: Callable[[PointCloud, PointCloud], FloatArray | None] | None
     """Takes the clouds of source and target and returns the (4, 4) pose T_target_source before refinement, or
-    None if it finds none. None is pycolmap, which takes the images."""
+    None if it finds none. The field is None for pycolmap, which takes the images."""
 
 
 def available_place_peers() -> tuple[str, ...]:
@@ -73,7 +73,7 @@ def solve_peer(task: PlacesTask) -> dict[str, Any]:
 
 
 def refined(source: PointCloud, target: PointCloud, T: FloatArray) -> FloatArray:
-    """Return the (4, 4) pose after Open3D's point-to-plane ICP with smaller and smaller gates."""
+    """Return the (4, 4) pose T after Open3D's point-to-plane ICP with each of ``GATES_M`` in turn."""
     scale = _scale(source, target)
     moving, fixed = _thinned(source, FINE_M * scale), _thinned(target, FINE_M * scale)
     fixed.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(20))
@@ -105,7 +105,7 @@ def _with_features(cloud: PointCloud, voxel_m: float) -> tuple[Any, Any]:
 
 
 def _fpfh(source: PointCloud, target: PointCloud, fast: bool) -> FloatArray | None:
-    """Match FPFH features by Open3D, with RANSAC or with fast global registration."""
+    """Return the (4, 4) pose by Open3D's FPFH features and RANSAC, or fast global registration (``fast``)."""
     voxel_m = VOXEL_M * _scale(source, target)
     (moving, moving_features), (fixed, fixed_features) = (
         _with_features(cloud, voxel_m) for cloud in (source, target)

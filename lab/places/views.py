@@ -1,4 +1,4 @@
-"""Two camera poses in a random room whose views overlap by a wanted share."""
+"""Two camera poses in a random room whose views overlap by a given share."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pipeline.kernels.geometry import look_at, rotation_exp
 from pipeline.types import CameraIntrinsics, FloatArray
 
 TOLERANCE = 0.02
-"""Accepted difference from the wanted overlap."""
+"""Largest accepted difference from the given overlap."""
 PROPOSALS = 250
 """Second poses that are tried for a first one."""
 FIRST_POSES = 4
@@ -25,11 +25,11 @@ LEAST_MEASURED = 0.5
 LARGEST_SHELL = 0.65
 """Largest share of a view that walls and ceiling fill, as for the views of ``random_views``."""
 NEAREST_M = 0.4
-"""Least depth in a view, but for 2 % of its pixels."""
+"""Least depth in a view; 2 % of its pixels may be nearer."""
 CLEARANCE_M = 0.25
-"""A camera moves only where its way is free, and this much farther."""
+"""The line between the two cameras must be free, and this much of its extension behind the second one."""
 SHELL_PARTS = (1, 6)
-"""Ceiling and walls of a random room, as a range of its parts."""
+"""Ceiling and walls of a random room: its parts from the first index to before the second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ def two_poses(
     Args:
         scene: a random room.
         intrinsics: the camera of both views.
-        overlap: wanted overlap (see ``OverlapMeter.share``), 0 to 0.9.
+        overlap: overlap to reach (see ``OverlapMeter.share``), 0 to 0.9.
         rng: source of all randomness.
         renderer: the room's renderer.
 
@@ -82,7 +82,11 @@ def two_poses(
 
 
 def is_usable(seen: Hits) -> bool:
-    """Return whether a view is one that a person would take: neither a wall, nor something at the lens."""
+    """Return whether a view is like one that a person would take.
+
+    It must see the room everywhere, not mainly walls and ceiling, enough within the sensor's range, and
+    nothing close to the lens.
+    """
     shell = (seen.part >= SHELL_PARTS[0]) & (seen.part < SHELL_PARTS[1])
     return bool(
         np.all(seen.part >= 0)
@@ -95,7 +99,7 @@ def is_usable(seen: Hits) -> bool:
 def _proposal(
     scene: Scene, T_first: FloatArray, middle_m: float, overlap: float, rng: Rng, renderer: Renderer
 ) -> FloatArray:
-    """Return a second pose; the less overlap is wanted, the farther it is from the first."""
+    """Return a random second pose; the smaller ``overlap`` is, the farther it may be from the first."""
     kind = rng.integers(3)
     if kind == 2:
         return random_views(scene, rng, 1, renderer)[0]
@@ -119,7 +123,7 @@ def _proposal(
 
 
 def _is_free(caster: RayCaster, T_first: FloatArray, T_second: FloatArray) -> bool:
-    """Return whether nothing is between two eyes, so that neither is in an object or outside the room."""
+    """Return whether nothing is between two cameras, so that neither is in an object or outside the room."""
     way_m = T_second[:3, 3] - T_first[:3, 3]
     length_m = float(np.linalg.norm(way_m))
     if length_m < 1e-6:

@@ -12,7 +12,7 @@ LEFT, RIGHT, TOP, BOTTOM = 60, 265, 20, 50
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#999999")
 """Colours that colour-blind people can tell apart (Okabe and Ito 2008)."""
 SHIFT = 5.0
-"""Distance of neighbouring series' marks at one place, so that their bars do not hide each other."""
+"""Horizontal distance of the marks of neighbouring series, so that their bars do not hide each other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class Series:
     shares: tuple[float | None, ...]
     """One for each place; None leaves a gap."""
     intervals: tuple[tuple[float, float] | None, ...]
-    """Lower and upper end of the bar at each place."""
+    """Lower and upper end of the bar at each place; None draws no bar."""
 
 
 def chart(x_label: str, y_label: str, places: Sequence[str], series: Sequence[Series]) -> str:
@@ -48,7 +48,7 @@ def chart(x_label: str, y_label: str, places: Sequence[str], series: Sequence[Se
 
 
 def document(parts: Sequence[str]) -> str:
-    """Return the whole picture of its parts."""
+    """Return the SVG picture that contains these elements."""
     body = "\n".join(parts)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" '
@@ -68,7 +68,7 @@ def titled(x_label: str, y_label: str) -> list[str]:
 
 
 def _x(place: int, count: int) -> float:
-    """Return the position of a place's middle."""
+    """Return the x position of a place's middle."""
     return LEFT + (WIDTH - LEFT - RIGHT) * (place + 0.5) / count
 
 

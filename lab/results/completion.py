@@ -51,7 +51,7 @@ def depth_claims(numbers: Row) -> str:
 
 
 def target(runs: Sequence[Row]) -> str:
-    """Return where the target is reached, and the results elsewhere."""
+    """Return a paragraph: the discs at which the target is reached, and the ratios at the others."""
     ratios = {}
     for group in _groups(runs, ", disc of "):
         kind, _, size = group.partition(", disc of ")
@@ -90,7 +90,7 @@ def whole_holes(runs: Sequence[Row]) -> str:
 
 
 def reasons() -> str:
-    """Return the reasons for the remaining error, with the numbers of the training."""
+    """Return a paragraph with the reasons for the remaining error and the numbers of the training."""
     images, minutes = _training()
     return (
         f"**Why no better.** It was trained on {images:,} frames in {minutes} minutes of two cores, and "
@@ -101,7 +101,7 @@ def reasons() -> str:
 
 
 def trust(claim: Row) -> str:
-    """Return the true share of the pixels whose confidence is 80 to 90 %."""
+    """Return a paragraph on the pixels whose confidence is 80 to 90 %: the share that is right, by group."""
     (bins,) = (found for found in claim["tables"] if found["title"] == "Confidence in bins")
     rows = [row for row in bins["rows"] if row[1] == SAID]
     shares = {group: true for group, _, _, _, true in rows}

@@ -28,7 +28,7 @@ PICTURES: dict[str, Callable[[Row], dict[str, str]]] = {
     PLACES: places.pictures,
     RECORDINGS: recordings.pictures,
 }
-"""Pictures by record, which are written next to the page."""
+"""Function that draws a record's pictures, by record; they are written next to the page."""
 
 SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "reconstruct": ("What comes out", tables.reconstructions),
@@ -66,7 +66,7 @@ claims run from 0 to 1, intervals are 95 %."""
 
 
 def write_pages() -> None:
-    """Write all pages from the committed records."""
+    """Write all pages and pictures from the records in docs/results."""
     records = read_records()
     pages = {
         RESULTS: results_page(records),
@@ -110,13 +110,13 @@ def worth(records: Records) -> str:
 
 
 def marked(page: str, lines: str) -> str:
-    """Return a page with other lines between its marks."""
+    """Return a page with ``lines`` in place of what is between its marks; without marks it is unchanged."""
     pattern = f"({re.escape(BEGIN)}\n).*?({re.escape(END)})"
     return re.sub(pattern, lambda marks: f"{marks[1]}{lines}\n{marks[2]}", page, flags=re.DOTALL)
 
 
 def readme_results(records: Records) -> Iterator[str]:
-    """Yield the README's limits: one line with one number for each record that it needs."""
+    """Yield the README's limits: a line for each record that it needs, and one for all records of claims."""
     if "reconstruct" in records:
         yield _fusion(records["reconstruct"].numbers)
     if "registration_claims" in records:

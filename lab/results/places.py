@@ -51,7 +51,7 @@ def pictures(numbers: Row) -> dict[str, str]:
 
 
 def recall_picture(runs: list[Row]) -> str:
-    """Return the share of right answers over the overlap, a line for each program."""
+    """Return a chart of the share of right answers over the overlap, with a line for each program."""
     overlaps = sorted({run["overlap"] for run in runs})
     series = []
     for program in dict.fromkeys(run["program"] for run in runs):
@@ -61,7 +61,7 @@ def recall_picture(runs: list[Row]) -> str:
 
 
 def verdict_picture(runs: list[Row]) -> str:
-    """Return shares of ours over the overlap: right, called sure, and called sure but wrong."""
+    """Return a chart of our shares over the overlap: right, called sure, and called sure but wrong."""
     own = [run for run in runs if run["program"] == OURS and run["overlap"] != "all" and run["pairs"]]
     kinds = {"right": "right", "called sure": "sure", "called sure but wrong": "sure_wrong"}
     names = [run["overlap"].replace(" to ", "–") for run in own]

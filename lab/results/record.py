@@ -23,7 +23,7 @@ WRITTEN = (
     *("assets/depth/README.md", "assets/depth/worth.md"),
     *("docs/places_recall.svg", "docs/places_verdict.svg", "docs/recordings.svg"),
 )
-"""Files written from records: their changes are no changes of the code."""
+"""The records and the files written from them; a change of these is no change of the code."""
 DIGITS = 6
 """Significant digits of a stored number."""
 
@@ -42,7 +42,7 @@ class Record:
     versions: dict[str, str]
     """Versions of Python and of the installed libraries."""
     machine: str
-    """Kind of machine: cores and memory."""
+    """Kind of machine: cores, memory and graphics."""
     numbers: dict[str, Any]
 
 
@@ -80,10 +80,10 @@ def write_record(record: Record, folder: Path = FOLDER) -> Path:
 
 
 def committed_code(root: Path = ROOT) -> str:
-    """Return the commit of the code in ``root``.
+    """Return the short hash of the commit of the code in ``root``.
 
     Raises:
-        InputError: files differ from the commit, so it would not identify the code.
+        InputError: files differ from the commit, so it would not identify the code; or git fails.
     """
     unlike = _git(root, "status", "--porcelain", "--", ".", *(f":!{path}" for path in WRITTEN))
     if unlike:

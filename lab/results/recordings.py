@@ -1,4 +1,4 @@
-"""The table of docs/results.md about recordings."""
+"""The tables and the picture of docs/results.md about recordings."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _worst_cm(run: Row) -> float | None:
 
 
 def recordings(numbers: Row) -> str:
-    """Return a table for each case of the record."""
+    """Return the text of the section: introduction, picture, and a table for each case of the record."""
     parts = [
         "Rendered walks through rooms on which no constant was fitted, with a Kinect's noise; each closes "
         "one loop. Faults that walks 6,000,001, 2, 3, 6 and 7 showed were mended; 6,000,000, 4, 5, 8 and 9 "

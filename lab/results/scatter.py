@@ -15,7 +15,7 @@ STEPS = (1, 2, 5)
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A program's place in the chart; all values above 0."""
+    """A program's mark in the chart; all values above 0."""
 
     label: str
     x: float
@@ -23,7 +23,7 @@ class Mark:
     y_worst: float | None
     """Other end of the bar; None for no bar."""
     hollow: bool = False
-    """Whether only the outline is drawn, which tells a second case apart."""
+    """Whether only the outline of the mark is drawn, to distinguish a second case."""
 
 
 @dataclass(frozen=True, slots=True)

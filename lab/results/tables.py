@@ -39,7 +39,7 @@ SHOWN = (
     ("D08", "F-score of some"),
     ("D10", "Confidence in bins"),
 )
-"""Claims, and title beginnings of their tables that the page shows."""
+"""Claim and beginning of the title, for each table of a claim that the page shows."""
 
 
 def reconstructions(numbers: Row) -> str:
@@ -195,7 +195,7 @@ def _excess(run: Row) -> str:
 
 
 def _sized(run: Row) -> Row:
-    """Return a run with the size of its discs as its group."""
+    """Return a copy of a run whose group is the size of its discs."""
     return {**run, "group": run["group"].partition(", disc of ")[2]}
 
 
@@ -204,7 +204,7 @@ def _best(runs: Sequence[Row], group: str, measure: str, sign: float) -> str:
 
 
 def registration_claims(numbers: Row) -> str:
-    """Return C16 to C20."""
+    """Return claims C16 to C20, with a table of point errors for each direction of matching."""
     return claims(
         numbers,
         "Median point error in centimetres and, in brackets, the share of rooms that end within 2 cm; "
@@ -261,7 +261,7 @@ def losses(medians: dict[str, dict[str, str]], rival: str, ours: str = OURS) -> 
 
 
 def registration_speed(numbers: Row) -> str:
-    """Return the speed of registering two views of a room, by us and the peers' programs."""
+    """Return a table for each case: time, error and memory of registering two views of a room, by program."""
     header = ("program", "seconds", "95th percentile", "point error, mm", "peak memory, MB")
     parts = []
     for case, result in numbers.items():
@@ -288,7 +288,7 @@ def registration_speed(numbers: Row) -> str:
 
 
 def rolling_speed(numbers: Row) -> str:
-    """Return the speed of every program's balls over the same clouds."""
+    """Return tables of ball pivoting: time, covered share and memory of every program, by cloud and balls."""
     runs = numbers["surface"]["runs"]
     columns = ("cloud", "balls")
     points = listed(list(dict.fromkeys(f"{run['cloud']} {run['points']:,}" for run in runs)))
@@ -332,7 +332,7 @@ at most {result["peak_memory_bytes"] / 1e9:.2f} GB in a process. Saturated nodes
 
 
 def ns3_throughput(numbers: Row) -> str:
-    """Return both programs' throughput of saturated nodes around one sink: 10 simulated seconds, one seed."""
+    """Return a table of both programs' throughput of saturated nodes around one sink."""
     rows = [
         (
             *(run["mac"], run["nodes"], run["network_sim"]["throughput_bps"] / 1e3),
@@ -367,7 +367,7 @@ def problems(numbers: Row) -> str:
 
 
 def chain_speed(numbers: Row) -> str:
-    """Return time and memory of the whole chain, after warm-up."""
+    """Return tables of the chain's time, whole and by stage, and of its memory, after warm-up."""
     rows = [(case, result["ours_s"], result["peak_memory_bytes"] / 1e6) for case, result in numbers.items()]
     whole = table(("case", "seconds, warm", "peak memory, MB"), rows)
     stages = [run["stage"] for run in next(iter(numbers.values()))["runs"]]

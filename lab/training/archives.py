@@ -18,12 +18,11 @@ _AR_HEADER_BYTES = 60
 
 
 def zip_files(source: Path, cache: Path) -> list[Path]:
-    """Return the zip files of a folder (with all below it), of a package, or ``source`` itself, sorted by
-    name.
+    """Return the zip files in a folder and below it, or in a package, or ``source`` itself; sorted by name.
 
     Args:
         source: a folder, a ``.deb`` or a zip file; packages inside a folder are opened too.
-        cache: folder for the packages' content; unpacked once.
+        cache: folder into which each package is unpacked once.
 
     Raises:
         InputError: there is no zip file, or a package cannot be read.

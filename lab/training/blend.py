@@ -32,7 +32,7 @@ from pipeline.types import ByteArray, CameraIntrinsics, FloatArray, IntArray
 Camera = tuple[CameraIntrinsics, FloatArray]
 """Undistorted intrinsics, and T_world_camera (4, 4)."""
 FIRST_TRACED = 500_000
-"""First seed of traced rooms within their split, away from the ray-cast ones."""
+"""Offset of the traced rooms' seeds from their split's first, so that they differ from the ray-cast ones."""
 _SCRIPT = Path(__file__).with_name("blender_script.py")
 _FILM = Film(0.7, 0.08, noise=(0.0, 0.02), blur_px=(0.25, 0.6), vignette=(0.0, 0.25))
 _ATLAS_WIDTH = 4096
@@ -40,7 +40,8 @@ _GUTTER = 2
 """Border of each chart in texels, so that texture filtering never reaches its neighbour."""
 _CHART_TEXELS = 700_000
 _FINEST_M, _COARSEST_M = 0.002, 0.03
-"""Range of the texels' size; within it, a texel is smaller than a pixel of the nearest camera."""
+"""Range of the texels' size; within it, a texel is smaller than a pixel of the nearest camera, except in
+charts that would exceed ``_CHART_TEXELS`` or the image's width."""
 _TEXELS_A_PIXEL = 1.4
 _RAISED_M = 3e-4
 _GOLDEN = 0.6180339887498949
@@ -72,7 +73,7 @@ def render_traced(
         catalogue: furniture of the rooms; None takes procedural pieces.
 
     Raises:
-        InputError: that Python cannot render.
+        InputError: that Python cannot render; raised when the first shard is rendered.
     """
 
     room = partial(traced_views, blender=blender, samples=samples, threads=threads, catalogue=catalogue)
@@ -83,7 +84,7 @@ def render_traced(
 def traced_views(
     seed: int, blender: Path, samples: int, threads: int, catalogue: Catalogue | None = None
 ) -> Iterator[tuple[ByteArray, FloatArray]]:
-    """Yield photographs (H, W, 3) uint8 of one room with depth (H, W) float16 as in ``room_views``."""
+    """Yield photographs (H, W, 3) uint8 of one room, each with the depth (H, W) of ``room_views``."""
     room = dataset.viewed_room(seed, catalogue, threads)
     light = trace(room.scene, room.cameras, blender, samples, threads)
     for camera, view in zip(room.cameras, light, strict=True):
@@ -121,11 +122,11 @@ def trace(
 def write_exchange(file: Path, scene: Scene, cameras: Sequence[Camera]) -> None:
     """Write a scene and its cameras as plain arrays; lengths in metres, colours linear unless stated.
 
-    ``corners_m`` (F, 3, 3) of the triangles, world, ``corner_normals`` (F, 3, 3) world, ``uv`` (F, 3, 2) from
-    the lower left of the image, ``material`` (F,) index into ``gloss`` and ``emission`` (M,);
-    ``atlas_png`` the bytes of an 8-bit sRGB PNG; ``light_position_m``, ``light_color`` (L, 3) at 1 m,
-    ``light_size_m`` (L,) radius; ``ambient`` (3,); ``matrix`` (N, 3, 3), ``T_world_camera`` (N, 4, 4),
-    ``size_px`` width and height.
+    The arrays are: ``corners_m`` and ``corner_normals`` (F, 3, 3) of the triangles, world frame; ``uv``
+    (F, 3, 2) from the lower left of the image; ``material`` (F,) index into ``gloss`` and ``emission`` (M,);
+    ``atlas_png`` the bytes of an 8-bit sRGB PNG; ``light_position_m`` (L, 3), ``light_color`` (L, 3)
+    intensity at 1 m, ``light_size_m`` (L,) radius; ``ambient`` (3,); ``matrix`` (N, 3, 3), ``T_world_camera``
+    (N, 4, 4), ``size_px`` width and height.
 
     Raises:
         InputError: a camera is distorted or has another size than the first.
@@ -166,19 +167,22 @@ def _check(cameras: Sequence[Camera]) -> None:
 
 
 def _apart(corners_m: FloatArray) -> FloatArray:
-    """Return (F, 3, 3) triangles raised by different heights up to 0.3 mm: light sticks between twins."""
+    """Return (F, 3, 3) triangles, each raised by a different height up to 0.3 mm.
+
+    Between two triangles in the same place, Blender's rays would be trapped.
+    """
     raised_m = _RAISED_M * (np.arange(len(corners_m)) * _GOLDEN % 1.0)
     return corners_m + (raised_m[:, None] * _face_normals(corners_m))[:, None]
 
 
 def _face_normals(corners_m: FloatArray) -> FloatArray:
-    """Return (F, 3) normals of (F, 3, 3) triangles."""
+    """Return (F, 3) unit normals of (F, 3, 3) triangles."""
     normals = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)
 
 
 def _nearest_m(vertices: FloatArray, triangles: IntArray, cameras: Sequence[Camera]) -> FloatArray:
-    """Return (F,) a pixel's size on each triangle, metres, in the nearest camera; inf if unseen."""
+    """Return (F,) smallest size of a pixel on each triangle, metres, over all cameras; inf if unseen."""
     caster = triangle_scene(vertices, triangles)
     covered_m = np.full(len(triangles), np.inf)
     for intrinsics, pose in cameras:
@@ -205,7 +209,8 @@ def unwrap(scene: Scene, covered_m: FloatArray) -> tuple[FloatArray, ByteArray]:
 
     Args:
         scene: the triangles of its parts, in order, are the F triangles.
-        covered_m: (F,) a pixel's size on each triangle, the largest allowed texel; infinite if unseen.
+        covered_m: (F,) a pixel's size on each triangle, metres, which determines the texels' size; infinite
+            if unseen.
 
     Returns:
         (F, 3, 2) float32 coordinates of the corners, 0 to 1 from the lower left, and the
@@ -238,7 +243,7 @@ def _lay_out(
 ) -> tuple[FloatArray, int]:
     """Lay charts (connected triangles that face the same way along x, y or z) flat in one image.
 
-    They are packed on shelves, the tallest first.
+    They are packed in rows, the tallest first.
 
     Returns:
         (F, 3, 2) positions of the triangles' corners in the image, pixels, and its height.
@@ -293,8 +298,8 @@ def _connected(points: FloatArray, group: IntArray) -> IntArray:
 
 @numba.njit(cache=True, nogil=True)
 def _rasterise(corners_px, points, height, width):  # type: ignore[no-untyped-def]
-    """Return (height, width) index of the triangle at or near each texel's centre, -1 for none, and its
-    place.
+    """Return (height, width) index of the triangle at or near each texel's centre, -1 for none, and
+    (height, width, 3) the place of the texel on it.
 
     Triangles extend a texel and a half beyond their edges, unless another one is nearer.
     """

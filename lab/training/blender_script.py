@@ -17,7 +17,7 @@ from mathutils import Matrix
 
 _SENSOR_MM = 36.0
 _BRIGHTEST = 6e4
-"""Largest value of a half float, roughly."""
+"""Limit of the light, a little below the largest half float."""
 
 
 def main() -> None:
@@ -93,7 +93,7 @@ def _material(image: Any, gloss: float, emission: float) -> Any:
 
 
 def _mesh(name: str, room: dict[str, np.ndarray], materials: list[Any], chosen: np.ndarray) -> Any:
-    """Return an object of the chosen triangles, with their own corners' normals."""
+    """Return an object of the chosen triangles, shaded with the normals at their corners."""
     corners_m = room["corners_m"][chosen]
     count = len(corners_m)
     mesh = bpy.data.meshes.new(name)
@@ -122,7 +122,7 @@ def _lights(room: dict[str, np.ndarray]) -> None:
         strongest = max(float(color.max()), 1e-9)
         light = bpy.data.lights.new("lamp", "POINT")
         light.color = color / strongest
-        # White at 1 m reflects W / (4 pi^2), and should reflect the light's intensity.
+        # A white surface at 1 m has the radiance W / (4 pi^2), which should be the light's intensity.
         light.energy = 4.0 * np.pi**2 * strongest
         light.shadow_soft_size = float(size_m)
         thing = bpy.data.objects.new("lamp", light)
@@ -185,7 +185,7 @@ def _point(
 
 
 def _light(file: Path) -> np.ndarray:
-    """Return (H, W, 3) float16 of a rendered file; Blender stores rows from the bottom up."""
+    """Return (H, W, 3) float16 light of a rendered file; Blender stores rows from the bottom up."""
     image = bpy.data.images.load(str(file))
     width, height = image.size
     values = np.empty(width * height * 4, np.float32)

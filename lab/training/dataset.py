@@ -24,7 +24,7 @@ WIDTH_PX, HEIGHT_PX = 320, 240
 ROOMS_PER_SHARD = 10
 VIEWS_PER_ROOM = 5
 FOCAL_PX = 262.5
-"""Focal length of the images in shards: a Kinect's at half size."""
+"""Focal length of a Kinect at half size, for which the depth of rooms from a catalogue is computed."""
 FIRST_SEED = {"train": 0, "validation": 1_000_000, "test": 2_000_000}
 """First room seed of each split; no room is in two splits."""
 
@@ -48,7 +48,15 @@ def write_shards(
     first_seed: int,
     room: Callable[[int], Iterable[tuple[ByteArray, FloatArray]]],
 ) -> Iterator[Path]:
-    """Write the missing shards: the views that ``room`` gives for each of ten seeds."""
+    """Write the missing shards, ten rooms each, and yield the RGB file of every shard.
+
+    Args:
+        folder: folder of the shards.
+        name: beginning of the files' names.
+        shards: numbers of the shards.
+        first_seed: seed of the first room of shard 0.
+        room: yields colours and depth of the views of the room of a seed.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     for shard in shards:
         rgb_file = folder / f"{name}_{shard:04d}_rgb.npy"
@@ -74,10 +82,10 @@ class ViewedRoom:
     rng: np.random.Generator
     """Random generator of the images."""
     focal_px: float
-    """Focal length of the camera whose depth is learned."""
+    """Focal length of the learned camera, for which ``canonical_m`` computes depth."""
 
     def canonical_m(self, z_m: FloatArray, intrinsics: CameraIntrinsics) -> FloatArray:
-        """Return (H, W) float16 depth that the learned camera would measure for the same image."""
+        """Return (H, W) float16 depth, metres, that the learned camera would measure for the same image."""
         return (z_m * (self.focal_px / intrinsics.fx_px)).astype(np.float16)
 
 
@@ -92,7 +100,7 @@ def viewed_room(
             as in ``zoom``, their depth is that which the training camera would measure for the same image:
             true depth times 262.5 px / focal length (canonical cameras, Yin et al. 2023).
         threads: threads of the renderer; 0 takes all cores.
-        views: number of cameras.
+        views: number of cameras; None takes five.
     """
     from lab.training.varied_rooms import varied_room
     from lab.worlds.render import Renderer
@@ -114,7 +122,7 @@ def viewed_room(
 
 
 def room_views(seed: int, catalogue: Catalogue | None = None) -> Iterator[tuple[ByteArray, FloatArray]]:
-    """Yield colours and depth, float16 metres, of the views of one room."""
+    """Yield (240, 320, 3) uint8 colours and (240, 320) float16 depth, metres, of the views of one room."""
     room = viewed_room(seed, catalogue)
     for intrinsics, T_world_camera in room.cameras:
         view = room.renderer.view(intrinsics, T_world_camera, "fast", room.rng)
@@ -132,7 +140,7 @@ class Shards:
         self.refresh()
 
     def refresh(self) -> None:
-        """Open the shards that appeared since the last call."""
+        """Open the shards that were written since the last call."""
         for file in sorted(self.folder.glob(f"{self.split}_*_rgb.npy")):
             if file not in self.files:
                 rgb = np.load(file, mmap_mode="r")
@@ -151,13 +159,13 @@ class Shards:
         return np.asarray(rgb[row]), np.asarray(depth[row], dtype=np.float32)
 
     def evenly(self, count: int) -> Iterator[tuple[ByteArray, FloatArray]]:
-        """Yield ``count`` images, evenly spread over all."""
+        """Yield ``count`` images with their depth, evenly spread over all; there must be at least one."""
         for item in np.linspace(0, len(self) - 1, count).astype(int):
             yield self[item]
 
 
 def augment(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> tuple[ByteArray, FloatArray]:
-    """Return a plausible other photograph of the same place, with its depth."""
+    """Return another plausible photograph of the same place, with its depth."""
     if rng.random() < 0.5:
         rgb, depth_m = rgb[:, ::-1], depth_m[:, ::-1]
     if rng.random() < 0.3:
@@ -168,7 +176,10 @@ def augment(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> tu
 def zoom(
     rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator, largest: float = 1.6
 ) -> tuple[ByteArray, FloatArray]:
-    """Return a random crop enlarged to full size; the focal length is kept, so depth shrinks with it."""
+    """Return a random crop, enlarged up to ``largest`` times to full size.
+
+    The network assumes a fixed focal length, so the depth is divided by the enlargement.
+    """
     factor = rng.uniform(1.0, largest)
     width, height = round(WIDTH_PX / factor), round(HEIGHT_PX / factor)
     left, top = rng.integers(WIDTH_PX - width + 1), rng.integers(HEIGHT_PX - height + 1)
@@ -181,7 +192,7 @@ def zoom(
 
 
 def recolor(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
-    """Change exposure, contrast, gamma and white balance at random, and sometimes saturation."""
+    """Change brightness, contrast, gamma and white balance at random, and sometimes saturation."""
     level = np.linspace(0.0, 1.0, 256)
     gamma, contrast, brightness = np.exp(rng.normal(0.0, (0.25, 0.2, 0.15)))
     balance = np.exp(rng.normal(0.0, 0.08, 3))

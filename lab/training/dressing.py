@@ -20,7 +20,7 @@ _OPENING_DEPTH_M = 0.06
 def dressed(
     entry: Entry, model: Model, T: FloatArray, rng: np.random.Generator, daylight: float
 ) -> list[Part]:
-    """Return the parts of a model at ``T``.
+    """Return the parts of a model at ``T``, in its own or other colours, black, or of one random material.
 
     Args:
         entry: the model's catalogue entry.
@@ -43,7 +43,7 @@ def dressed(
 
 
 def placed_size_m(entry: Entry) -> FloatArray:
-    """Return (3,) width, depth and height in the room; doors and windows protrude only a little."""
+    """Return (3,) width, depth and height in the room; doors and windows are at most 6 cm deep."""
     if entry.role != "opening":
         return entry.size_m
     return np.array([entry.size_m[0], min(entry.size_m[1], _OPENING_DEPTH_M), entry.size_m[2]])
@@ -52,7 +52,7 @@ def placed_size_m(entry: Entry) -> FloatArray:
 def _part(
     surface: Surface, entry: Entry, T: FloatArray, rng: np.random.Generator, daylight: float, share: float
 ) -> Part:
-    """Return one surface with the material of its kind, its depth scaled by ``share``."""
+    """Return one surface with the material of its kind, its size along y scaled by ``share``."""
     texture: Texture = surface.colors if share == 1.0 else _stretched(surface.colors, share)
     gloss = float(rng.uniform(0.15, 0.45))
     material = {
@@ -84,7 +84,7 @@ def _darkened(part: Part) -> Part:
 
 
 def _cloth(rng: np.random.Generator) -> Material:
-    """Plain weave, stripes or print."""
+    """Return a cloth: plain weave, stripes, a print or checks."""
     color, second = textures.random_palette(rng, 2)
     seed = draw_seed(rng)
     makers = (

@@ -19,7 +19,7 @@ from pipeline.io.rigs import load_frame
 from pipeline.types import ByteArray, DepthMap, FloatArray
 
 FIRST_TEST_ROOM = FIRST_SEED["test"]
-"""First seed of rooms that are never trained on."""
+"""First seed of the test split's rooms."""
 MODES: tuple[AlignmentMode, ...] = ("none", "median", "affine_depth", "affine_inverse", "local")
 BLOCK_PX = 32
 SHOWN = ("abs_rel", "rmse_m", "rmse_log", "delta_1", "silog")
@@ -37,7 +37,7 @@ class Example:
 
 
 def evaluate(model: Path | None, real: Path | None, rooms: int) -> Iterator[str]:
-    """Yield lines of a Markdown table: every set of images, every alignment mode, mean errors.
+    """Yield lines of a Markdown table of mean errors, by set of images and alignment mode.
 
     Args:
         model: ONNX file; None takes the one that ships.
@@ -58,7 +58,7 @@ def evaluate(model: Path | None, real: Path | None, rooms: int) -> Iterator[str]
 
 
 def rows(title: str, examples: list[Example], network: DepthNetwork) -> Iterator[str]:
-    """Yield two lines for a constant depth, shaped by the sensor's depth only, and one per mode."""
+    """Yield two table lines for constant depth aligned with the sensor's, and one per mode of the network."""
     flat = [DepthMap(np.ones_like(example.truth_m)) for example in examples]
     for mode in ("median", "local"):
         yield row(f"| {title} | constant | {mode} |", examples, flat, mode)

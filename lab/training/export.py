@@ -53,11 +53,12 @@ CONVENTION = Convention(
 """Input and output of an exported file: unscaled 8-bit values, and metres up to an unknown scale, which an
 image does not determine."""
 INTEGER_LAYERS = ("/encoder/pool/", "/encoder/stages.", "/decoder/")
+"""Prefixes of the nodes that are quantised, apart from ``FLOAT_LAYERS``."""
 FLOAT_LAYERS = ("/decoder/reduce.4/", "/decoder/join.4/", "/decoder/heads.3/")
-"""Layers in floating point, with the input, the first convolution and all from the head's logit to depth,
-which 8 bits would quantise into 256 steps."""
+"""Prefixes of decoder nodes that stay in floating point. So do the input, the first convolution, and all
+nodes from the head's logit to depth, because 8 bits would reduce the depth to 256 steps."""
 FACTS = ("seed", "width", "initial", "loss", "step", "images_seen", "elapsed_s", "learning_rate")
-"""Facts about the training that a file repeats."""
+"""Facts about the training that are copied from the checkpoint to the file's metadata."""
 
 
 class Normalise(nn.Module):
@@ -152,7 +153,7 @@ def write_float(network: DepthNet, file: Path) -> None:
 
 
 def quantise(float_file: Path, out: Path, training: Shards) -> None:
-    """Write the network with 8-bit weights and activations, ranges from training images."""
+    """Write the network with 8-bit weights and activations in its integer layers; images give the ranges."""
     prepared = out.with_suffix(".prepared.onnx")
     quant_pre_process(str(float_file), str(prepared), skip_symbolic_shape=True)
     nodes = [node.name for node in onnx.load(prepared).graph.node]
@@ -194,7 +195,7 @@ def described_data(training: Shards) -> str:
 
 
 def describe(file: Path, facts: dict[str, Any], errors: dict[str, float], data: str) -> None:
-    """Write into the file its input and output, its training, and its errors on validation rooms."""
+    """Write the file's metadata: convention of input and output, training, errors on validation rooms."""
     model = onnx.load(file)
     properties = {
         **metadata_of(CONVENTION),

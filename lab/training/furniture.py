@@ -24,9 +24,9 @@ from packetmesh.errors import InputError
 from pipeline.types import ByteArray, FloatArray
 
 Role = Literal["opening", "ceiling", "wall", "against", "table", "chair", "free", "small", "unused"]
-"""Place of an object: in, under, on or against another part, or free on the floor."""
+"""Place of an object, such as in a wall (opening), against a wall, or on the floor or furniture (small)."""
 _FORMAT = 2
-"""Version of the cached models; a change makes them again."""
+"""Version of the cached models; after a change all models are made again."""
 _OUTDOORS = re.compile(
     r"\b(sedan|elevator|garage|shutter|blind|screen door|street|lamppost|fences?|railing|hedge|goal|horse|"
     r"hut|chimney|swimming|diving|snowman|motorbike|swing|sandpit|light source|hydrant|fountain|fitness|net|"
@@ -35,7 +35,7 @@ _OUTDOORS = re.compile(
 _TABLES = ("table", "desk", "nightstand", "commode", "chest of drawers", "sideboard", "counter", "workbench")
 _CHAIRS = ("chair", "stool", "pouf", "ottoman")
 OTHER_AUTHORS = {"validation": ("katorlegaz",), "test": ("blendswap-cc-by",)}
-"""Folders of a catalogue's archives, one per author or two, used by these splits only."""
+"""Values of ``Entry.author`` whose models furnish the rooms of that split only."""
 _HUNG = ("picture", "painting", "poster", "frame", "mirror", "clock", "board")
 
 
@@ -46,20 +46,22 @@ class Entry:
     name: str
     category: str
     size_m: FloatArray
-    """(3,) width, depth and height."""
+    """(3,) width, depth and height of the object."""
     elevation_m: float
     """Height of its lowest point above the floor."""
     rotation: FloatArray
     """(3, 3) rotation of the model in its own frame."""
     light_m: FloatArray | None
-    """(3,) position of a lamp's light in the frame of the piece: Z up, from the middle of its foot."""
+    """(3,) position of a lamp's light in the piece's frame (Z up, from the middle of its foot), or None."""
     file: Path
+    """Zip file of the catalogue."""
     model: str
+    """Path of the OBJ model in ``file``."""
     role: Role
 
     @property
     def author(self) -> str:
-        """The archive's folder of the model: a contributor, or a collection of a licence."""
+        """The archive's top folder of the model, named after a contributor or a collection."""
         return self.model.partition("/")[0]
 
     @property
@@ -75,6 +77,7 @@ class SurfaceImage:
 
     category: str
     size_m: tuple[float, float]
+    """True width and height of the photographed area."""
     rgba: ByteArray
     """(H, W, 4)."""
 
@@ -113,7 +116,7 @@ class Catalogue:
         return cls(tuple(entries), tuple(images), folder)
 
     def of_split(self, split: str) -> Catalogue:
-        """Return the part for rooms of a split: no author's models are in two splits.
+        """Return the part of the catalogue for a split; no ``Entry.author`` is in two splits.
 
         Raises:
             InputError: the catalogue has no model for the split.
@@ -177,7 +180,7 @@ def _entry(record: dict[str, str], file: Path) -> Entry:
 
 
 def _light(record: dict[str, str], size_m: FloatArray) -> FloatArray | None:
-    """Return a record's first light position; the catalogue's x and y are from the back left corner."""
+    """Return a record's first light position, (3,) or None; the catalogue's origin is back left."""
     if "lightSourceX" not in record:
         return None
     x, y, z = (float(record[f"lightSource{axis}"].split()[0]) / 100.0 for axis in "XYZ")
@@ -185,7 +188,7 @@ def _light(record: dict[str, str], size_m: FloatArray) -> FloatArray | None:
 
 
 def _role(name: str, category: str, size_m: FloatArray, elevation_m: float, opening: bool) -> Role:
-    """Return the place of an object, from its names and its size."""
+    """Return the place of an object, by its name, category, size and elevation."""
     width, depth, height = size_m
     longest = float(size_m.max())
     if category in ("Vehicles", "Staircases") or _OUTDOORS.search(name):

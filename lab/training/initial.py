@@ -30,7 +30,7 @@ MEAN_BGR = np.array([104.0, 117.0, 123.0], np.float32)
 LITE_MEAN, LITE_DEVIATION = 127.0, 128.0
 """Values that Google's Lite networks subtract from 8-bit images and divide by, equal in all channels."""
 LITE_FEATURES = ("_conv_stem", "_bn0", "_blocks")
-"""The package's names of the parts before its classifier."""
+"""Beginnings of the names of the package's tensors that are used: all before its classifier."""
 LICENCES = {
     "random": "Apache-2.0",
     "open-nsfw": "Apache-2.0; encoder trained on from Open-NSFW, Copyright 2016 Yahoo Inc., BSD-2-Clause",
@@ -50,7 +50,7 @@ def initial_network(initial: Initial, width: Width, images: Iterable[Tensor]) ->
             variances.
 
     Raises:
-        InputError: the weights are of another encoder, or their package is missing.
+        InputError: the weights are for another encoder, or their package is missing or of another version.
     """
     fitting = WIDTHS[initial]
     if initial != "random" and width != fitting:
@@ -153,7 +153,7 @@ def layers_of(model: onnx.ModelProto) -> Iterator[tuple[np.ndarray, list[np.ndar
 
 
 def encoder_pairs(encoder: ResNet50) -> Iterator[tuple[nn.Conv2d, nn.BatchNorm2d]]:
-    """Yield our convolutions and norms in the package's order: a shortcut before the block's last one."""
+    """Yield convolutions and norms in the package's order: a block's shortcut before its last convolution."""
     yield encoder.stem[0], encoder.stem[1]
     for stage in encoder.stages:
         for block in stage:

@@ -2,8 +2,8 @@
 
 ``python -m lab.training.least_confidence [ROOMS]`` reconstructs one view of each of 24 rooms of the
 validation split with ``depth.least_confidence`` from 0 to 0.8 and prints medians over them: rays without a
-surface, the F-score at 5 cm, and the share of the area more than 5 cm off the truth, much of which is skirts
-from objects to their background. Test rooms, demo scenes and real frames are not used.
+surface, the F-score at 5 cm, and the share of the area more than 5 cm off the truth, much of which joins
+objects to their background. Test rooms, demo scenes and real frames are not used.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def rig_of(seed: int) -> Rig:
 
 
 def measured(rig: Rig, level: float) -> tuple[float, ...]:
-    """Return rays without a surface, F-score and share of the area that is off, at a least confidence."""
+    """Return shares, 0 to 1: rays without a surface, F-score, area over 5 cm off, at a least confidence."""
     preset = PRESETS["packetmesh"]
     result = reconstruct(rig, replace(preset, depth=replace(preset.depth, least_confidence=level)))
     truth = result.truth_after

@@ -19,9 +19,9 @@ def supervised_loss(
 
     Args:
         depths_m: predictions (N, 1, H/s, W/s) at strides s = 1, 2, 4, 8.
-        target_m: (N, 1, H, W), NaN where unknown.
-        image: (N, 3, H, W) any normalisation; guides the smoothness.
-        kind: loss of the depth itself; its gradients and smoothness have the same weights in both kinds.
+        target_m: (N, 1, H, W) true depth, NaN where unknown.
+        image: (N, 3, H, W), normalised in any way; edges in it reduce the smoothness term.
+        kind: loss of the depth values; the terms of gradients and smoothness are the same for both kinds.
     """
     loss = target_m.new_zeros(())
     for level, depth_m in enumerate(depths_m):
@@ -37,7 +37,12 @@ def supervised_loss(
 
 
 def scale_invariant(error: Tensor, valid: Tensor) -> Tensor:
-    """Return 10 sqrt(mean(g^2) - 0.85 mean(g)^2), for each image separately (Eigen et al. 2014)."""
+    """Return the mean over images of 10 sqrt(mean(g^2) - 0.85 mean(g)^2) (Eigen et al. 2014).
+
+    Args:
+        error: (N, 1, H, W) g, predicted minus true log depth; 0 where unknown.
+        valid: (N, 1, H, W) True where the truth is known.
+    """
     count = valid.sum(dim=(1, 2, 3)).clamp(min=1)
     mean = error.sum(dim=(1, 2, 3)) / count
     mean_square = error.square().sum(dim=(1, 2, 3)) / count
@@ -45,7 +50,7 @@ def scale_invariant(error: Tensor, valid: Tensor) -> Tensor:
 
 
 def berhu(error_m: Tensor, valid: Tensor) -> Tensor:
-    """Return the mean of |x|, above c = 0.2 max |x| of (x^2 + c^2) / 2c (Laina et al. 2016)."""
+    """Return the mean of |x|, or of (x^2 + c^2) / 2c where |x| > c = 0.2 max |x| (Laina et al. 2016)."""
     size_m = error_m.abs()
     limit_m = (BERHU_SHARE * size_m.detach().max()).clamp(min=1e-6)
     cost = torch.where(size_m <= limit_m, size_m, (size_m.square() + limit_m.square()) / (2.0 * limit_m))
@@ -53,7 +58,7 @@ def berhu(error_m: Tensor, valid: Tensor) -> Tensor:
 
 
 def gradient_error(error: Tensor, valid: Tensor) -> Tensor:
-    """Return mean |dx g| + mean |dy g| over neighbouring pixels that both have a target."""
+    """Return mean |dx g| + mean |dy g| of log errors g over neighbouring pixels that both have a target."""
     total = error.new_zeros(())
     for axis in (2, 3):
         size = error.shape[axis] - 1
@@ -63,7 +68,7 @@ def gradient_error(error: Tensor, valid: Tensor) -> Tensor:
 
 
 def smoothness(depth_m: Tensor, image: Tensor) -> Tensor:
-    """Return edge-aware first differences of the mean-normalised disparity (Godard et al. 2019)."""
+    """Return the mean edge-aware first differences of mean-normalised disparity (Godard et al. 2019)."""
     disparity = 1.0 / depth_m
     disparity = disparity / disparity.mean(dim=(2, 3), keepdim=True)
     total = depth_m.new_zeros(())

@@ -37,7 +37,7 @@ class Surface:
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A model that stands on z = 0 about the origin, its front towards -y."""
+    """A model that stands on z = 0, centred on the z axis, its front towards -y."""
 
     surfaces: tuple[Surface, ...]
     top_m: FloatArray
@@ -53,7 +53,7 @@ def make_model(
         mesh: the model as read.
         rotation: (3, 3) the catalogue's rotation of the model.
         size_m: (3,) true width, depth and height, to which the bounding box is scaled.
-        light_m: (3,) position of its light, in the piece's frame; the surfaces around it glow.
+        light_m: (3,) position of its light, in the piece's frame, or None; the surfaces around it glow.
     """
     vertices = _standing(mesh.vertices @ (_FRAME @ rotation).T, mesh.triangles, size_m)
     corners = vertices[mesh.triangles]
@@ -110,7 +110,7 @@ def load_model(file: Path) -> Model:
 
 
 def _standing(vertices: FloatArray, triangles: IntArray, size_m: FloatArray) -> FloatArray:
-    """Scale and move vertices so that the triangles' bounding box has this size and stands on z = 0."""
+    """Scale and move vertices so that the triangles' box has this size, on z = 0 and about the z axis."""
     used = vertices[np.unique(triangles)]
     low, extent = used.min(axis=0), np.ptp(used, axis=0)
     scaled = (vertices - low) / np.where(extent > 0.0, extent, 1.0) * size_m
@@ -118,7 +118,7 @@ def _standing(vertices: FloatArray, triangles: IntArray, size_m: FloatArray) -> 
 
 
 def _kind(finish: Finish) -> Kind:
-    """Return a material's kind; Blender writes Ks 0.5 and Ns 96 for unchanged materials."""
+    """Return a material's kind; Blender's defaults, Ks 0.5 and Ns 96, count as matt."""
     name = finish.name.lower()
     if "mirror" in name or "espejo" in name:
         return "mirror"
@@ -131,7 +131,7 @@ def _kind(finish: Finish) -> Kind:
 def _sampled(
     corners: FloatArray, area: FloatArray, count: int, rng: np.random.Generator
 ) -> tuple[IntArray, FloatArray]:
-    """Return triangles, by area and each at least once, and (N, 3) random positions on them."""
+    """Return (N,) triangle indices drawn by area, each at least once, and (N, 3) random positions on them."""
     face = np.searchsorted(np.cumsum(area), rng.random(count) * area.sum())
     face = np.concatenate([np.minimum(face, len(area) - 1), np.arange(len(area))])
     u, v = np.sqrt(rng.random(len(face))), rng.random(len(face))
@@ -142,7 +142,7 @@ def _sampled(
 def _colors(
     mesh: Wavefront, face: IntArray, points_m: FloatArray, corners: FloatArray
 ) -> tuple[FloatArray, np.ndarray]:
-    """Return (N, 3) linear colours, and (N,) whether the surface exists, of positions on triangles."""
+    """Return (N, 3) linear colours of positions on triangles, and (N,) True where the texture is opaque."""
     rgb, opaque = np.zeros((len(face), 3)), np.ones(len(face), np.bool_)
     for k, finish in enumerate(mesh.finishes):
         rows = np.flatnonzero(mesh.finish[face] == k)
@@ -173,7 +173,7 @@ def _barycentric(points: FloatArray, corners: FloatArray) -> FloatArray:
 
 
 def _thinned(vertices: FloatArray, triangles: IntArray, budget: int) -> tuple[FloatArray, IntArray]:
-    """Return a mesh of about ``budget`` of these triangles, by quadric errors (Garland, Heckbert 1997)."""
+    """Return these triangles simplified to about ``budget``, by quadric errors (Garland, Heckbert 1997)."""
     from pipeline.kernels.open3d_runtime import o3d
 
     rounded = np.round(vertices[triangles].reshape(-1, 3), 5)
@@ -186,10 +186,10 @@ def _thinned(vertices: FloatArray, triangles: IntArray, budget: int) -> tuple[Fl
     most = 4 * budget
     while budget < len(faces):
         thin = mesh.simplify_quadric_decimation(budget)
-        if len(thin.triangles) > 2 * budget:  # loose triangles share no edges to collapse
+        if len(thin.triangles) > 2 * budget:  # triangles that share no edges cannot collapse
             thin = mesh.simplify_vertex_clustering(float(np.ptp(places, axis=0).max()) / np.sqrt(budget))
         kept = thin.get_surface_area() / mesh.get_surface_area()
-        if kept < _KEPT_AREA and budget < most:  # leaves fall to pieces
+        if kept < _KEPT_AREA and budget < most:  # separate leaves of plants vanish
             budget *= 2
             continue
         places, faces = np.asarray(thin.vertices).copy(), np.asarray(thin.triangles).astype(np.int64)
@@ -198,7 +198,7 @@ def _thinned(vertices: FloatArray, triangles: IntArray, budget: int) -> tuple[Fl
 
 
 def _top(points_m: FloatArray, size_m: FloatArray) -> FloatArray:
-    """Return a (24, 24) map of the highest points over the footprint."""
+    """Return ``Model.top_m`` of (N, 3) points on the surface."""
     top = np.full((GRID, GRID), -np.inf)
     cell = np.clip(((points_m[:, :2] / size_m[:2] + 0.5) * GRID).astype(int), 0, GRID - 1)
     np.maximum.at(top, (cell[:, 0], cell[:, 1]), points_m[:, 2])

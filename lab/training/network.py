@@ -84,8 +84,8 @@ class ResNet50(nn.Module):
     def forward(self, x: Tensor) -> list[Tensor]:
         """Return features of a normalised image (N, 3, H, W), finest first.
 
-        ``offset`` is the value of the first convolution's zero padding; subtracting it instead of folding it
-        into a bias keeps the borders exact for weights that were made with another mean.
+        ``offset`` is the input value that the first convolution's zero padding represents. It differs from 0
+        for weights trained with another mean; subtracting it, unlike a bias, is exact at the borders too.
         """
         features = [self.stem(x - self.offset)]
         x = self.pool(features[0])
@@ -177,7 +177,10 @@ class DepthNet(nn.Module):
         self.reset()
 
     def reset(self) -> None:
-        """Apply He initialisation, which keeps the variance under ELU; heads start near a room's depth."""
+        """Draw the weights: the encoder's after He, the decoder's so that ELU keeps the variance.
+
+        The heads start near the typical depth of a room.
+        """
         for module in self.encoder.modules():
             if isinstance(module, nn.Conv2d):
                 fan_out = module.out_channels * module.weight[0, 0].numel() / module.groups
@@ -197,6 +200,6 @@ class DepthNet(nn.Module):
 
 
 def depth_from_logit(logit: Tensor) -> Tensor:
-    """Return depth = 1 / (1/dmax + (1/dmin - 1/dmax) sigmoid(logit)), in float32."""
+    """Return depth = 1 / (1/dmax + (1/dmin - 1/dmax) sigmoid(logit)), in float32 metres."""
     share = torch.sigmoid(logit.float())
     return 1.0 / (1 / DEPTH_MAX_M + (1 / DEPTH_MIN_M - 1 / DEPTH_MAX_M) * share)

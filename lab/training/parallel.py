@@ -17,14 +17,14 @@ from torch import Tensor, nn
 
 @dataclass(slots=True)
 class Team:
-    """One process's rank among its equals, and the memory that they share."""
+    """A process's rank in its team, and the memory that the team shares."""
 
     rank: int
     size: int
     gradients: Tensor
-    """(2, size, parameters): two slots, so that one step can be written while the previous is read."""
+    """(2, size, parameters): two slots, so that a step can be written while the previous one is read."""
     clock_s: Tensor
-    """(2,) float64, the leader's time."""
+    """(2,) float64, the leader's time in either slot."""
     barrier: Any
 
     @property
@@ -33,7 +33,7 @@ class Team:
         return self.rank == 0
 
     def average_gradients(self, parameters: Iterable[nn.Parameter], step: int, now_s: float) -> float:
-        """Replace every gradient by the team's mean. Returns the leader's time, equal in all processes."""
+        """Replace every gradient by the team's mean; return the leader's ``now_s``, in all processes."""
         slot = step % 2
         grads = [p.grad for p in parameters if p.grad is not None]
         torch.cat([grad.reshape(-1) for grad in grads], out=self.gradients[slot, self.rank])
@@ -47,7 +47,16 @@ class Team:
 
 
 def run_team(size: int, parameters: int, work: Callable[..., None], *arguments: object) -> None:
-    """Run ``work(team, *arguments)`` in ``size`` processes of one thread each, until all have ended."""
+    """Run ``work(team, *arguments)`` in ``size`` processes of one thread each, until all have stopped.
+
+    An exception in one process stops the others at their next step; it is printed, but not raised here.
+
+    Args:
+        size: number of processes.
+        parameters: number of parameters of the trained network, all of which get gradients.
+        work: called in each process.
+        arguments: further arguments of ``work``.
+    """
     context = mp.get_context("spawn")
     gradients = torch.zeros(2, size, parameters).share_memory_()
     clock_s = torch.zeros(2, dtype=torch.float64).share_memory_()

@@ -16,7 +16,7 @@ from pipeline.types import FloatArray
 
 _TEXEL_M = 0.004
 _PHOTOGRAPHED = 0.4
-"""Share of floors and walls covered by a photograph, if there are any."""
+"""Share of floors and walls covered by a photograph, if the catalogue has any."""
 
 
 def photographed_shell(
@@ -43,7 +43,7 @@ def skirting(rng: np.random.Generator, size_m: FloatArray) -> list[Part]:
 
 
 def mirror(rng: np.random.Generator) -> tuple[list[Part], FloatArray]:
-    """Return a framed mirror, its foot on z = 0 and its front towards -y, and its (3,) size."""
+    """Return a framed mirror, its foot on z = 0 and its front towards -y, and its (3,) size, metres."""
     size_m = np.array([rng.uniform(0.4, 1.2), 0.03, rng.uniform(0.5, 1.6)])
     glass = Material(paint((0.8, 0.82, 0.8), 3, 0.0), gloss=0.95, infrared=0.02)
     pane = size_m - np.array([0.06, 0.01, 0.06])
@@ -57,13 +57,13 @@ def tiled(image: SurfaceImage, scale: float, gain: FloatArray) -> Texture:
 
     Args:
         image: the photograph, of known true size.
-        scale: scale over its true size.
-        gain: (3,) tint.
+        scale: enlargement, 1 for its true size.
+        gain: (3,) factors of its linear colours.
     """
     width_m, height_m = scale * image.size_m[0], scale * image.size_m[1]
     shape = (max(2, round(width_m / _TEXEL_M)), max(2, round(height_m / _TEXEL_M)))
     small = image.rgba[..., :3]
-    if shape[0] < small.shape[1]:  # so coarse that distant floors do not flicker
+    if shape[0] < small.shape[1]:  # coarse, to avoid aliasing on distant floors
         small = cv2.resize(small, shape, interpolation=cv2.INTER_AREA)
     albedo = np.clip((small / 255.0) ** 2.2 * gain, 0.01, 0.9).astype(np.float32)
 
@@ -78,7 +78,7 @@ def tiled(image: SurfaceImage, scale: float, gain: FloatArray) -> Texture:
 
 
 def _covered(category: str, rng: np.random.Generator, images: tuple[SurfaceImage, ...]) -> Material | None:
-    """Return a photographed surface, or None if there is none or the draw decides against it."""
+    """Return a material with a photograph of the category; None if there is none, or at random."""
     fitting = [image for image in images if image.category == category]
     if not fitting or rng.random() >= _PHOTOGRAPHED:
         return None

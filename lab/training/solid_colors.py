@@ -1,4 +1,4 @@
-"""The colours of a surface in small cubes of space, so that a mesh needs no texture coordinates."""
+"""Colours of a surface, stored by small cubes of space, so that a mesh needs no texture coordinates."""
 
 from __future__ import annotations
 
@@ -21,19 +21,20 @@ _NEIGHBOURS = np.array(
 
 @dataclass(frozen=True, slots=True)
 class SolidColors:
-    """A texture (as in ``lab.worlds.scene``): the mean colour of a surface in each cube that it passes."""
+    """A ``lab.worlds.scene.Texture``: the mean colour of a surface in each cube that it passes through."""
 
     low_m: FloatArray
-    """(3,) corner of the first cube."""
+    """(3,) lowest corner of the first cube."""
     cube_m: float
+    """Side of a cube."""
     keys: IntArray
     """(K,) int32, sorted numbers of the cubes that hold colour."""
     colors: ByteArray
-    """(K, 3) sRGB."""
+    """(K, 3) 8-bit colours with a gamma of 2.2."""
 
     @classmethod
     def sampled(cls, points_m: FloatArray, rgb: FloatArray, cube_m: float) -> SolidColors:
-        """Collect (N, 3) linear colours at (N, 3) positions."""
+        """Average (N, 3) linear colours at (N, 3) positions in cubes of ``cube_m`` or larger."""
         low_m = points_m.min(axis=0) - cube_m
         cube_m = max(cube_m, float(np.ptp(points_m, axis=0).max()) / (_SIDE - 4))
         cells = ((points_m - low_m) / cube_m).astype(np.int64)

@@ -36,6 +36,7 @@ RISE = 0.04
 """Share of the budget in which the learning rate rises."""
 VALIDATION_IMAGES = 48
 MEASURED_BATCHES = 8
+"""Batches on which ``initial_network`` measures variances."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +48,7 @@ class Stage:
     size_px: tuple[int, int]
     """Height and width of the input."""
     batch: int
+    """Images per step, of all processes together."""
 
 
 STAGES = {
@@ -113,17 +115,21 @@ def stop_on_signals() -> Iterator[Tensor]:
 
 
 def device_of(config: TrainingConfig) -> torch.device:
-    """Return the device of the training."""
+    """Return the device of the training.
+
+    Raises:
+        InputError: the device is cuda and there is no GPU.
+    """
     if config.device == "cuda" and not torch.cuda.is_available():
         raise InputError("Device cuda was asked for, but torch finds no GPU here: use cpu or auto.")
     return torch.device("cuda" if config.device != "cpu" and torch.cuda.is_available() else "cpu")
 
 
 def start(config: TrainingConfig) -> None:
-    """Write the first checkpoint, of an untrained network.
+    """Write ``out/last.pt`` with an untrained network.
 
     Raises:
-        InputError: ``out`` holds the best network of another training.
+        InputError: ``out`` holds the best network of another training, or the initial weights cannot be used.
     """
     if (config.out / "best.pt").exists():
         raise InputError(f"{config.out} holds a best.pt but no last.pt to go on from: use another folder.")
@@ -136,7 +142,7 @@ def start(config: TrainingConfig) -> None:
 
 
 def train_member(team: Team, config: TrainingConfig, stop: Tensor) -> None:
-    """Train on one process's share of each batch, until the leader sees ``stop``."""
+    """Train on one process's share of each batch, until the time is over or the leader sees ``stop``."""
     device = device_of(config)
     model = DepthNet(config.width).to(device, memory_format=torch.channels_last)
     optimizer = optimizer_of(model, config)
@@ -225,6 +231,7 @@ class Batches(IterableDataset):
     data: Path
     stage: Stage
     images: int
+    """Images per batch."""
     seed: tuple[int, ...]
 
     def __iter__(self) -> Iterator[tuple[Tensor, Tensor]]:
@@ -254,7 +261,10 @@ def endless_samples(data: Path, rng: np.random.Generator) -> Iterator[tuple[np.n
 
 
 def collate(samples: list[tuple[np.ndarray, np.ndarray]], stage: Stage) -> tuple[Tensor, Tensor]:
-    """Return images (N, 3, h, w) and targets (N, 1, h, w) of a stage's size; the padding has no target."""
+    """Return images (N, 3, h, w) and targets (N, 1, h, w) in metres, both of a stage's size.
+
+    Targets are NaN in the padding and beyond ``DEPTH_MIN_M`` and ``DEPTH_MAX_M``.
+    """
     images = np.concatenate([normalised_input(rgb) for rgb, _ in samples])
     depth_m = np.stack([depth_m for _, depth_m in samples])
     rows = (images.shape[2] - depth_m.shape[1]) // 2
@@ -304,7 +314,7 @@ def keep_best(
 
 
 def write(config: TrainingConfig, name: str, model: DepthNet, state: TrainingState, **more: object) -> None:
-    """Replace a checkpoint in ``out`` atomically."""
+    """Replace the checkpoint ``name``.pt in ``out`` atomically; it also stores ``more``."""
     plain = asdict(replace(config, data=str(config.data), out=str(config.out)))  # type: ignore[arg-type]
     with atomic_path(config.out / f"{name}.pt") as temporary:
         torch.save({"model": model.state_dict(), "state": asdict(state), "config": plain, **more}, temporary)

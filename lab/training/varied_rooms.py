@@ -30,7 +30,7 @@ class Placed:
     """An object in a room, with its bounding box."""
 
     low_m: FloatArray
-    """(3,) corner."""
+    """(3,) lowest corner, world frame."""
     high_m: FloatArray
     entry: Entry | None = None
     """Catalogue entry; None for other objects."""
@@ -49,23 +49,23 @@ class RoomPlan:
     """(3,) inner width (x), depth (y) and height."""
     theme: str
     daylight: float
-    """Brightness of windows; 0 at night."""
+    """Brightness of the light from windows and of the catalogue's panes; 0 at night."""
     catalogue: Catalogue
     rng: np.random.Generator
     parts: list[Part]
     placed: list[Placed] = field(default_factory=list)
     windows: list[FloatArray] = field(default_factory=list)
-    """(3,) positions before windows."""
+    """(3,) positions in front of windows, at which their light is placed."""
 
     def pick(self, role: Role) -> Entry | None:
-        """Return a random entry of a role, preferably of the room's theme."""
+        """Return a random entry of a role, preferably of the room's theme; None if the role has none."""
         entries = self.catalogue.of_role(role)
         themed = [entry for entry in entries if entry.category == self.theme]
         choice = themed if themed and self.rng.random() < 0.7 else entries
         return choice[self.rng.integers(len(choice))] if choice else None
 
     def fits(self, low_m: FloatArray, high_m: FloatArray, support: Placed | None = None) -> bool:
-        """Whether a box is inside the room and overlaps only its support."""
+        """Return whether a box is inside the room and overlaps no object except its support."""
         half = 0.5 * self.size_m[:2] + 1e-6
         if np.any(low_m[:2] < -half) or np.any(high_m[:2] > half) or high_m[2] > self.size_m[2] + 1e-6:
             return False
@@ -77,7 +77,7 @@ class RoomPlan:
         return not np.any(np.all((low_m < highs - 1e-6) & (high_m > lows + 1e-6), axis=1))
 
     def add(self, entry: Entry, T: FloatArray, support: Placed | None = None) -> Placed | None:
-        """Put an object at ``T`` if it fits there."""
+        """Put an object at ``T`` and return it; None if it does not fit there."""
         low, high = box_at(placed_size_m(entry), T)
         if not self.fits(low, high, support):
             return None
@@ -95,7 +95,7 @@ def varied_room(seed: int, catalogue: Catalogue) -> Scene:
 
 
 def plan_room(seed: int, catalogue: Catalogue) -> RoomPlan:
-    """Return all furniture of the room of a seed."""
+    """Return the room of a seed with all its furniture."""
     rng = np.random.default_rng([seed, 8117])
     size_m = np.array([rng.uniform(2.6, 6.0), rng.uniform(2.6, 6.0), rng.uniform(2.4, 3.2)])
     if rng.random() < 0.12:
@@ -141,7 +141,7 @@ def _dress_walls(plan: RoomPlan) -> None:
 
 
 def _hang_made(plan: RoomPlan, wall: int, along_m: float) -> float:
-    """Hang a procedural window, door, picture or shelf; return its width, little if it does not fit."""
+    """Hang a random procedural wall piece; return its width, metres, or 0.1 if it does not fit."""
     piece = pieces.from_stock(pieces.random_wall_piece, plan.seed, plan.rng)
     T = wall_pose(plan.size_m, wall, along_m + 0.5 * piece.width_m, 0.0, piece.height_m)
     if not _add_made(plan, pieces.moved(piece.parts, T)):
@@ -152,7 +152,10 @@ def _hang_made(plan: RoomPlan, wall: int, along_m: float) -> float:
 
 
 def _add_made(plan: RoomPlan, parts: list[Part]) -> bool:
-    """Add procedural parts on a wall; parts behind the wall's face do not count."""
+    """Add procedural parts on a wall if they fit, and return whether they do.
+
+    What is inside the wall, up to 20 cm, is left out of the test.
+    """
     half = 0.5 * plan.size_m[:2]
     low, high = pieces.bounds(parts)
     behind = 0.2
@@ -168,7 +171,7 @@ def _add_made(plan: RoomPlan, parts: list[Part]) -> bool:
 
 
 def _hang_entry(plan: RoomPlan, wall: int, along_m: float) -> float:
-    """Hang an object of the catalogue; return its width, little if it does not fit."""
+    """Hang a random object of the catalogue; return its width, metres, or 0.1 to 0.5 if nothing fits."""
     entry = plan.pick("opening" if plan.rng.random() < 0.25 else "wall")
     if entry is None:
         return 0.5
@@ -230,7 +233,10 @@ def _furnish_middle(plan: RoomPlan) -> None:
 
 
 def _drop(plan: RoomPlan, entry: Entry) -> Placed | None:
-    """Put an object somewhere on the floor, mostly parallel to the walls."""
+    """Put an object at random on the floor and return it; None if it does not fit.
+
+    Half of the objects are parallel to the walls.
+    """
     for _ in range(8):
         x, y = plan.rng.uniform(-0.48, 0.48, 2) * plan.size_m[:2]
         square = plan.rng.integers(4) * np.pi / 2.0
@@ -285,7 +291,7 @@ def _is_support(entry: Entry) -> bool:
 
 
 def _resting(plan: RoomPlan, support: Placed, entry: Entry) -> FloatArray | None:
-    """Return the pose of an object on a flat place of its support, or None after a few tries."""
+    """Return the (4, 4) pose of an object on a flat place of its support; None if six tries find none."""
     assert support.entry is not None
     assert support.T is not None
     size, top = support.entry.size_m, plan.catalogue.model(support.entry).top_m
@@ -305,7 +311,7 @@ def _resting(plan: RoomPlan, support: Placed, entry: Entry) -> FloatArray | None
 
 
 def _lights(plan: RoomPlan) -> tuple[tuple[Light, ...], FloatArray]:
-    """Return one to three area lights and ambient light: noon, a grey day, an evening with one lamp."""
+    """Return one to three area lights and ambient light, as at noon, on a grey day or in the evening."""
     rng = plan.rng
     lights = []
     for place in plan.windows[:2] if plan.daylight > 0.0 else ():

@@ -19,7 +19,7 @@ _LARGEST_TEXTURE_PX = 512
 
 @dataclass(slots=True)
 class Finish:
-    """One material of an MTL file; colours as written there, sRGB from 0 to 1."""
+    """One material of an MTL file; its colour as written there, sRGB from 0 to 1."""
 
     name: str = ""
     color: FloatArray = field(default_factory=lambda: np.full(3, 0.7))
@@ -27,7 +27,7 @@ class Finish:
     shininess: float = 0.0
     opacity: float = 1.0
     image: ByteArray | None = None
-    """(H, W, 4) RGBA, first row at v = 1."""
+    """(H, W, 4) RGBA texture, first row at v = 1; None if there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,14 +39,14 @@ class Wavefront:
     triangles: IntArray
     """(F, 3) indices into ``vertices``."""
     uv: FloatArray
-    """(F, 3, 2) texture coordinates of each triangle's corners; 0 without any."""
+    """(F, 3, 2) texture coordinates of each triangle's corners; 0 where the model has none."""
     finish: IntArray
     """(F,) indices into ``finishes``."""
     finishes: tuple[Finish, ...]
 
 
 def read_wavefront(archive: zipfile.ZipFile, path: str) -> Wavefront:
-    """Read a model with its materials and textures; polygons become fans.
+    """Read a model with its materials and textures; polygons are split into fans of triangles.
 
     Args:
         archive: holds the model and the files that it names.
@@ -127,7 +127,7 @@ def _read_library(archive: zipfile.ZipFile, path: str) -> dict[str, Finish]:
 
 
 def decode_image(content: bytes) -> ByteArray | None:
-    """Return (H, W, 4) RGBA of an image file's bytes, at most 512 x 512 pixels; None if unreadable."""
+    """Return (H, W, 4) RGBA of an image file, at most 512 x 512 pixels; None if unreadable or not 8-bit."""
     image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if content else None
     if image is None or image.dtype != np.uint8:
         return None

@@ -1,1 +1,1 @@
-"""Simulated calibration sessions, and how often the verdict on them is right."""
+"""Simulated calibration sessions, and the share of verdicts on them that are right."""

@@ -21,12 +21,14 @@ from packetmesh.files import finite
 from packetmesh.progress import drain
 
 BINS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
-"""Edges of the probabilities whose frequency is counted."""
+"""Edges of the bins of stated probability in which good cameras are counted."""
 
 
 def summary(answers: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return counts of right and wrong verdicts by rule, and the frequency of good cameras by our
-    probability.
+    """Return counts of right and wrong verdicts by rule, and of good cameras by our stated probability.
+
+    Args:
+        answers: the results of ``judge``.
     """
     rules = dict.fromkeys(rule for one in answers for rule in one["verdicts"])
     judged = [one for one in answers if "probability" in one]
@@ -66,11 +68,11 @@ GROUPS = (
     *(("good views", "views", "good"), ("few views", "views", "few"), ("similar views", "views", "similar")),
     *(("no view blurred", "blurred", False), ("blurred views", "blurred", True)),
 )
-"""Title, key and value of groups of sessions."""
+"""Title of each group of sessions, and the key and value of the answers that belong to it."""
 
 
 def counts(verdicts: Sequence[dict[str, Any]]) -> dict[str, int]:
-    """Count verdicts, and those that the truth contradicts."""
+    """Count verdicts, the wrong ones, and the good cameras on which there is no decision."""
     numbers = {"judged": len(verdicts)}
     for word, wrong_if in (("pass", False), ("fail", True), ("not decided", True)):
         found = [one for one in verdicts if one["word"] == word]
@@ -82,7 +84,7 @@ def counts(verdicts: Sequence[dict[str, Any]]) -> dict[str, int]:
 
 
 def main() -> None:
-    """Print the counts as one JSON object; the trials are stored, and an interrupted run continues."""
+    """Print the counts as one JSON object; the trials are stored, so that an interrupted run resumes."""
     parser = argparse.ArgumentParser(prog="python -m lab.verdicts", description=__doc__)
     parser.add_argument("--seed", type=int, default=2026)
     parser.add_argument("--sessions", type=int, default=400)

@@ -1,7 +1,7 @@
-"""mrcal's view of a simulated session: its camera, its uncertainty, and the difference of two halves.
+"""mrcal's results on a simulated session: its camera, its uncertainty, and the difference of two halves.
 
-Run by the Python for which mrcal is installed, which need not be ours: it imports nothing of PacketMesh.
-It reads a session as JSON from standard input and prints JSON.
+The Python for which mrcal is installed runs this script. It need not be that of PacketMesh, of which the
+script imports nothing. The script reads a session as JSON from standard input and prints JSON.
 """
 
 from __future__ import annotations
@@ -31,7 +31,10 @@ def camera(
     size_px: list[int],
     spacing_m: float,
 ) -> Any:
-    """Return mrcal's camera from (V, H, W, 2) points, started at (V, 6) poses of the boards and a camera."""
+    """Return the camera that mrcal fits to (V, H, W, 2) points.
+
+    It starts at the (V, 6) poses ``rt`` of the boards and at ``start``: fx, fy, cx, cy and distortion.
+    """
     name, count = MODELS[lens]
     views = len(points_px)
     weights = np.ones((*points_px.shape[:3], 1))
@@ -67,7 +70,10 @@ def camera(
 
 
 def judged(one: dict[str, Any]) -> dict[str, Any]:
-    """Return mrcal's camera and the (G,) errors in metres by its uncertainty and by two halves."""
+    """Return mrcal's camera and the (G,) errors in metres by its uncertainty and by two halves of the views.
+
+    The halves are the even and the odd views; with fewer than six views their error is None.
+    """
     points_px, rt, grid_px = (np.array(one[name], float) for name in ("points_px", "rt", "grid_px"))
     how = one["lens"], np.array(one["start"], float), one["size_px"], one["spacing_m"]
     range_m = one["range_m"]

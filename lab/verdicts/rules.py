@@ -32,7 +32,10 @@ OURS, RMS, MRCAL = "packetmesh", "OpenCV, RMS below {:g} px", "mrcal, {}"
 
 
 def judge(task: tuple[int, int, bool]) -> dict[str, Any]:
-    """Draw a session, calibrate it, and return what is said of it and what is true.
+    """Draw and calibrate a session; return its properties, our probability, and the verdicts by rule.
+
+    Each verdict has whether the camera that it judges is truly good. If the calibration fails, there are no
+    verdicts and no probability.
 
     Args:
         task: seed and number of the session, and whether mrcal judges it, too.
@@ -65,7 +68,7 @@ def judge(task: tuple[int, int, bool]) -> dict[str, Any]:
 
 
 def _mrcal_input(session: Session, found: Calibration) -> dict[str, Any]:
-    """Return a session as ``mrcal_script.py`` reads it, started at our camera and poses."""
+    """Return a session as ``mrcal_script.py`` reads it; mrcal starts at our camera and poses."""
     columns, rows = session.board.grid
     seen = sight(found.optics, session.size_px, session.range_m)
     grid_px = np.stack(np.meshgrid(seen.columns_px, seen.rows_px), axis=-1).reshape(-1, 2)
@@ -88,14 +91,14 @@ def _mrcal_input(session: Session, found: Calibration) -> dict[str, Any]:
 
 
 def mrcal_installed(python: str = MRCAL_PYTHON) -> bool:
-    """Return whether mrcal can be used."""
+    """Return whether this Python exists and can import mrcal."""
     if shutil.which(python) is None:
         return False
     return not subprocess.run([python, "-c", "import mrcal"], capture_output=True, check=False).returncode
 
 
 def _by_mrcal(session: Session, found: Calibration) -> dict[str, dict[str, Any]]:
-    """Return mrcal's verdicts by rule; empty if it finds no camera or has no such lens."""
+    """Return mrcal's verdicts by rule; empty if mrcal fails or does not have the lens model."""
     if session.chosen == "fisheye":
         return {}
     given = json.dumps(_mrcal_input(session, found))

@@ -18,17 +18,19 @@ LENSES: tuple[Lens, ...] = ("thesis", "brown", "rational", "fisheye")
 SIZES_PX = ((640, 480), (1280, 960), (1920, 1080))
 BOARDS = (Board("circles", 11, 9, 0.035), Board("chessboard", 9, 7, 0.03), Board("chessboard", 8, 6, 0.04))
 NOISE_PX = (0.1, 1.0)
-"""Least and most standard deviation of a coordinate, drawn evenly in its logarithm."""
+"""Least and largest standard deviation of a coordinate, drawn evenly in its logarithm."""
 BENT, BLURRED, RIGHT = 0.3, 0.25, 0.5
-"""Shares of sessions with a bent board, with blurred views, and with the right lens model."""
+"""Shares of sessions with a bent board, with blurred views, and with the true lens model; in the others the
+lens model is drawn from all four."""
 BEND = (0.001, 0.008)
-"""Least and most bend of a bent board, over its width."""
+"""Least and largest bend of a bent board, over its width."""
 BLUR = 4.0
-"""Standard deviation along the blur over that of the other points."""
+"""Standard deviation of the noise that blur adds along its direction, over that of the usual noise."""
 RANGES_M, ACCURACIES_M = (1.0, 2.0, 3.0), (0.0025, 0.005, 0.01)
 MOST_TRIES = 400
-"""Poses tried for a view; a camera in which so few fit is drawn again."""
+"""Poses tried for a view; if the board fits into the image at none, the session is drawn again."""
 RIM_PX = 4.0
+"""Least distance of a board's points from the image's rim."""
 
 Views = Literal["good", "few", "similar"]
 
@@ -42,7 +44,7 @@ class Session:
     size_px: tuple[int, int]
     board: Board
     bend_m: float
-    """Height of a bent board's middle over its rim; 0 if it is flat."""
+    """Height of a bent board's middle over its outermost points; 0 if it is flat."""
     noise_px: float
     blurred: int
     """Number of blurred views."""
@@ -50,7 +52,7 @@ class Session:
     chosen: Lens
     """The lens model with which the camera is calibrated."""
     views: tuple[View, ...]
-    """Noisy points, on the board as printed, which is flat."""
+    """Noisy pixels of each view, with the points of the board as printed, which is flat."""
     boards_m: FloatArray
     """(N, 3) true places of all views' points in the camera's frame."""
     range_m: float
@@ -58,13 +60,13 @@ class Session:
 
     @property
     def right_lens(self) -> bool:
-        """Whether the chosen lens model can hold the true one."""
+        """Whether the chosen lens model can represent the true lens."""
         richer = {"thesis": ("thesis", "brown", "rational"), "brown": ("brown", "rational")}
         return self.chosen in richer.get(self.optics.lens, (self.optics.lens,))
 
 
 def draw_session(seed: int, number: int) -> Session:
-    """Draw a session; equal numbers give equal sessions."""
+    """Draw a session; equal arguments give equal sessions."""
     rng = np.random.default_rng((seed, number))
     while True:
         drawn = _drawn(rng)
@@ -73,7 +75,7 @@ def draw_session(seed: int, number: int) -> Session:
 
 
 def _drawn(rng: np.random.Generator) -> Session | None:
-    """Draw a session; None if the drawn camera is impossible or the board fits nowhere."""
+    """Draw a session; None if a pixel of the camera has no ray, or the board fits into no view."""
     lens = LENSES[rng.integers(len(LENSES))]
     size_px = SIZES_PX[rng.integers(len(SIZES_PX))]
     optics = _camera(rng, lens, size_px)
@@ -113,7 +115,7 @@ def _between(rng: np.random.Generator, ends: tuple[float, float]) -> float:
 
 
 def _camera(rng: np.random.Generator, lens: Lens, size_px: tuple[int, int]) -> Optics:
-    """Draw a camera."""
+    """Draw a camera with this lens model."""
     width, height = size_px
     if lens == "fisheye":
         f_px = 0.5 * width / np.radians(rng.uniform(50.0, 70.0))
@@ -136,14 +138,14 @@ def _camera(rng: np.random.Generator, lens: Lens, size_px: tuple[int, int]) -> O
 
 
 def _everywhere(optics: Optics, size_px: tuple[int, int]) -> bool:
-    """Return whether every pixel has a ray."""
+    """Return whether all pixels of a coarse grid over the whole image have rays."""
     width, height = size_px
     rim = np.stack(np.meshgrid(np.linspace(0, width - 1, 9), np.linspace(0, height - 1, 7)), axis=-1)
     return bool(np.isfinite(optics.rays(rim.reshape(-1, 2))).all())
 
 
 def _bent(rng: np.random.Generator, board: Board, bend_m: float) -> FloatArray:
-    """Return the board's (N, 3) points, bent to a cylinder about a random direction."""
+    """Return the board's (N, 3) points, bent to a parabolic cylinder with a random direction."""
     points_m = board.points_m.copy()
     way = rng.uniform(0.0, np.pi)
     across = points_m[:, :2] @ (np.cos(way), np.sin(way))

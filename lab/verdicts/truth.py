@@ -1,4 +1,4 @@
-"""The true error of a calibrated camera, by the camera that was simulated."""
+"""The true error of a calibrated camera, from the camera that was simulated."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from pipeline.types import FloatArray
 
 
 def true_error_m(session: Session, found: Optics) -> FloatArray:
-    """Return (G,) distances at which points of the image at the session's range pass by the rays of a camera.
+    """Return the (G,) errors, metres, of a calibrated camera over a grid of pixels, at the session's range.
 
-    The camera gets the pose that fits the true boards best. Pixels without a ray have an infinite error.
+    A pixel's error is the distance of the calibrated camera's ray from the true point at that pixel. The
+    camera gets the pose that fits the true boards best. Pixels without a ray have an infinite error.
 
     Args:
         session: the session, with its true camera.
@@ -32,5 +33,5 @@ def true_error_m(session: Session, found: Optics) -> FloatArray:
 
 
 def truly_good(session: Session, found: Optics) -> bool:
-    """Return whether points are within the session's accuracy over ``LEAST_SHARE`` of the image."""
+    """Return whether the true error is within the session's accuracy over ``LEAST_SHARE`` of the image."""
     return bool((true_error_m(session, found) <= session.accuracy_m).mean() >= LEAST_SHARE)

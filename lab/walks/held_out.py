@@ -18,25 +18,26 @@ from pipeline.importing.recorded import DepthView, open_recording
 from pipeline.types import FloatArray, RgbdFrame
 
 FIRST_ROOM = 6_000_000
-"""First room seed. Rooms below had a part in thresholds, as had 5,000,001, 5,000,002 and the living room."""
+"""Seed of the first room. Thresholds were chosen with rooms of smaller seeds, such as 5,000,001 and
+5,000,002, and with the living room."""
 CACHE = Path("runs/walks")
 """Folder of the walks, ``SEED-FRAMES-WIDTH``; delete it when the rendering changes."""
 
 
 @dataclass(frozen=True, slots=True)
 class WalkTask:
-    """A program and a walk."""
+    """A program, a walk, and the frames that are used."""
 
     program: str
     folder: Path
-    """Folder of the rendered walk."""
+    """Folder of the rendered walk, or another recording."""
     every: int
     """Step from one frame to the next; 5 makes a fast walk."""
 
 
 @dataclass(frozen=True)
 class FramesInMemory:
-    """A recording that is read completely before the clock starts; has what ``Recording`` has."""
+    """A recording in memory, read completely before the clock starts; implements ``Recording``."""
 
     name: str
     times_s: FloatArray
@@ -59,9 +60,9 @@ class FramesInMemory:
 
 
 def held_out_walks(walks: int, frames: int, width_px: int, folder: Path = CACHE) -> list[Path]:
-    """Return the folders of the first walks from ``FIRST_ROOM`` up; those that are missing are rendered.
+    """Return the folders of the first ``walks`` walks from ``FIRST_ROOM`` up; missing ones are rendered.
 
-    Rooms that have no walk of so many frames are left out.
+    Rooms that have no walk of ``frames`` frames are left out.
     """
     found: list[Path] = []
     for seed in count(FIRST_ROOM):
@@ -82,7 +83,7 @@ def held_out_walks(walks: int, frames: int, width_px: int, folder: Path = CACHE)
 
 
 def frames_in_memory(folder: Path, every: int) -> FramesInMemory:
-    """Read every so many frames of a walk.
+    """Read each ``every``-th frame of a walk.
 
     Raises:
         InputError: the folder has no walk, or an image is damaged.

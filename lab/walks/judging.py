@@ -23,8 +23,9 @@ from pipeline.recording.errors import ate_m
 from pipeline.types import CameraIntrinsics, FloatArray
 
 LOST_M, LOST_SHARE = 0.2, 0.5
-"""A walk is lost if the ATE is larger, or if more of its frames have no pose."""
+"""A walk is lost if its ATE is larger than the first, or a larger share of its frames has no pose."""
 RPE_S = 1.0
+"""Time over which the relative pose error is measured."""
 WARM_FRAMES = 5
 """Frames that a program processes before the clock starts, to load its code."""
 
@@ -45,10 +46,10 @@ Program = Callable[[FramesInMemory], WalkAnswer]
 
 
 def measured(task: WalkTask, program: Program) -> Row:
-    """Run a program on a walk and judge its answer.
+    """Run a program on a walk and judge its answer; a program that raises a PacketMeshError has no poses.
 
     The time is that from images in memory to poses and map; reading, imports and the surface do not count.
-    The peak memory includes the images and all libraries, so it needs a process of its own.
+    The peak memory includes the images, the surface and all libraries, so it needs a process of its own.
     """
     frames = frames_in_memory(task.folder, task.every)
     with suppress(PacketMeshError):
@@ -80,12 +81,12 @@ def measured(task: WalkTask, program: Program) -> Row:
 
 
 def reference_of(folder: Path) -> tuple[list[FloatArray | None], WalkTruth | None]:
-    """Return the true pose of each frame of a walk, and the room if the walk is rendered.
+    """Return the true pose of each frame of a walk, and the true room (None if the walk is not rendered).
 
-    Of any other recording the poses that came with it are the truth.
+    The true poses of a recording that is not rendered are those that came with it, None where there is none.
 
     Raises:
-        InputError: it has no poses.
+        InputError: it has no poses, or cannot be opened.
     """
     if (folder / TRUTH).exists():
         truth = read_truth(folder)
@@ -104,7 +105,10 @@ def trajectory_errors(
     T_true_camera: Sequence[FloatArray | None],
     every: int,
 ) -> Row:
-    """Return ATE, also as a share of the true path, RPE, frames without a pose, and whether it is lost."""
+    """Return the true path's length, ATE, its share of that, RPE, frames without a pose, and whether lost.
+
+    Lengths are in metres. Every ``every``-th true pose belongs to an estimated one.
+    """
     T_true = T_true_camera[::every]
     length_m = path_m(tuple(T_true_camera))
     error_m = ate_m(T_world_camera, T_true)
@@ -125,16 +129,16 @@ def rpe_m(
     times_s: FloatArray,
     apart_s: float = RPE_S,
 ) -> float:
-    """Return the relative pose error: the RMSE of the motions' translation over ``apart_s``.
+    """Return the relative pose error: the RMSE of the translation between poses ``apart_s`` apart.
 
     Args:
         T_world_camera: (4, 4) poses; None where there is none, which does not count.
         T_reference_camera: as many poses in another world, or None.
-        times_s: (N,) their times.
-        apart_s: time from a pose to the one that it is compared with.
+        times_s: (N,) their times, seconds.
+        apart_s: seconds between the two poses of a motion.
 
     Returns:
-        Metres; NaN if no two poses are so far apart.
+        Metres; NaN if no two known poses are so far apart in time.
     """
     apart_m = []
     for k, later in enumerate(np.searchsorted(times_s, times_s + apart_s - 1e-3)):
@@ -175,7 +179,10 @@ def map_errors(
 def to_truth(
     T_world_camera: Sequence[FloatArray | None], T_true_camera: Sequence[FloatArray]
 ) -> FloatArray | None:
-    """Return T_true_world, the mean over all poses: chordal of the rotations, then of the positions."""
+    """Return the (4, 4) T_true_world by all known poses, None without any.
+
+    Its rotation is the chordal mean over the poses; its translation is the mean shift after this rotation.
+    """
     known = [(T, T_true_camera[k]) for k, T in enumerate(T_world_camera) if T is not None]
     if not known:
         return None

@@ -1,4 +1,4 @@
-"""The walk of a camera by PacketMesh: tracking alone, with loops, and with the map."""
+"""PacketMesh on a walk: by tracking alone, with loop closure, and with the map."""
 
 from __future__ import annotations
 
@@ -55,11 +55,11 @@ def _mapped(frames: FramesInMemory) -> WalkAnswer:
 
 
 def _rolled(points: PointCloud) -> Mesh:
-    """Roll the ball over a map with the default radii; the rims stay as they are."""
+    """Return the mesh of the ball rolled over a map with the default radii; its holes are not closed."""
     cloud = replace(points, source=np.full(len(points), PointSource.SENSOR, np.uint8))
     found = roll_or_nothing(cloud, radii(PRESETS["packetmesh"].surface, *spacing(cloud.points_m)))
     return Mesh(found.vertices_m, found.triangles)
 
 
 OWN: dict[str, Program] = {OURS: _mapped, OURS_LOOPS: _looped, OURS_TRACKING: _tracked}
-"""PacketMesh as far as each name says."""
+"""Variants of PacketMesh by name: with loops and map, with loops, and with tracking alone."""

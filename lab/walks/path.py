@@ -31,22 +31,23 @@ JITTER_M, JITTER_DEG = 0.005, 0.5
 JITTER_S = 0.14
 """Standard deviation of the window that smooths the jitter: after 0.2 s its correlation is 0.6."""
 LARGEST_RADIUS_M = 2.0
+"""Largest distance of a waypoint from the middle of the curve, level."""
 TRIES = 300
 """Paths that are tried in a room."""
 PITCHES_DEG = (-40.0, -8.0)
-"""Range of the gaze at the waypoints; negative is down."""
+"""Range of the pitch of the gaze at the waypoints; negative is down."""
 _PITCH_TRIES = 12
 """Pitches that are tried at a waypoint."""
 _FULL_TURN_S = 9.9
 """A shorter walk turns there and back instead of once around."""
 _SWEEP_SHARE = 0.42
-"""Angle of the turn there and back, relative to the largest turn of the walk's time in one direction."""
+"""Angle between the ends of the gaze's turn there and back, over the largest turn one way in that time."""
 _FINE = 4000
 """Steps of a curve along which its time is summed."""
 
 
 class FreeSpace:
-    """The places in a room at which a hand can hold a camera.
+    """Clearances of the places in a room at which a hand can hold a camera.
 
     Args:
         scene: a closed room; parts[0] is its floor slab.
@@ -74,7 +75,7 @@ class FreeSpace:
         return np.min([self.distances_m(np.insert(places_m, 2, z, axis=1)) for z in heights_m], axis=0)
 
     def reaches_m(self, center_m: FloatArray, angles_rad: FloatArray) -> FloatArray:
-        """Return (N,) lengths of the free ways from a (2,) place in (N,) directions."""
+        """Return (N,) lengths of the free ways from a (2,) place in (N,) directions, less than 2 m."""
         lengths_m = np.arange(0.05, LARGEST_RADIUS_M, 0.05)
         ways = np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=1)
         places_m = center_m + lengths_m[:, None, None] * ways
@@ -114,7 +115,7 @@ class _Curve:
         return np.concatenate([[0.0], np.cumsum((way_s**4 + turn_s**4) ** 0.25)])
 
     def size_in(self, duration_s: float) -> float:
-        """Return the largest size, at most 1, that a camera can walk in this time."""
+        """Return the largest size, 0 to 1, that can be walked in this time; 0 if the gaze takes longer."""
         if self.times_s(1.0)[-1] <= duration_s:
             return 1.0
         low, high = 0.0, 1.0
@@ -138,7 +139,7 @@ def walk_poses(scene: Scene, camera: CameraIntrinsics, count: int, rng: Rng) -> 
         rng: source of all randomness.
 
     Raises:
-        InputError: ``count`` is not positive, or no path that was tried has only usable views.
+        InputError: ``count`` is not positive, or no path that was tried is free and has only usable views.
     """
     if count < 1:
         raise InputError(f"A walk of {count} frames is not possible; it has at least 1")
@@ -188,9 +189,9 @@ def _random_curve(space: FreeSpace, duration_s: float, rng: Rng) -> _Curve:
 
 
 def _with_pitch(curve: _Curve, size: float, spread: float, meter: OverlapMeter, rng: Rng) -> _Curve:
-    """Return the curve with the first of some random pitches at each waypoint that makes its view usable.
+    """Return the curve with random pitches, drawn again at each waypoint until its view is usable.
 
-    ``spread``, 0 to 1, multiplies the differences between the waypoints' pitches.
+    After ``_PITCH_TRIES`` the last pitch is kept. ``spread``, 0 to 1, multiplies the pitches' variation.
     """
     base_deg = rng.uniform(-28.0, -16.0)
     gaze_rad = curve.gaze_rad.copy()
@@ -217,7 +218,7 @@ def _held(curve: _Curve, size: float, count: int, rng: Rng) -> list[FloatArray]:
 
 
 def _jitter(count: int, rng: Rng) -> FloatArray:
-    """Return (N, 6) smooth noise of unit variance."""
+    """Return (``count``, 6) smooth noise of unit variance."""
     window = JITTER_S * RATE_HZ
     margin = int(np.ceil(4.0 * window))
     noise = gaussian_filter1d(rng.standard_normal((count + 2 * margin, 6)), window, axis=0)

@@ -1,7 +1,7 @@
-"""Other programs that follow a depth camera, with the loop of their own examples.
+"""Other programs that follow a depth camera, each with the main loop of its own example.
 
-Lengths of programs for LiDAR in streets are for rooms here. Settings were chosen on a walk that the benchmark
-does not have, for the smallest ATE.
+Programs for LiDAR in streets get lengths that suit rooms. The settings gave the smallest ATE on a walk that
+the benchmark does not have.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ odometry: Any = o3d.t.pipelines.odometry
 FARTHEST_M = 4.0
 """Largest depth that the peers use."""
 UNITS_PER_METRE = 5000.0
-"""Of the 16-bit depth that Open3D gets: it mixes 8-bit colour with no other kind."""
+"""Units of the 16-bit depth that Open3D gets, because it accepts no other kind together with 8-bit colour."""
 ITERATIONS = (20, 20, 20)
-"""Most iterations of Open3D's odometry and SLAM at each size of the image. With the defaults, (10, 5, 3)
+"""Most iterations of Open3D's odometry and SLAM at each size of the image. With their defaults, (10, 5, 3)
 and (6, 3, 1), the ATE was two to four times as large."""
 LEAST_FITNESS, MOST_STEP_M = 0.1, 0.15
-"""Open3D's SLAM has no pose below this share of inliers or after a longer step, as in its example."""
+"""Open3D's SLAM gives no pose with a smaller share of inliers or a longer step, as in its example."""
 FINE_VOXEL_M = 0.0058
 """The default of Open3D's SLAM. With voxels as large as ours it is faster and drifts more."""
 OBSERVATIONS = 3.0
@@ -44,7 +44,7 @@ OBSERVATIONS = 3.0
 GICP_THIN_M, GICP_VOXEL_M, GICP_GATE_M = 0.05, 0.2, 0.5
 """small_gicp: voxel that thins a frame, voxel of the map, largest distance of a pair."""
 KISS_VOXEL_M, KISS_FIRST_M, KISS_LEAST_M = 0.05, 0.1, 0.005
-"""KISS-ICP: voxel of the map, first threshold and least motion; a twentieth of those for streets."""
+"""KISS-ICP: voxel of the map, first threshold and least motion; a twentieth of the defaults for streets."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ def available_walk_peers() -> tuple[str, ...]:
 def measure_peer(task: WalkTask) -> Row:
     """Measure one of the programs on a walk in a fresh process; returns the row of ``measured``.
 
-    A program that ends the process, as by a segmentation fault, has no poses.
+    If the program ends the process, as by a segmentation fault, its row has ``crashed`` and no poses.
     """
     started = time.perf_counter()
     try:
@@ -90,7 +90,7 @@ def _without_poses(frames: FramesInMemory) -> WalkAnswer:
 
 
 def _open3d_slam(frames: FramesInMemory, voxel_m: float | None = None) -> WalkAnswer:
-    """Run Open3D's dense SLAM, frame to model by ray casting, on the CPU; by default with our voxels."""
+    """Run Open3D's dense SLAM on the CPU: each frame to the ray-cast model; by default with our voxels."""
     slam, device = o3d.t.pipelines.slam, o3d.core.Device("CPU:0")
     camera = frames.frames[0].intrinsics
     edge_m = voxel_m or voxel_edge_m(frames, range(len(frames.views)))
@@ -115,7 +115,7 @@ def _open3d_slam(frames: FramesInMemory, voxel_m: float | None = None) -> WalkAn
 
 
 def _slam_step(model: Any, seen: Any, cast: Any) -> FloatArray | None:
-    """Return the motion since the last frame; None if tracking failed."""
+    """Return the (4, 4) motion since the last pose; None if tracking failed."""
     try:
         found = model.track_frame_to_model(
             seen, cast, UNITS_PER_METRE, FARTHEST_M, criteria=_criteria(), method=odometry.Method.PointToPlane
@@ -133,7 +133,7 @@ def _extracted(model: Any) -> Mesh:
 
 
 def _open3d_odometry(frames: FramesInMemory) -> WalkAnswer:
-    """Run Open3D's hybrid RGB-D odometry from each frame to the one before."""
+    """Run Open3D's hybrid RGB-D odometry from each frame to the last one with a pose."""
     matrix = tensor(frames.frames[0].intrinsics.matrix, np.float64)
     T: FloatArray = np.eye(4)
     poses: list[FloatArray | None] = []
@@ -166,7 +166,7 @@ def _criteria() -> list[Any]:
 
 
 def _small_gicp(frames: FramesInMemory) -> WalkAnswer:
-    """Run small_gicp's example of odometry: frame to a map of Gaussian voxels."""
+    """Run small_gicp's example of odometry: each frame to a map of Gaussian voxels."""
     import small_gicp
 
     model = small_gicp.GaussianVoxelMap(GICP_VOXEL_M)
@@ -185,7 +185,7 @@ def _small_gicp(frames: FramesInMemory) -> WalkAnswer:
 
 
 def _kiss_icp(frames: FramesInMemory) -> WalkAnswer:
-    """Run KISS-ICP (Vizzo et al., RA-L 2023) without its correction of a scan's motion."""
+    """Run KISS-ICP (Vizzo et al., RA-L 2023) without its correction for the motion during a scan."""
     from kiss_icp.config import KISSConfig
     from kiss_icp.kiss_icp import KissICP
 

@@ -25,13 +25,14 @@ from pipeline.types import AnyPath, ByteArray, FloatArray
 NAME = "living-room-walk"
 FRAMES = 200
 EVERY = 3
-"""Step along the path, whose poses are ``RATE_HZ``: 10 frames a second, so that 200 go once around."""
+"""Step between frames along the path, which has ``RATE_HZ`` poses a second: 200 frames at 10 a second go once
+around."""
 CAMERA = kinect(320)
 SENSOR = replace(SensorConfig(), disparity_step_px=0.25)
-"""A sensor of half the usual width, which divides its own pixels into eight steps, too."""
+"""A sensor of half the usual width, whose disparity step is an eighth of its own, twice as wide pixels."""
 JPEG = (cv2.IMWRITE_JPEG_QUALITY, 75, cv2.IMWRITE_JPEG_OPTIMIZE, 1)
 PNG = (cv2.IMWRITE_PNG_COMPRESSION, 9, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE)
-"""Without a filter, as the sensor's steps leave few different values."""
+"""No filter: the sensor's steps leave few different values, which compress better without."""
 
 
 def path_poses() -> list[FloatArray]:

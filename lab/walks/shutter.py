@@ -17,9 +17,9 @@ from pipeline.types import CameraIntrinsics, FloatArray
 
 EXPOSURE_S = 1.0 / 60.0
 PASSES_PX = ((0.125, 0.375), (-0.375, 0.125), (0.375, -0.125), (-0.125, -0.375))
-"""Positions in a pixel of the renderings that are averaged, at moments spread over the exposure."""
+"""Offsets (x, y), from the centre of a pixel, of the renderings that are averaged into one photograph."""
 _MOMENTS = EXPOSURE_S * RATE_HZ * ((np.arange(len(PASSES_PX)) + 0.5) / len(PASSES_PX) - 0.5)
-"""Their moments, counted in poses."""
+"""Moment of each of these renderings within the exposure, from its middle, in poses of the path."""
 
 
 def photographs(
@@ -30,7 +30,7 @@ def photographs(
     film: Film,
     rng: Rng,
 ) -> Iterator[View]:
-    """Yield the views of every so many poses of a path, with motion blur; the geometry is without it.
+    """Yield the view of each ``every``-th pose of a path, with motion blur in its colours only.
 
     Args:
         renderer: the scene.
@@ -52,7 +52,7 @@ def photographs(
 
 
 class _Between:
-    """Poses between those of a path: turned evenly, and shifted along a straight line."""
+    """Interpolates the poses of a path: rotations at even speed (slerp), positions along straight lines."""
 
     def __init__(self, poses: Sequence[FloatArray]) -> None:
         self._poses = poses
@@ -62,7 +62,7 @@ class _Between:
             self._turns = Slerp(np.arange(len(poses)), Rotation.from_matrix([T[:3, :3] for T in poses]))
 
     def at(self, moment: float) -> FloatArray:
-        """Return the (4, 4) pose at a moment, counted in poses; the ends are held."""
+        """Return the (4, 4) pose at a moment, counted in poses; beyond an end it is the pose at that end."""
         if not self._last:
             return self._poses[0]
         moment = float(np.clip(moment, 0.0, self._last))

@@ -16,15 +16,16 @@ from pipeline.kernels.rays import Camera, hit_depths, tensor, triangle_scene
 from pipeline.types import BoolArray, CameraIntrinsics, FloatArray, IntArray
 
 JUDGED_EVERY = 20
-"""Step between the frames of a walk whose rays say which part of the room is judged."""
+"""Step between the judged frames of a walk: the part of the room that these look at is judged."""
 JUDGED_TO_M = 4.0
-"""Largest true depth of these rays."""
+"""Largest true depth of a judged ray."""
 NEAR_M = (0.02, 0.05)
-"""Distances at which a point of one surface is met by the other one."""
+"""Distances from the other surface within which a point counts as on it."""
 F_SCORES = tuple(f"f_{near_m * 100:.0f}cm" for near_m in NEAR_M)
-"""Their names in a row."""
+"""Names of the F-scores at these distances in a row."""
 BESIDE_M = 0.25
-"""Way from a frame's camera to a viewpoint that had no part, right and left in turn; walls are farther."""
+"""Distance from a judged frame's camera to a viewpoint that the walk did not have, to the right and left in
+turn; walls are farther."""
 _CELL_M = 0.02
 """Edge of the cells with one point of the true surface each, so that near surfaces do not count more."""
 _MOST_POINTS = 200_000
@@ -43,16 +44,20 @@ class Mesh:
 
 
 def map_distance_m(points_m: FloatArray, truth: WalkTruth) -> float:
-    """Return the median distance of a map's (N, 3) points, evenly drawn, to the true surface."""
+    """Return the median distance of a map's (N, 3) points, metres, from the true surface.
+
+    Of more than ``_MOST_POINTS`` points, every k-th is used.
+    """
     some_m = points_m[:: max(1, -(-len(points_m) // _MOST_POINTS))]
     return float(np.median(_distances_m(some_m, Mesh(truth.vertices_m, truth.triangles))))
 
 
 def surface_errors(mesh: Mesh, camera: CameraIntrinsics, truth: WalkTruth) -> Row:
-    """Return the F-scores of a mesh in the room's frame, and the share of rays that meet none of it.
+    """Return the F-scores of a mesh in the room's frame, and the share of rays that do not meet it.
 
     Precision is over points drawn evenly from the mesh, recall over the true surface that the judged frames
-    look at. The rays are those of the judged frames' cameras moved by ``BESIDE_M``.
+    look at. The rays are those of the judged frames' cameras, moved by ``BESIDE_M``, that meet the true
+    surface within ``JUDGED_TO_M``.
     """
     if not len(mesh.triangles):
         return dict.fromkeys(F_SCORES, 0.0) | {"without_surface": 1.0}
@@ -73,7 +78,7 @@ def _f_score(precise: BoolArray, recalled: BoolArray) -> float:
 
 
 def _seen_m(room: Mesh, frames: Sequence[Camera]) -> FloatArray:
-    """Return (N, 3) points of the true surface that cameras look at, one a cell."""
+    """Return (N, 3) points of the true surface that the cameras look at, one in each cell."""
     seen_m = []
     for camera, depth in zip(frames, hit_depths(room.vertices_m, room.triangles, frames), strict=True):
         near = depth.z_m < JUDGED_TO_M
@@ -85,7 +90,7 @@ def _seen_m(room: Mesh, frames: Sequence[Camera]) -> FloatArray:
 
 
 def _without_surface(mesh: Mesh, room: Mesh, frames: Sequence[Camera]) -> float:
-    """Return the share of rays to the room that meet nothing of the mesh, from places next to the cameras."""
+    """Return the share of the rays to the room, from places next to the cameras, that miss the mesh."""
     beside = [
         Camera(
             one.intrinsics, one.T_world_camera @ rigid(np.eye(3), np.array([(-1) ** k * BESIDE_M, 0.0, 0.0]))

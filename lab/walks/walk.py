@@ -27,8 +27,9 @@ from pipeline.io.poses import write_tum
 from pipeline.types import AnyPath, CameraIntrinsics, DepthMap, FloatArray, IntArray
 
 TRUE_POSES = "groundtruth_true.txt"
-"""True poses; under TUM's own name the importer would take them as given."""
+"""File of the true poses; under TUM's own name the importer would read them as known poses."""
 TRUTH = "truth.npz"
+"""File of a ``WalkTruth``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +57,7 @@ def render_walk(scene: Scene, frames: int, camera: CameraIntrinsics, out: AnyPat
     """Write a walk through a room frame by frame; the same arguments give the same bits.
 
     All frames have one film (noise, blur and vignette), automatic exposure and motion blur. The lists and
-    the truth are written first, so that the frames there are can be read before the last one is rendered.
+    the truth are written first, so that the first frames can be read before the last one is rendered.
 
     Args:
         scene: a closed room.
@@ -101,14 +102,14 @@ def read_truth(folder: AnyPath) -> WalkTruth:
 
 
 def one_film(rng: Rng) -> Film:
-    """Return a film without the random differences between photographs."""
+    """Return a film that is the same for all photographs, drawn from the ranges of the usual film."""
     usual = Film()
     noise, blur_px, vignette = (rng.uniform(*of) for of in (usual.noise, usual.blur_px, usual.vignette))
     return Film(0.0, 0.0, (noise, noise), (blur_px, blur_px), (vignette, vignette))
 
 
 def write_lists(folder: Path, times_s: FloatArray, color_suffix: str = ".png") -> None:
-    """Write rgb.txt and depth.txt: the (N,) times and the file of each image."""
+    """Write rgb.txt and depth.txt: the time (seconds) and the file of each of N images."""
     for kind, suffix in (("rgb", color_suffix), ("depth", ".png")):
         lines = [f"{time_s:.6f} {image_file(kind, k, suffix)}" for k, time_s in enumerate(times_s)]
         text = "\n".join([f"# {kind} images: time in seconds, file", *lines])
@@ -122,7 +123,7 @@ def image_file(kind: str, index: int, suffix: str = ".png") -> str:
 
 
 def depth_units(depth: DepthMap) -> NDArray[np.uint16]:
-    """Return (H, W) depth in ``UNITS_PER_METRE``; 0 is unknown."""
+    """Return (H, W) depth in units, ``UNITS_PER_METRE`` to a metre; 0 is unknown."""
     return np.rint(np.nan_to_num(depth.z_m) * UNITS_PER_METRE).astype(np.uint16)
 
 

@@ -11,7 +11,7 @@ from pipeline.io.rigs import save_rig
 
 
 def main(names: list[str]) -> None:
-    """Write the rigs of the demos named, or of all, with their truth and board views."""
+    """Write the rigs of the named demos, or of all if none is named, with their truth and board views."""
     for name in names or DEMOS:
         rig = render_demo(name)
         save_rig(SCENES / name, rig)

@@ -22,7 +22,10 @@ JPEG_QUALITY = 92
 
 
 def save_board_views(folder: Path, views: BoardViews) -> None:
-    """Write the images, the board's description and the truth; depth images only where depth is known.
+    """Write the images, the board's description and the truth; a depth image only if it has a known pixel.
+
+    Older images in the folder stay. A lens is written without ``fisheye``, a board without its dictionary and
+    tag spacing.
 
     Raises:
         InputError: the folder cannot be written.
@@ -45,7 +48,7 @@ def save_board_views(folder: Path, views: BoardViews) -> None:
 
 
 def load_board_views(folder: Path) -> BoardViews:
-    """Read board views; colours are those of the JPEG files, depth is rounded to the millimetre.
+    """Read board views; colours have the errors of JPEG, and depth is rounded to the millimetre.
 
     Raises:
         InputError: a file is missing or cannot be used.

@@ -1,4 +1,4 @@
-"""Choice of the board poses from which the cameras of a rig can be calibrated best."""
+"""Choice of board poses whose views calibrate the cameras of a rig well."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ from pipeline.types import FloatArray
 DISTANCES_M = (0.6, 2.5)
 MOST_TILT_DEG = 45.0
 MARGIN_PX = 8.0
+"""Least distance of the board from the border of the image; half a spacing is added."""
 LEAST_SPACING_PX = 11.0
-"""Least distance between neighbours on the board; smaller circles are not found."""
+"""Least distance between the images of neighbouring points; detection misses smaller circles."""
 TRIES = 60
 """Number of random poses that are tried for each chosen one."""
 CELLS = {(8, 6): 0.25, (4, 3): 4.0}
-"""Grids of image parts, across and down, and the value of a new part; the large parts are those of the depth
-sensor's map."""
+"""Grids of image parts, across and down, and the value of a new part; the large parts are those in
+which the depth calibration needs views."""
 
 
 def propose_poses(
@@ -34,22 +35,23 @@ def propose_poses(
     free_m: Sequence[FloatArray] | None = None,
     distances_m: tuple[float, float] = DISTANCES_M,
 ) -> tuple[FloatArray, ...]:
-    """Return T_world_board of ``count`` moments: of many random poses, each time the one that shows most new.
+    """Return T_world_board of ``count`` moments, chosen one by one from random poses by their value.
 
-    New are parts of an image, a distance or a tilt for a camera, and a pair of cameras that see the board
-    together; a second occurrence counts half of the first.
+    A pose has a value for each part of an image that it covers, for the distance and the tilt that a camera
+    sees, and for each pair of cameras that see the board together; every chosen pose that has the same halves
+    the value.
 
     Args:
         board: the board.
-        cameras: the cameras; at least one of them sees the whole board in every pose.
+        cameras: the cameras; at least one of them sees the whole board in every returned pose.
         count: number of moments.
         seed: seed of the random poses.
-        free_m: (H, W) depth of the objects before each camera, which must not hide the board; None: no
-            objects.
-        distances_m: nearest and farthest distance from a camera.
+        free_m: (H, W) depth of the scene from each camera, which must not hide the board; None: an empty
+            scene.
+        distances_m: least and greatest depth of the board's centre in the camera for which a pose is drawn.
 
     Raises:
-        InputError: no place was found at which a camera sees the whole board.
+        InputError: fewer than ``count`` of the random poses show a camera the whole board.
     """
     rng = np.random.default_rng(seed)
     pool: list[tuple[FloatArray, dict[Hashable, float]]] = []
@@ -80,13 +82,13 @@ def propose_poses(
 def sees(
     board: Board, camera: BoardCamera, T_world_board: FloatArray, free_m: FloatArray | None = None
 ) -> bool:
-    """Whether a camera sees the whole board from its front, large enough and not hidden.
+    """Return whether a camera sees the whole board from its front, large enough and not hidden.
 
     Args:
         board: the board.
         camera: the camera.
         T_world_board: (4, 4).
-        free_m: (H, W) depth of the objects before the camera.
+        free_m: (H, W) depth of the scene from the camera; NaN counts as hidden. None: an empty scene.
     """
     T = inverse(camera.T_world_camera) @ T_world_board
     points_m = apply(T, board.points_m)
@@ -115,7 +117,7 @@ def _tilt_rad(T_camera_board: FloatArray) -> float:
 def _random_pose(
     cameras: Sequence[BoardCamera], rng: np.random.Generator, distances_m: tuple[float, float]
 ) -> FloatArray:
-    """Return a random (4, 4) pose in the view of one camera, facing it or the middle of several."""
+    """Return a random (4, 4) pose in the view of one camera, tilted from facing the mean position of some."""
     camera = cameras[int(rng.integers(len(cameras)))]
     size = np.array([camera.intrinsics.width_px, camera.intrinsics.height_px])
     at_px = rng.uniform(0.1, 0.9, 2) * size
@@ -143,7 +145,7 @@ def _shown(
     T_world_board: FloatArray,
     distances_m: tuple[float, float],
 ) -> Iterator[tuple[Hashable, float]]:
-    """Yield the new views that a moment gives the cameras, with their values."""
+    """Yield the image parts, distances, tilts and pairs of cameras that a pose shows, with their values."""
     far = {}
     for node in seen:
         camera = cameras[node].intrinsics

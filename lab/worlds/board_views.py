@@ -1,4 +1,4 @@
-"""Board views of the cameras of a rig: photographs and biased depth of a board (SPEC 1.2, 1.5).
+"""Rendering of board views: photographs and biased depth by the cameras of a rig (SPEC 1.2, 1.5).
 
 The sheet is sampled with ``OVER`` x ``OVER`` rays per pixel through the true lens, lit by the room's lamps.
 Objects before it hide it; the room behind it is traced once per camera.
@@ -27,25 +27,26 @@ from pipeline.kernels.geometry import apply, inverse, pixel_rays, project
 from pipeline.types import ByteArray, CameraIntrinsics, DepthMap, FloatArray
 
 OVER = 4
-"""Rays along each side of a pixel, whose value is their mean."""
+"""Rays along each side of a pixel; the pixel's value is the mean of all its rays."""
 INK, PAPER, BACK = 0.05, 0.82, 0.45
 """Albedo of the print, of the sheet, and of the board's back."""
 LIGHT_STEP_PX = 4
-"""Step of the pixels at which the light on the sheet is traced, in both directions."""
+"""Distance between the pixels, in both directions, at which the light on the sheet is traced."""
 LIGHT_BLUR = 2.0
-"""Standard deviation of the light's blur, in these steps, against the noise of its few rays."""
+"""Standard deviation, in steps of ``LIGHT_STEP_PX``, of the blur that reduces the light's noise."""
 AROUND_M = 0.6
-"""Distance of the room's walls beyond all cameras and boards."""
+"""Least distance of a plain room's walls from all cameras and boards."""
 
 
 @dataclass(frozen=True, slots=True)
 class BoardCamera:
-    """A node with its true parameters; its depth is on the pixels of its photographs."""
+    """A node with its true parameters; its depth and colour images share one pixel grid."""
 
     intrinsics: CameraIntrinsics
     T_world_camera: FloatArray
     """(4, 4)."""
     bias: DepthBias = field(default_factory=DepthBias)
+    """Bias of its depth sensor; none by default."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +56,7 @@ class BoardImage:
     rgb: ByteArray
     """(H, W, 3)."""
     depth: DepthMap
-    """(H, W)."""
+    """(H, W) with the sensor's noise, holes and bias."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +68,7 @@ class BoardViews:
     T_world_board: tuple[FloatArray, ...]
     """(4, 4) of every moment."""
     images: tuple[tuple[BoardImage, ...], ...]
-    """Images of every moment, of every camera."""
+    """``images[moment][camera]``."""
 
     def T_camera_board(self, moment: int, camera: int) -> FloatArray:
         """Return the (4, 4) true pose of the board in a camera's frame."""
@@ -93,6 +94,9 @@ def render_board_views(
         scene: the room around; None builds a plain one that holds all cameras and boards.
         quality: quality of the room behind the board.
         film: colour film of the cameras; None is the demo scenes' film.
+
+    Raises:
+        InputError: a board is partly behind a camera.
     """
     scene = scene or room_around(board, cameras, T_world_board)
     renderer = Renderer(scene)
@@ -112,7 +116,7 @@ def render_board_views(
 
 
 def with_depth_near_boards(views: BoardViews, margin_px: int) -> BoardViews:
-    """Return the views without depth farther than a margin from the rectangle around the board."""
+    """Return the views without the depth of pixels beyond a margin around the board's bounding rectangle."""
     rows = []
     for moment, images in enumerate(views.images):
         row = []
@@ -161,7 +165,7 @@ def _with_board(
     camera: BoardCamera,
     rng: np.random.Generator,
 ) -> Exposure:
-    """Return the room with the board in it, where it is in the picture and no object hides it."""
+    """Return the exposure of the room with the board in it, where no object is before the board."""
     T_camera_board = inverse(camera.T_world_camera) @ T_world_board
     window = _window(board, T_camera_board, camera.intrinsics)
     if window is None:
@@ -192,20 +196,24 @@ Window = tuple[slice, slice]
 
 
 def _window(board: Board, T_camera_board: FloatArray, intrinsics: CameraIntrinsics) -> Window | None:
-    """Return the rows and columns that the sheet can cover; None if it is out of the picture."""
+    """Return the rows and columns that the sheet can cover; None if it is out of the picture.
+
+    Raises:
+        InputError: the sheet is partly behind the camera.
+    """
     corners_m = apply(T_camera_board, sheet_corners_m(board))
     if (corners_m[:, 2] <= 0.05).any():
         if (corners_m[:, 2] > 0.05).any():
             raise InputError("A board stands beside a camera, partly behind it; move it before the camera")
         return None
-    # Edges bow between the corners as the lens distorts; points along them bound the sheet.
+    # The lens bends the sheet's edges, so points along them, not the corners alone, bound the sheet.
     around = np.linspace(0.0, 1.0, 16, endpoint=False)[:, None]
     edges_m = [
         (1.0 - around) * a + around * b
         for a, b in zip(corners_m, np.roll(corners_m, -1, axis=0), strict=True)
     ]
     seen_px = project(intrinsics, np.concatenate(edges_m))
-    if np.isnan(seen_px).any():  # the sheet reaches beyond the lens's range, where it has no pixels
+    if np.isnan(seen_px).any():  # the sheet reaches beyond the range of the lens, where it has no pixels
         return slice(0, intrinsics.height_px), slice(0, intrinsics.width_px)
     low = np.clip(np.floor(seen_px.min(axis=0)).astype(int) - 2, 0, None)
     high = np.ceil(seen_px.max(axis=0)).astype(int) + 3
@@ -241,7 +249,7 @@ def _looked_at(
 def _light(
     renderer: Renderer, places_m: FloatArray, normal: FloatArray, rng: np.random.Generator
 ) -> FloatArray:
-    """Return (h, w, 3) light on the sheet, smooth except for shadows."""
+    """Return (h, w, 3) irradiance of the sheet, traced at every ``LIGHT_STEP_PX``-th pixel and blurred."""
     some_m = places_m[LIGHT_STEP_PX // 2 :: LIGHT_STEP_PX, LIGHT_STEP_PX // 2 :: LIGHT_STEP_PX]
     if not some_m.size:
         some_m = places_m[:1, :1]

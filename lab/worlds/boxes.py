@@ -15,13 +15,13 @@ from pipeline.types import CameraIntrinsics, FloatArray
 
 
 def box_room(seed: int, nodes: int = 2, angle_deg: float = 25.0, baseline_m: float = 1.0) -> Scene:
-    """A room with 4 to 7 boxes and 1 to 3 balls, and neighbouring cameras that see about 60 % of the same.
+    """A room with 4 to 7 boxes and 1 to 3 balls; with the defaults, the views overlap by about 60 %.
 
     Args:
         seed: chooses everything but the cameras' spacing.
         nodes: number of cameras, 1 to 6.
-        angle_deg: angle between the directions in which neighbours look, 5 to 60.
-        baseline_m: distance of neighbours, 0.1 to 3.
+        angle_deg: angle between the headings of neighbouring cameras, 5 to 60.
+        baseline_m: distance between neighbouring cameras, 0.1 to 3.
 
     Raises:
         InputError: an argument is out of its range.
@@ -51,13 +51,13 @@ def _check(nodes: int, angle_deg: float, baseline_m: float) -> None:
 
 
 def _cameras(rng: Rng, nodes: int, angle_rad: float, reach_m: float) -> tuple[FloatArray, ...]:
-    """Cameras on an arc about the room's middle: neighbours are a chord of baseline length apart."""
+    """Return T_world_camera on an arc of radius ``reach_m`` about the room's middle, ``angle_rad`` apart."""
     tilt = rng.uniform(0.12, 0.3)
     target = np.array([0.0, 0.0, rng.uniform(0.6, 0.9)])
     heading = -np.pi / 2.0 + (np.arange(nodes) - (nodes - 1) / 2.0) * angle_rad
     places = [target + reach_m * np.array([np.cos(h), np.sin(h), 0.0]) for h in heading]
     lift = np.array([0.0, 0.0, min(1.0, reach_m * np.tan(tilt))])
-    # All cameras look down equally, at points below the arc's centre, so the heading differs by the angle.
+    # All cameras look at one point, below the arc's centre, so they look down equally.
     return tuple(look_at(place + lift, target) for place in places)
 
 
@@ -76,7 +76,7 @@ def _shell(rng: Rng, low: FloatArray, high: FloatArray) -> list[Part]:
 
 
 def _things(rng: Rng, eyes: FloatArray) -> list[Part]:
-    """Boxes and balls on the floor about the middle, a metre or more from every camera."""
+    """Boxes and balls on the floor about the middle, their centres 1.1 m or more from every camera."""
     boxes, balls = int(rng.integers(4, 8)), int(rng.integers(1, 4))
     parts = []
     for k, spot in enumerate(_spots(rng, eyes[:, :2], boxes + balls)):
@@ -91,7 +91,7 @@ def _things(rng: Rng, eyes: FloatArray) -> list[Part]:
 
 
 def _spots(rng: Rng, eyes_m: FloatArray, count: int) -> list[FloatArray]:
-    """Places on the floor: the least crowded of a few random ones, one after the other."""
+    """Return (2,) places on the floor: of 12 random ones each time the farthest from those before."""
     spots: list[FloatArray] = []
     while len(spots) < count:
         tries = rng.uniform([-1.7, -1.2], [1.7, 1.4], (12, 2))

@@ -1,4 +1,4 @@
-"""The demo scenes: procedural places, photographed as rigs with their truth, which ship in assets/scenes."""
+"""The demo scenes in assets/scenes: rendering of procedural rooms as rigs with their truth."""
 
 from __future__ import annotations
 
@@ -23,8 +23,9 @@ from pipeline.kernels.geometry import rotation_exp
 from pipeline.types import DepthMap, FloatArray, RgbdFrame, Rig, RigTruth
 
 POSE_ERROR_RAD = np.radians(3.0)
+"""Error of the believed orientation of every node but the first."""
 POSE_ERROR_M = 0.06
-"""Error of the believed position of every node but the first, metres."""
+"""Error of the believed position of every node but the first."""
 
 UNCALIBRATED = "uncalibrated"
 
@@ -35,7 +36,7 @@ DEMOS: dict[str, Callable[[], Scene]] = {
     "box-on-table": box_on_table,
     UNCALIBRATED: moving_day,
 }
-"""The builder of each demo; its ``scene.json`` describes it and holds its seed."""
+"""Builder of each demo's scene; its ``scene.json`` holds the seed of its noise and pose errors."""
 
 
 def build_demo(name: str) -> Scene:
@@ -50,7 +51,11 @@ def build_demo(name: str) -> Scene:
 
 
 def render_demo(name: str) -> Rig:
-    """Return the rig of a demo as it ships; every call gives the same bits."""
+    """Return the rig of a demo as it ships; every call gives the same bits.
+
+    Raises:
+        InputError: there is no demo of that name.
+    """
     scene = build_demo(name)
     renderer = Renderer(scene)
     frames, depth = [], []
@@ -85,7 +90,7 @@ def render_demo_boards(name: str) -> BoardViews | None:
 
 
 def disturbed(T_world_camera: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return the (4, 4) pose with random turn ``POSE_ERROR_RAD`` and random shift ``POSE_ERROR_M``."""
+    """Return a pose turned by ``POSE_ERROR_RAD`` and shifted by ``POSE_ERROR_M``, in random directions."""
     axis, way = (v / np.linalg.norm(v) for v in rng.standard_normal((2, 3)))
     T = T_world_camera.copy()
     T[:3, :3] = T[:3, :3] @ rotation_exp(POSE_ERROR_RAD * axis)

@@ -1,7 +1,7 @@
 """A room on moving day with three uncalibrated nodes, and board views to calibrate them.
 
-The nodes' files have a focal length of 525 pixels, a lens without distortion, poses by a tape measure, and
-depth as the sensor gives it.
+The nodes' files state a focal length of 525 pixels and no distortion, poses with the errors of a tape measure
+(but for the first node's), and depth with the sensor's bias.
 """
 
 from __future__ import annotations
@@ -25,11 +25,12 @@ from pipeline.types import CameraIntrinsics
 SIZE_M = (3.9, 3.7, 2.5)
 WINDOW = (0.35, 0.9, 1.3, 1.3)
 CORNER_M = (SIZE_M[0] - 0.4, SIZE_M[1] - 0.36)
-"""Place of the stacked boxes."""
+"""(x, y) position of the stacked boxes."""
 BOARD = Board("circles", 11, 9, 0.05)
 MOMENTS = 14
+"""Number of board poses; all nodes photograph each at the same time."""
 AROUND_PX = 16
-"""Margin of the depth images around the board, which keeps the files small."""
+"""Distance from the board, in pixels, beyond which depth is removed to keep the files small."""
 
 
 def _lens(fx_px: float, fy_px: float, cx_px: float, cy_px: float, k1: float, k2: float) -> CameraIntrinsics:
@@ -76,7 +77,7 @@ def true_nodes() -> tuple[BoardCamera, ...]:
 
 
 def render_boards(seed: int) -> BoardViews:
-    """Return views of the circle grid in the room before all nodes, at ``MOMENTS`` moments."""
+    """Return the views of all nodes of the circle grid in the room, at ``MOMENTS`` moments."""
     scene, nodes = moving_day(), true_nodes()
     renderer = Renderer(scene)
     free_m = [renderer.depth(node.intrinsics, node.T_world_camera) for node in nodes]
@@ -98,7 +99,7 @@ def _room(rng: Rng) -> list[Part]:
 
 
 def _corner(rng: Rng) -> list[Part]:
-    """Add stacks of cartons."""
+    """Return stacks of cartons."""
     x, y = CORNER_M
     return [
         *storage.cardboard_box(rng, place(x, y, 0.04), (0.62, 0.5, 0.48)),
@@ -111,7 +112,7 @@ def _corner(rng: Rng) -> list[Part]:
 
 
 def _sideboard(rng: Rng) -> list[Part]:
-    """Add an emptied sideboard with objects on it that fit into no carton."""
+    """Return a sideboard with objects on it that fit into no carton."""
     x, y, top = 2.3, SIZE_M[1] - 0.24, 0.8
     return [
         *storage.cabinet(rng, place(x, y, NORTH), (1.35, 0.44, top), "#8a5a33"),

@@ -1,4 +1,4 @@
-"""Closed solids, as (vertices, triangles): every edge has two faces, counter-clockwise seen from outside."""
+"""Closed solids, as (vertices, triangles): every edge has two faces, each counter-clockwise from outside."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def box(size_m: Vector) -> Mesh:
 def rounded_box(
     size_m: Vector, radius_m: float, crown_m: float = 0.0, steps: int = 3, cells: int = 4
 ) -> Mesh:
-    """A box with round edges, centred on the origin, whole size ``size_m``: shade it smooth.
+    """A box with round edges, centred on the origin, ``size_m`` over all; its part should be ``smooth``.
 
     Args:
         size_m: (x, y, z) size.
-        radius_m: radius of the edges, at most half of the smallest side.
+        radius_m: radius of the edges; limited to half of the smallest side without its crown.
         crown_m: how far the top and bottom bulge in the middle (cushions), part of the z size.
-        steps: facets over half a right angle of the edge.
+        steps: facets over 45 degrees of an edge, which spans 90.
         cells: cells across the flat part of each face; only a crown needs more than one.
     """
     half = np.asarray(size_m, float) / 2.0 - [0.0, 0.0, crown_m]
@@ -59,7 +59,8 @@ def lathe(profile_m: FloatArray | Sequence, segments: int = 32, bevel_m: float =
             closed along the axis; a profile that returns to its start is a ring, counter-clockwise in the
             (radius, height) plane.
         segments: facets around the axis.
-        bevel_m: cuts the profile's corners, so that they stay sharp in smooth shading.
+        bevel_m: distance from each corner of the profile at which it is cut, so that corners stay sharp in
+            smooth shading; 0 cuts none.
     """
     profile = np.asarray(profile_m, float)
     ring = np.array_equal(profile[0], profile[-1])
@@ -145,7 +146,7 @@ def sheet(
 def thickened(upper_m: FloatArray, quads: IntArray, rim: IntArray, thickness_m: float) -> Mesh:
     """A surface of (N, 3) points and (Q, 4) cells with its copy ``thickness_m`` below, joined at the rim.
 
-    The cells, and the (R,) points of the rim, run counter-clockwise seen from above.
+    ``quads`` and ``rim``, (R,), hold indices of points, counter-clockwise seen from above.
     """
     face, ahead, under = _split(quads), np.roll(rim, -1), len(upper_m)
     walls = _split(np.stack([rim + under, ahead + under, ahead, rim], axis=1))
@@ -154,7 +155,7 @@ def thickened(upper_m: FloatArray, quads: IntArray, rim: IntArray, thickness_m: 
 
 
 def tube(path_m: FloatArray | Sequence, radius_m: float | Vector, segments: int = 10) -> Mesh:
-    """A round bar along a (K, 3) path: lamp arms, cables, stems; the radius may change on the way."""
+    """A round bar along a (K, 3) path (lamp arms, cables, stems), of one radius or (K,) radii."""
     path = np.asarray(path_m, float)
     radius = np.broadcast_to(np.asarray(radius_m, float), len(path))[:, None, None]
     forward = np.gradient(path, axis=0)
@@ -195,7 +196,7 @@ def merged(meshes: Sequence[Mesh]) -> Mesh:
 
 
 def quads_of(index: IntArray) -> IntArray:
-    """Return (Q, 4) cells of a (rows, columns) grid of vertex numbers, counter-clockwise if rows go up."""
+    """Return (Q, 4) cells of a (rows, columns) grid of vertex indices, counter-clockwise if rows go up."""
     corners = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
     return np.stack(corners, axis=-1).reshape(-1, 4)
 
@@ -206,14 +207,14 @@ def _split(quads: IntArray) -> IntArray:
 
 
 def _cube_surface(axes: list[FloatArray]) -> Mesh:
-    """Return the outside of a grid over a box, whose planes are at three lists of coordinates."""
+    """Return the surface of a box, divided by planes at three lists of coordinates (along x, y and z)."""
     used, triangles = _cube_triangles(tuple(len(axis) for axis in axes))
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)[used], triangles
 
 
 @lru_cache(maxsize=64)
 def _cube_triangles(shape: tuple[int, ...]) -> tuple[IntArray, IntArray]:
-    """Return the points of a grid that are on its outside, and (F, 3) triangles over them."""
+    """Return the indices of the points on the surface of a 3-D grid, and (F, 3) triangles of them."""
     number = np.arange(np.prod(shape)).reshape(shape)
     # For each axis, the other two in the order that makes the high side's faces counter-clockwise.
     quads = []
@@ -225,7 +226,7 @@ def _cube_triangles(shape: tuple[int, ...]) -> tuple[IntArray, IntArray]:
 
 
 def _bevelled(profile: FloatArray, bevel_m: float, ring: bool) -> FloatArray:
-    """Return the profile with two points per corner, a bevel (or a third of the edge) away from it."""
+    """Replace each corner by two points on its edges, ``bevel_m`` (at most a third of the edge) from it."""
     corners = profile if ring else profile[1:-1]
     before = np.roll(profile, 1, axis=0) if ring else profile[:-2]
     after = np.roll(profile, -1, axis=0) if ring else profile[2:]
@@ -253,7 +254,7 @@ def _ear_clip(outline: FloatArray) -> IntArray:
 
 
 def _is_ear(ear: FloatArray, others: FloatArray) -> bool:
-    """Whether a corner is convex and holds none of the other points."""
+    """Return whether the triangle at a corner is convex and contains none of the other points."""
     edges = np.roll(ear, -1, axis=0) - ear
     if edges[0, 0] * edges[1, 1] - edges[0, 1] * edges[1, 0] <= 0.0:
         return False

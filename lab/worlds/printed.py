@@ -1,4 +1,4 @@
-"""A calibration board as it is printed on its sheet."""
+"""Picture of a calibration board's printed sheet, and positions of the sheet in the board's frame."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ def printed(board: Board) -> ByteArray:
 
 
 def sheet_px(board: Board, flat_m: FloatArray) -> FloatArray:
-    """Return (N, 2) pixels in ``printed`` of (N, 2) positions in the board's plane."""
+    """Return (N, 2) pixels in ``printed`` of (N, 2) positions in the board's plane, metres."""
     first_mm = 1000.0 * board.points_m[0, :2]
     return (1000.0 * flat_m - first_mm + place_of_first_mm(board)) / PIXEL_MM - 0.5
 
 
 def sheet_corners_m(board: Board) -> FloatArray:
-    """Return the (4, 3) corners of the sheet in the board's frame, in order around it."""
+    """Return the (4, 3) corners of the sheet in the board's frame, clockwise from the upper left."""
     whole = sheet(board)
     low_m = board.points_m[0, :2] - place_of_first_mm(board) / 1000.0
     high_m = low_m + np.array([whole.width_mm, whole.height_mm]) / 1000.0

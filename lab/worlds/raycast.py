@@ -1,4 +1,4 @@
-"""Ray casting with Embree: the part that a ray meets, the place, and shadow tests."""
+"""Ray casting with Embree: first intersections of rays, the parts they hit, and shadow tests."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ class Hits:
     """The first intersections of N rays with the scene."""
 
     t: FloatArray
-    """(N,) ray parameter, in units of the direction; infinite for a miss."""
+    """(N,) ray parameter: distance to the hit in lengths of the ray's direction; infinite for a miss."""
     positions: FloatArray
-    """(N, 3)."""
+    """(N, 3) in the world frame, metres; zero for a miss."""
     normals: FloatArray
-    """(N, 3) unit, towards the ray's origin."""
+    """(N, 3) unit shading normals towards the ray's origin; zero for a miss."""
     view: FloatArray
-    """(N, 3) unit direction of the ray."""
+    """(N, 3) unit direction of the ray, from its origin."""
     part: IntArray
     """(N,) index of the part, -1 for a miss."""
 
     def select(self, rows: IntArray) -> Hits:
-        """Return the hits of some rays."""
+        """Return the hits of the rays with these indices."""
         return Hits(self.t[rows], self.positions[rows], self.normals[rows], self.view[rows], self.part[rows])
 
 
@@ -55,7 +55,7 @@ class RayCaster:
 
     @cached_property
     def _opaque(self) -> o3d.t.geometry.RaycastingScene:
-        """The parts that cast shadows."""
+        """Return the ray-casting scene of the parts that cast shadows."""
         pairs = zip(self._meshes, self._parts, strict=True)
         return _embree([mesh for mesh, part in pairs if part.material.emission <= 0.0])
 
@@ -73,7 +73,7 @@ class RayCaster:
         return Hits(t, positions, normals, view, part)
 
     def occluded(self, rays: FloatArray, t_far: float) -> BoolArray:
-        """Return (N,) True where an opaque part is nearer than ``t_far`` times the ray's direction."""
+        """Return (N,) True where a part that casts shadows is met at a ray parameter below ``t_far``."""
         cast = tensor(rays, np.float32)
         return self._opaque.test_occlusions(cast, 0.0, t_far, nthreads=self._threads).numpy()
 
@@ -87,7 +87,7 @@ _ShadedMesh = tuple[FloatArray, IntArray, FloatArray]
 
 
 def _world_mesh(part: Part) -> _ShadedMesh:
-    """Return world vertices, triangles, and (F, 3, 3) shading normals of each triangle's corners."""
+    """Return world vertices, triangles, and (F, 3, 3) shading normals at the corners of the triangles."""
     vertices = apply(part.T_world_part, part.vertices_m)
     triangles = np.ascontiguousarray(part.triangles)
     return vertices, triangles, shading.corner_normals(vertices, triangles, part.smooth)

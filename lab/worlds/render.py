@@ -27,18 +27,18 @@ class View:
     z_m: FloatArray
     """(H, W) float32 depth along the optical axis at the pixel centres; NaN if the ray meets nothing."""
     normals: FloatArray
-    """(H, W, 3) unit surface normals in the world frame, towards the camera."""
+    """(H, W, 3) unit normals in the world frame, towards the camera; zero if the ray meets nothing."""
     infrared: FloatArray
     """(H, W) infrared albedo, 0 to 1."""
     gloss: FloatArray
     """(H, W) strength of the mirror-like reflection, 0 to 1."""
     T_world_camera: FloatArray
-    """(4, 4) pose it was rendered from."""
+    """(4, 4) pose of the camera."""
 
 
 @dataclass(frozen=True, slots=True)
 class Exposure:
-    """A view before it becomes a photograph."""
+    """The light and the true geometry of a view, before the film makes a photograph of the light."""
 
     radiance: FloatArray
     """(H, W, 3) float32 linear light."""
@@ -57,10 +57,10 @@ class Exposure:
 
 @dataclass(frozen=True, slots=True)
 class _Sampling:
-    """The number of rays of a render quality."""
+    """The rays and the film of a render quality."""
 
     offsets_px: tuple[tuple[float, float], ...]
-    """Positions in a pixel that the passes sample."""
+    """Offset of each pass's rays from the pixel centres."""
     rays: int
     """Shadow rays per light, pass and pixel, and sky rays over the hemisphere per pass and pixel."""
     thorough: bool
@@ -76,16 +76,16 @@ _SAMPLING = {
     "photo": _Sampling(_ROTATED_GRID_PX, rays=4, thorough=True, film=Film()),
 }
 _DULL = 0.05
-"""Gloss below which parts reflect nothing."""
+"""Gloss up to which parts do not mirror their surroundings; lamps have highlights on them from 0.02."""
 _REACH_M = 1.2
 """Distance within which objects occlude the ambient light."""
 
 
 class Renderer:
-    """A scene made ready for rays; keep it to render several views of one scene.
+    """Renders views of one scene; creating it prepares the ray casting, so keep it for several views.
 
     Args:
-        scene: what to render. Parts with emission do not cast shadows, so that lamps shine through shades.
+        scene: the scene. Parts with emission do not cast shadows, so that lamps shine through shades.
         threads: Embree threads; 0 takes all cores.
     """
 
@@ -101,7 +101,7 @@ class Renderer:
 
     @cached_property
     def _mean_albedo(self) -> FloatArray:
-        """Return (parts + 1, 3) mean albedo of each part, black for a miss."""
+        """Return (parts + 1, 3) mean albedo of each part; the last row, black, is for rays without a hit."""
         return np.stack([*(_mean_albedo(part) for part in self.scene.parts), np.zeros(3, np.float32)])
 
     def view(
@@ -121,7 +121,7 @@ class Renderer:
         quality: Quality,
         rng: np.random.Generator,
     ) -> Exposure:
-        """Return the light of one view (H, W of ``intrinsics``)."""
+        """Return the light and the true geometry of one view (H, W of ``intrinsics``)."""
         sampling = _SAMPLING[quality]
         shape = (intrinsics.height_px, intrinsics.width_px)
         center = self._caster.cast(camera_rays(intrinsics, T_world_camera))
@@ -159,10 +159,10 @@ class Renderer:
     def irradiance(
         self, positions_m: FloatArray, normals: FloatArray, rng: np.random.Generator, rays: int = 4
     ) -> FloatArray:
-        """Return (H, W, 3) light on positions (H, W, 3) of an object that is not in the scene.
+        """Return (H, W, 3) irradiance of an object that is not in the scene and casts no shadow.
 
         Args:
-            positions_m: (H, W, 3) world frame.
+            positions_m: (H, W, 3) points of its surface, world frame.
             normals: (H, W, 3) unit, towards the lit side.
             rng: draws the rays.
             rays: shadow rays per light and position, and sky rays per position.
@@ -196,7 +196,7 @@ class Renderer:
         sampling: _Sampling,
         rng: np.random.Generator,
     ) -> FloatArray:
-        """Return (H, W, 3) light towards the camera: traced at some pixels, spread within surfaces to all."""
+        """Return (H, W, 3) light towards the camera, traced at ``lit_pixels`` and spread over surfaces."""
         lit = lit_pixels(shape, sampling.thorough)
         some = hits.select(lit)
         direct, shine, sky = (np.zeros((len(lit), 3), np.float32) for _ in range(3))
@@ -225,9 +225,9 @@ class Renderer:
         shine: FloatArray,
         shadows: bool = True,
     ) -> None:
-        """Add each light to (N, 3) irradiance, by one shadow ray or as if unoccluded.
+        """Add each light to (N, 3) irradiance, by one shadow ray or, without ``shadows``, as if unoccluded.
 
-        Its blurred image in (N,) glossy surfaces is added to (N, 3) shine.
+        Its highlights on surfaces of (N,) ``gloss`` are added to (N, 3) ``shine``.
         """
         count = len(hits.t)
         rays, weight = np.empty((count, 6), np.float32), np.empty(count, np.float32)
@@ -242,7 +242,11 @@ class Renderer:
             shading.add_light(*lamp, hits.view, hits.normals, gloss, irradiance, shine)
 
     def _sky(self, hits: Hits, random: FloatArray, bounce: bool) -> FloatArray:
-        """Return (N, 3) ambient irradiance by one ray over the hemisphere, with the surface it meets."""
+        """Return (N, 3) ambient irradiance, by one random ray per position.
+
+        With ``bounce``, 0.7 of its light comes from the surface that it meets. Without, it brings the ambient
+        light, or 0.35 of it if it meets a part within ``_REACH_M``.
+        """
         rays = np.empty((len(hits.t), 6), np.float32)
         shading.hemisphere_rays(hits.positions, hits.normals, random, rays)
         if bounce:
@@ -251,7 +255,7 @@ class Renderer:
         return np.where(blocked[:, None], 0.35 * self._ambient, self._ambient).astype(np.float32)
 
     def _met(self, rays: FloatArray, random: FloatArray, shadows: bool) -> FloatArray:
-        """Return (N, 3) light of the surfaces that rays meet: mean colour, lamps and ambient light."""
+        """Return (N, 3) light of the surfaces that rays meet, by their mean albedo; ambient for misses."""
         hits = self._caster.cast(rays)
         light = np.zeros((len(rays), 3), np.float32)
         self._add_lights(hits, np.zeros(len(rays), np.float32), random, light, light, shadows)
@@ -264,7 +268,7 @@ class Renderer:
     def _add_mirrored(
         self, hits: Hits, albedo: FloatArray, random: FloatArray, shadows: bool, shine: FloatArray
     ) -> None:
-        """Add reflections of shiny parts to (N, 3) shine, blurred by roughness and tinted by metals."""
+        """Add reflections of glossy parts to (N, 3) shine, blurred by roughness and tinted by albedo."""
         rows = np.flatnonzero(self._mirror[hits.part] > _DULL)
         if not len(rows):
             return
@@ -296,7 +300,7 @@ def _evaluate(part: Part, positions_m: FloatArray, normals: FloatArray) -> Float
 
 
 def _mean_albedo(part: Part) -> FloatArray:
-    """Return the (3,) mean of the texture over positions on about twenty triangles."""
+    """Return the (3,) mean of the texture over three positions on each of at most 39 triangles."""
     triangles = np.ascontiguousarray(part.triangles[:: max(1, len(part.triangles) // 20)])
     weights = np.array([[3, 3, 4], [7, 2, 1], [1, 7, 2]], np.float32) / 10.0
     corners = part.vertices_m[triangles].astype(np.float32)
@@ -312,7 +316,7 @@ def _mirror_share(hits: Hits, gloss: FloatArray) -> FloatArray:
 
 
 def _smoothed(image: FloatArray, hits: Hits, shape: tuple[int, int]) -> FloatArray:
-    """Return (H * W, 3) light averaged, and filled where it is NaN, within surfaces."""
+    """Return (H * W, 3) light, averaged over neighbours on the same surface; NaN pixels are filled."""
     surface = (hits.positions.reshape(*shape, 3), hits.normals.reshape(*shape, 3), hits.t.reshape(shape))
     return shading.smooth_within_surfaces(image.reshape(*shape, 3), *surface, 2).reshape(-1, 3)
 

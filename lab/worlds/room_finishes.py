@@ -85,7 +85,7 @@ def random_material(rng: Rng) -> Material:
 
 
 def recolored(parts: list[Part], rng: Rng) -> list[Part]:
-    """Return a piece in other colours: its own times a random tint, so that textures and contrasts stay."""
+    """Return a piece with its albedo times a random tint, which keeps textures; lamps stay unchanged."""
     gain = np.clip(rng.uniform(0.45, 1.7) * rng.uniform(0.6, 1.4, 3), 0.2, 2.0).astype(np.float32)
     return [
         part if part.material.emission > 0.0 else replace(part, material=_tinted(part.material, gain))
@@ -94,7 +94,7 @@ def recolored(parts: list[Part], rng: Rng) -> list[Part]:
 
 
 def random_timber(rng: Rng) -> tuple[FloatArray, FloatArray]:
-    """Return light and dark colour of a wood: from maple over oak and cherry to wenge, or limed grey."""
+    """Return light and dark (3,) colour of a wood, from maple over oak and cherry to wenge, or limed grey."""
     light = np.array([0.55, 0.36, 0.19]) * rng.uniform([0.9, 0.75, 0.6], [1.1, 1.15, 1.5])
     light *= rng.uniform(0.15, 1.3)
     light = light + rng.uniform(0.0, 0.5) ** 2 * (light.mean() - light)
@@ -109,7 +109,7 @@ def muted(rng: Rng, count: int, low: float, high: float, chroma: float = 0.4) ->
 
 
 def draw_seed(rng: Rng) -> int:
-    """Return a seed for a texture."""
+    """Return a random seed for a texture."""
     return int(rng.integers(2**31))
 
 

@@ -1,4 +1,4 @@
-"""Random furnished rooms: training data for the depth network and held-out places to measure it in."""
+"""Random furnished rooms: training data for the depth network, and held-out rooms that judge it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class _Plan:
     """Low and high (x, y) corners of the pieces on the floor."""
 
     def add_free(self, piece: list[Part], T: FloatArray, gap_m: float = 0.04) -> bool:
-        """Put a piece at ``T`` if it is inside the room and overlaps no other piece on the floor."""
+        """Put a piece at ``T`` if it is inside the room and overlaps no other; return whether it was put."""
         moved = pieces.moved(piece, T)
         low, high = pieces.bounds(moved)
         half = 0.5 * self.size_m[:2] - 0.01
@@ -59,7 +59,7 @@ def random_room(seed: int) -> Scene:
 
 
 def _dress_walls(plan: _Plan, rng: Rng) -> list[FloatArray]:
-    """Add skirting, windows, doors, pictures and shelves; return the places where daylight comes in."""
+    """Add skirting, windows, doors, pictures and shelves; return (3,) positions of light before windows."""
     windows = []
     skirting = Material(paint(muted(rng, 1, 0.1, 0.8)[0], 2)) if rng.random() < 0.6 else None
     for wall in range(4):
@@ -124,7 +124,7 @@ def _varied(piece: list[Part], rng: Rng) -> list[Part]:
 
 
 def _lights(rng: Rng, size_m: FloatArray, windows: list[FloatArray]) -> tuple[tuple[Light, ...], FloatArray]:
-    """Return one to three area lights and the ambient light, from a warm evening to a grey day."""
+    """Return one to four area lights and the (3,) ambient light, from a warm evening to a grey day."""
     lights = []
     for place in windows[:2]:
         if rng.random() < 0.75:

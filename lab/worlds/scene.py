@@ -19,9 +19,10 @@ class Material:
     """The reflection of visible and infrared light by a surface."""
 
     texture: Texture
-    """Albedo as a function of the place on the part; a solid texture needs no unwrapping."""
+    """Albedo as a function of position and normal on the part, so meshes need no texture coordinates."""
     gloss: float = 0.0
-    """Strength of the mirror-like reflection, 0 (chalk) to 1 (polished metal); high gloss loses depth."""
+    """Strength of the mirror-like reflection, 0 (chalk) to 1 (polished metal); at high gloss the sensor
+    measures no depth."""
     infrared: float = 1.0
     """Infrared albedo relative to the visible luminance; black plastic and screens are near 0."""
     emission: float = 0.0
@@ -33,26 +34,26 @@ class Part:
     """One solid with one material."""
 
     vertices_m: FloatArray
-    """(V, 3) in the part's own frame."""
+    """(V, 3) in the part's own frame, metres."""
     triangles: IntArray
     """(F, 3), counter-clockwise seen from outside."""
     material: Material
     T_world_part: FloatArray
-    """(4, 4)."""
+    """(4, 4) transform from the part's frame to the world."""
     smooth: bool = False
     """Shade with interpolated vertex normals (spheres, cushions) instead of flat triangles."""
 
 
 @dataclass(frozen=True, slots=True)
 class Light:
-    """A small area light: a lamp (``position_m``) or a window's sky, with soft shadows."""
+    """A ball that emits light and casts soft shadows: a lamp, or the sky in a window."""
 
     position_m: FloatArray
     """(3,) centre, world frame."""
     color: FloatArray
-    """(3,) linear RGB intensity at 1 m."""
+    """(3,) linear RGB irradiance of a surface that faces the light at 1 m."""
     size_m: float = 0.1
-    """Radius of the emitting ball; larger makes softer shadows."""
+    """Radius of the ball; a larger one makes softer shadows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,5 +66,6 @@ class Scene:
     ambient: FloatArray
     """(3,) linear RGB of the light from all directions, dimmed by ambient occlusion."""
     cameras: tuple[FloatArray, ...]
-    """True T_world_camera of every node."""
+    """True (4, 4) T_world_camera of every node."""
     intrinsics: CameraIntrinsics
+    """Intrinsics of all cameras; in the uncalibrated demo those of its files, not the true ones."""

@@ -1,4 +1,4 @@
-"""A structured-light depth sensor like the first Kinect: its noise, quantisation and holes."""
+"""Model of a structured-light depth sensor like the first Kinect: noise, quantisation and holes."""
 
 from __future__ import annotations
 
@@ -19,35 +19,39 @@ class SensorConfig:
     """Parameters of a first-generation Kinect; pixels are those of its 640-wide image.
 
     Sources: Nguyen, Izadi, Lovell 2012 (axial noise, steep angles); Khoshelham, Elberink 2012 (baseline,
-    disparity steps, range); Barron, Malik 2013 and Handa et al. 2014 (jitter at edges). The holes' thresholds
-    were set by eye from two real frames, for 10 to 25 % of holes.
+    disparity steps, range); Barron, Malik 2013 and Handa et al. 2014 (jitter at edges). The thresholds
+    of the losses were set by eye from two real frames, so that 10 to 25 % of the pixels are holes.
     """
 
     baseline_m: float = 0.075
     """Distance of the projector to the right of the camera; shadows fall to the left of objects."""
     disparity_step_px: float = 0.125
     near_m: float = 0.4
+    """Least depth that is measured."""
     far_m: float = 4.5
+    """Greatest depth that is measured."""
     fade_m: float = 0.6
-    """Distance before the far end over which returns become rare."""
+    """Returns become rare over this distance before ``far_m``."""
     noise_m: tuple[float, float] = (0.0012, 0.0019)
-    """Standard deviation a + b (z - 0.4)^2 along the axis."""
+    """a (metres) and b (1/metre) of the standard deviation a + b (z - 0.4)^2 along the optical axis."""
     grazing_deg: tuple[float, float] = (70.0, 86.0)
-    """Angles to the normal between which returns get lost."""
+    """Angles between ray and normal: below the first, steepness loses no return, above the second all."""
     dark: tuple[float, float] = (0.0012, 0.006)
-    """Infrared return (albedo x cosine / z^2) below which every pixel is lost, and above which none is."""
+    """Infrared return, albedo x (1 - gloss)^2 x cosine / z^2: below the first value every pixel is lost, and
+    above the second none is lost by darkness."""
     mirror_deg: float = 9.0
-    """Angle to the view direction within which a shiny surface's reflection blinds the camera."""
+    """Scale of the angle between ray and normal: a surface that faces the camera blinds it by its reflection
+    with probability gloss x exp(-(angle / mirror_deg)^2)."""
     edge_px: tuple[float, float] = (0.0, 1.7)
-    """Smallest and largest width of the band without depth along depth edges."""
+    """Least and greatest width of the band without depth on each side of a depth edge."""
     edge_jump_px: float = 1.0
-    """Disparity step between neighbours that makes an edge."""
+    """Neighbouring pixels are at an edge if their disparities differ by more."""
     flying_share: float = 0.06
-    """Share of the pixels near edges that report a depth between front and back."""
+    """Share of the pixels within 3 px of an edge that report a random depth between front and back."""
     blob_share: float = 0.002
     """Share of pixels lost in blobs without a visible cause."""
     blob_px: tuple[float, float] = (2.0, 9.0)
-    """Sizes of the blobs, fine and coarse, in which returns are lost."""
+    """Standard deviations of the Gaussians, fine and coarse, that form the blobs of lost pixels."""
     border_px: tuple[float, float, float, float] = (8.0, 6.0, 16.0, 6.0)
     """Left, top, right and bottom margins outside the depth camera's view."""
 
@@ -55,7 +59,10 @@ class SensorConfig:
 def sense_depth(
     view: View, intrinsics: CameraIntrinsics, rng: np.random.Generator, config: SensorConfig | None = None
 ) -> DepthMap:
-    """Return the sensor's depth of a rendered view: metric, with noise, quantisation and holes (NaN)."""
+    """Return the sensor's (H, W) depth of a rendered view: metric, with noise, quantisation and holes (NaN).
+
+    ``config`` of None is ``SensorConfig()``.
+    """
     config = config or SensorConfig()
     per_px = 640.0 / intrinsics.width_px
     focal_px = intrinsics.fx_px * per_px
@@ -78,7 +85,7 @@ def sense_depth(
 
 
 def axial_sigma_m(z_m: FloatArray, config: SensorConfig | None = None) -> FloatArray:
-    """Return the standard deviation of the depth noise, Nguyen et al. 2012."""
+    """Return the standard deviation of the depth noise at depth ``z_m``, metres (Nguyen et al. 2012)."""
     a, b = (config or SensorConfig()).noise_m
     return a + b * (z_m - 0.4) ** 2
 
@@ -98,7 +105,10 @@ def projector_shadow(z_m: FloatArray, focal_baseline: float, jump_px: float) -> 
 
 @numba.njit(cache=True, nogil=True)
 def _cast_shadow(disparity, jump_px, shadow):  # type: ignore[no-untyped-def]
-    """Fill each row's z-buffer in the projector's view, two bins a pixel: column u is at u - disparity."""
+    """Fill ``shadow`` by a z-buffer of each row in the projector's view, where column u is at u - disparity.
+
+    The buffer has two bins per pixel.
+    """
     height, width = disparity.shape
     for y in range(height):
         margin = int(np.max(disparity[y])) + 2
@@ -116,7 +126,7 @@ def _cast_shadow(disparity, jump_px, shadow):  # type: ignore[no-untyped-def]
 
 
 def _distance_to_edges(disparity_px: FloatArray, jump_px: float) -> FloatArray:
-    """Return (H, W) distance to the nearest depth edge in pixels, at most the image's size."""
+    """Return (H, W) distance to the nearest depth edge, pixels; at most about the image's size."""
     smooth = np.ones(disparity_px.shape, np.uint8)
     across = np.abs(np.diff(disparity_px, axis=1)) > jump_px
     down = np.abs(np.diff(disparity_px, axis=0)) > jump_px
@@ -128,7 +138,7 @@ def _distance_to_edges(disparity_px: FloatArray, jump_px: float) -> FloatArray:
 def _jittered(
     true_m: FloatArray, edge_distance_px: FloatArray, rng: np.random.Generator, config: SensorConfig
 ) -> FloatArray:
-    """Return depth with edges ragged by about a pixel and a few flying pixels between front and back."""
+    """Return depth with edges displaced by about a pixel, and flying pixels between front and back."""
     height, width = true_m.shape
     y, x = np.mgrid[:height, :width]
     dy, dx = np.rint(rng.normal(0.0, 0.7, (2, height, width))).astype(int)
@@ -141,7 +151,7 @@ def _jittered(
 
 
 def _quantised(z_m: FloatArray, focal_baseline: float, step_px: float) -> FloatArray:
-    """Return depth whose disparity is a whole number of steps."""
+    """Return the depth after rounding its disparity to a whole number of steps, at least one."""
     steps = np.maximum(np.rint(focal_baseline / np.maximum(z_m, 0.05) / step_px), 1.0)
     return focal_baseline / (steps * step_px)
 
@@ -149,7 +159,7 @@ def _quantised(z_m: FloatArray, focal_baseline: float, step_px: float) -> FloatA
 def _loss_probability(
     view: View, intrinsics: CameraIntrinsics, true_m: FloatArray, config: SensorConfig
 ) -> FloatArray:
-    """Return (H, W) probability that a pixel returns nothing: steep, dark, shiny, far, or by chance."""
+    """Return (H, W) probability that a pixel is lost: steep, dark, shiny or far surfaces, or by chance."""
     rays = pixel_rays(intrinsics) @ view.T_world_camera[:3, :3].T
     cosine = np.abs(np.einsum("hwk,hwk->hw", rays, view.normals)) / np.linalg.norm(rays, axis=-1)
     angle_deg = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
@@ -162,7 +172,7 @@ def _loss_probability(
 
 
 def _field(shape: tuple[int, int], sizes_px: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return (H, W) uniform random numbers, 0 to 1, correlated over the equally weighted (K,) sizes."""
+    """Return (H, W) random numbers, uniform from 0 to 1: noise blurred by Gaussians of (K,) sizes, added."""
     total = np.zeros(shape)
     for size_px in sizes_px:
         blurred = cv2.GaussianBlur(rng.standard_normal(shape), (0, 0), size_px, borderType=cv2.BORDER_REFLECT)

@@ -1,4 +1,4 @@
-"""Compiled per-pixel loops of the renderer; all arrays float32, directions of unit length unless stated."""
+"""Compiled loops of the renderer over pixels or triangles; directions have unit length unless stated."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ _SKIN_M = 0.003
 
 @numba.njit(cache=True, nogil=True)
 def corner_normals(vertices, triangles, smooth):  # type: ignore[no-untyped-def]
-    """Return (F, 3, 3) float32 shading normals at the corners of triangles: the faces' own, or blended if
-    smooth.
+    """Return (F, 3, 3) float32 shading normals at the corners of triangles: the faces' normals, or if
+    ``smooth`` the means of the faces around each vertex, weighted by area.
 
-    A corner whose blend is over 60 degrees from its face's normal keeps the face's: caps keep sharp edges.
+    A corner whose mean is over 60 degrees from its face's normal keeps the face's: caps keep sharp edges.
     """
     faces = np.zeros((len(triangles), 3))
     total = np.zeros((len(vertices), 3))
@@ -64,7 +64,7 @@ def interpolate_hits(rays, t_hit, primitive, uv, corner_normals, positions, norm
 
 @numba.njit(cache=True, nogil=True)
 def rotate(directions, T, rays):  # type: ignore[no-untyped-def]
-    """Fill (N, 6) rays from the origin of a (4, 4) pose, along (N, 3) directions in its frame."""
+    """Fill (N, 6) rays from the origin of a (4, 4) pose, along any (N, 3) directions in its frame."""
     for n in range(len(directions)):
         x, y, z = directions[n, 0], directions[n, 1], directions[n, 2]
         for k in range(3):
@@ -74,9 +74,9 @@ def rotate(directions, T, rays):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def light_rays(positions, normals, center, size_m, dither, rays, cosine_over_d2, index):  # type: ignore[no-untyped-def]
-    """Fill shadow rays (t = 1 at the light) from the lit side of surfaces to random points of a ball.
+    """Fill shadow rays (t = 1 at the light) from surfaces to random points on a sphere; return their number.
 
-    Fills the first M rows of rays (N, 6), cosine_over_d2 (N,) and index (N,), and returns M.
+    Fills the first rows of rays (N, 6), cosine_over_d2 (N,) and index (N,), for surfaces that face the light.
     """
     count = 0
     for n in range(len(positions)):
@@ -101,7 +101,7 @@ def light_rays(positions, normals, center, size_m, dither, rays, cosine_over_d2,
 
 @numba.njit(cache=True, nogil=True)
 def add_light(occluded, cosine_over_d2, index, rays, color, view, normals, gloss, irradiance, shine):  # type: ignore[no-untyped-def]
-    """Add unoccluded light to (N, 3) irradiance, and its blurred image (Blinn-Phong) to (N, 3) shine."""
+    """Add unoccluded light to (N, 3) irradiance, and the lamp's highlight (Blinn-Phong) to (N, 3) shine."""
     for m in range(len(occluded)):
         if occluded[m]:
             continue
@@ -142,7 +142,7 @@ def hemisphere_rays(positions, normals, dither, rays):  # type: ignore[no-untype
 
 @numba.njit(cache=True, nogil=True)
 def mirror_rays(positions, normals, view, roughness, dither, rays):  # type: ignore[no-untyped-def]
-    """Fill (N, 6) mirrored rays, spread by an (N,) roughness."""
+    """Fill (N, 6) mirrored rays, spread by an (N,) roughness; their directions do not have unit length."""
     for n in range(len(positions)):
         along = view[n, 0] * normals[n, 0] + view[n, 1] * normals[n, 1] + view[n, 2] * normals[n, 2]
         z = np.float32(2.0) * dither[n, 0] - np.float32(1.0)
@@ -162,7 +162,8 @@ def mirror_rays(positions, normals, view, roughness, dither, rays):  # type: ign
 def smooth_within_surfaces(image, positions, normals, z_m, radius):  # type: ignore[no-untyped-def]
     """Return (H, W, 3) means of each pixel's known (not NaN) neighbours on the same plane; edges stay sharp.
 
-    The outermost neighbours count half, so that patterns with a period of twice the radius vanish.
+    A pixel without such a neighbour takes the mean of all known ones within ``radius`` pixels. The outermost
+    neighbours count half, so that patterns with a period of twice the radius vanish.
     """
     height, width = z_m.shape
     out = np.zeros_like(image)

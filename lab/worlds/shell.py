@@ -1,4 +1,4 @@
-"""The shell of a rectangular room that stands on the origin, and poses against its walls."""
+"""The shell of a rectangular room, the origin in the middle of its floor, and poses against its walls."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ def shell(
     wall: Finish = random_wall,
     floor: Finish = random_floor,
 ) -> list[Part]:
-    """Return floor, ceiling and walls as slabs outside ``size_m``; one wall in five has another finish."""
+    """Return slabs around the inner size: floor, ceiling, four walls. One wall in five has another finish.
+
+    ``darkest_ceiling`` is the least luminance of a painted ceiling, 0 to 0.85.
+    """
     x, y, z = size_m
     white = muted(rng, 1, darkest_ceiling, 0.85)[0]
     ceiling = Material(paint(white, 1, 0.04)) if rng.random() < 0.85 else random_wall(rng)
@@ -44,7 +47,10 @@ def shell(
 def wall_pose(
     size_m: FloatArray, wall: int, along_m: float, inset_m: float = 0.0, z_m: float = 0.0
 ) -> FloatArray:
-    """Return a pose against one of four walls, front (-y) to the room, ``along_m`` from the wall's middle."""
+    """Return a pose against one of four walls, front (-y) to the room, ``along_m`` from the wall's middle.
+
+    Walls 0 to 3 are those at +y, -x, -y and +x; ``inset_m`` is the distance from the wall.
+    """
     reach_m = 0.5 * (size_m[1] if wall % 2 == 0 else size_m[0]) - inset_m
     return place(0.0, 0.0, wall * np.pi / 2.0) @ place(along_m, reach_m, 0.0, z_m)
 

@@ -18,9 +18,11 @@ VGA = CameraIntrinsics.pinhole(525.0, 525.0, 319.5, 239.5, 640, 480)
 WEST, EAST, SOUTH, NORTH = np.pi / 2.0, -np.pi / 2.0, np.pi, 0.0
 """Yaw of pieces with their back to the wall at x = 0, x = max, y = 0 and y = max."""
 WALL_M = 0.22
+"""Thickness of floor, ceiling and walls."""
 
 Opening = tuple[float, float, float, float]
-"""A window's hole in metres: place along the wall, right of its middle; lower edge; width; height."""
+"""A window's hole, metres: distance of its centre from the wall's middle, to the right seen from the room;
+height of its lower edge above the floor; width; height."""
 
 
 def shell(
@@ -36,7 +38,7 @@ def shell(
 
     Args:
         rng: random generator of the paint.
-        size_m: inner size.
+        size_m: (x, y, z) inner size.
         floor: material of the floor.
         walls: materials of the west, east, south and north wall.
         ceiling: material of the ceiling.
@@ -59,7 +61,7 @@ def shell(
 
 
 def _wall(length_m: float, height_m: float, opening: Opening | None) -> Mesh:
-    """Return a wall behind y = 0, about x = 0, with or without a hole; it covers the corners too."""
+    """Return a wall behind y = 0, centred on x = 0 and longer by ``WALL_M`` at both ends, for the corners."""
     total = length_m + 2.0 * WALL_M
     if opening is None:
         return moved(box((total, WALL_M, height_m)), 0.0, WALL_M / 2, height_m / 2)
@@ -75,7 +77,10 @@ def _wall(length_m: float, height_m: float, opening: Opening | None) -> Mesh:
 
 
 def sun(through_m: Sequence[float], onto_m: Sequence[float], irradiance: float) -> Light:
-    """Return sunlight that passes one place (in a window) and falls on another."""
+    """Return sunlight through one place (in a window) onto another.
+
+    ``irradiance`` is that of red light there, on a surface that faces the sun.
+    """
     through, onto = np.asarray(through_m, float), np.asarray(onto_m, float)
     way = (through - onto) / np.linalg.norm(through - onto)
     distance_m = 15.0
@@ -86,7 +91,10 @@ def sun(through_m: Sequence[float], onto_m: Sequence[float], irradiance: float) 
 def arc(
     target_m: Sequence[float], distance_m: float, height_m: float, azimuths_deg: Sequence[float]
 ) -> tuple[FloatArray, ...]:
-    """Return T_world_camera of nodes around a place, at a horizontal distance and a height."""
+    """Return T_world_camera of nodes that look at ``target_m`` from this horizontal distance and height.
+
+    Azimuths are those of the nodes seen from the target, from +x towards +y.
+    """
     poses = []
     for azimuth in np.radians(azimuths_deg):
         x = target_m[0] + distance_m * np.cos(azimuth)

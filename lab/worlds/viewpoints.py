@@ -1,6 +1,6 @@
-"""Random viewpoints in a room: of handheld depth cameras, and of cameras below the ceiling.
+"""Random camera poses in a room: of handheld depth cameras, and of cameras below the ceiling.
 
-Rooms are closed; parts[0] is the floor slab, parts[1] the ceiling slab, parts[:6] the shell.
+The room must be closed; parts[0] is its floor slab, parts[1] its ceiling slab, parts[:6] its shell.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ _MARGIN_M = 0.25
 _CLOSE_UP_SHARE = 0.3
 _CEILING_SHARE = 0.25
 _CLEARANCE_M = 0.45
-"""Distance from the box around any object: at 75 degrees the corner of the image is 44 degrees off the axis,
-so an object 0.42 m away can have a depth of 0.3 m."""
+"""Distance from the bounding box of any object. With a field of view of 75 degrees the corner of the image is
+44 degrees off the axis, so an object 0.42 m away can have a depth of 0.3 m."""
 _PREVIEW = CameraIntrinsics.pinhole(26.25, 26.25, 15.5, 11.5, 32, 24)
 
 _View = TypeVar("_View")
@@ -38,10 +38,10 @@ def random_views(scene: Scene, rng: Rng, count: int, renderer: Renderer | None =
         scene: a closed room.
         rng: source of all randomness.
         count: number of cameras.
-        renderer: the scene's renderer, if there is one already.
+        renderer: the scene's renderer; None creates one.
 
     Raises:
-        InputError: the room is so full that no camera sees anything.
+        InputError: the room is so full that fewer cameras with a usable view were found.
     """
     renderer = renderer or Renderer(scene)
     low, high = _inside(scene, np.max)
@@ -63,18 +63,18 @@ def varied_views(
 ) -> Iterator[tuple[FloatArray, CameraIntrinsics]]:
     """Yield T_world_camera and intrinsics (4:3) of cameras with a usable view that are inside no object.
 
-    Three in four are held by people, at 1.0 to 1.8 m; the others hang at 2.2 to 3 m and look down. Their
+    Three in four proposals are handheld, at 1.0 to 1.8 m; the others hang at 2.2 to 3 m and look down. Their
     horizontal fields of view are 45 to 75 degrees.
 
     Args:
         seed: seed of the views.
         scene: a closed room.
         count: number of views.
-        renderer: the scene's renderer, if there is one already.
+        renderer: the scene's renderer; None creates one.
         width_px: width of the images.
 
     Raises:
-        InputError: the room is so full that no camera sees anything.
+        InputError: the room is so full that fewer cameras with a usable view were found.
     """
     rng = np.random.default_rng([seed, 5333])
     renderer = renderer or Renderer(scene)
@@ -95,7 +95,7 @@ def varied_views(
 
 
 def _found(scene: Scene, count: int, tries: int, candidate: Callable[[], _View | None]) -> Iterator[_View]:
-    """Yield the first ``count`` valid candidates, of ``tries`` for each."""
+    """Yield the first ``count`` candidates that are not None, of at most ``tries`` x ``count``."""
     found = 0
     for _ in range(tries * count):
         if found == count:
@@ -109,7 +109,7 @@ def _found(scene: Scene, count: int, tries: int, candidate: Callable[[], _View |
 
 
 def _inside(scene: Scene, face: Callable[[FloatArray], float]) -> tuple[FloatArray, FloatArray]:
-    """Return the corners of a room's air, up to the face of the ceiling slab that ``face`` selects."""
+    """Return the low and high corner of a room, up to the lower (np.min) or upper face of its ceiling."""
     floor, ceiling = scene.parts[:2]
     places = floor.vertices_m + floor.T_world_part[:3, 3]
     top = float(face(ceiling.vertices_m[:, 2] + ceiling.T_world_part[2, 3]))
@@ -117,14 +117,14 @@ def _inside(scene: Scene, face: Callable[[FloatArray], float]) -> tuple[FloatArr
 
 
 def _things(scene: Scene, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return (K, 3) centres of the parts in the lower half of the room."""
+    """Return (K, 3) origins of the parts inside the room, without the shell, that are below 1.3 m."""
     centers = np.array([part.T_world_part[:3, 3] for part in scene.parts[6:]]).reshape(-1, 3)
     inside = np.all((centers > low) & (centers < high), axis=1) & (centers[:, 2] < 1.3)
     return centers[inside]
 
 
 def _boxes(scene: Scene) -> tuple[FloatArray, FloatArray]:
-    """Return (K, 3) low and high corners of the boxes around everything but the shell."""
+    """Return (K, 3) low and high corners of the bounding boxes of all parts but the shell."""
     corners = np.array([bounds([part]) for part in scene.parts[6:]]).reshape(-1, 2, 3)
     return corners[:, 0], corners[:, 1]
 
@@ -139,7 +139,7 @@ def _room_view(rng: Rng, low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 def _close_up(rng: Rng, things: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray | None:
-    """Return a camera 0.6 to 1.6 m from an object, looking down at it by 20 to 65 degrees."""
+    """Return a camera 0.6 to 1.6 m from an object, looking down by 20 to 65 degrees; None if outside."""
     target = things[rng.integers(len(things))] + rng.normal(0.0, 0.1, 3)
     distance, yaw = rng.uniform(0.6, 1.6), rng.uniform(0.0, 2.0 * np.pi)
     pitch = np.radians(rng.uniform(20.0, 65.0))
@@ -150,7 +150,7 @@ def _close_up(rng: Rng, things: FloatArray, low: FloatArray, high: FloatArray) -
 
 
 def _handheld(rng: Rng, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return a camera at 1.0 to 1.8 m, tilted -45 to +10 degrees, mostly towards the middle of the room."""
+    """Return a camera at 1.0 to 1.8 m, pitched -45 to +10 degrees, mostly towards the middle of the room."""
     eye = _somewhere(rng, low, high, rng.uniform(1.0, 1.8), 0.35)
     pitch = np.radians(np.clip(rng.normal(-15.0, 13.0), -45.0, 10.0))
     yaw = _yaw_to_middle(eye, low, high) + rng.normal(0.0, 0.9)
@@ -200,12 +200,12 @@ def _camera(fov_rad: float, width_px: int) -> CameraIntrinsics:
 
 
 def _is_bare(part: IntArray, most: float) -> bool:
-    """Whether a ray leaves the room, or walls and ceiling fill more than ``most`` of the picture."""
+    """Return whether a ray meets nothing, or walls and ceiling fill over ``most``, 0 to 1, of the view."""
     return bool(np.any(part < 0) or np.mean((part >= 1) & (part < 6)) > most)
 
 
 def _sees_enough(z_m: FloatArray, part: IntArray, close: bool) -> bool:
-    """Whether no object is close before the lens and the picture is not only walls and ceiling."""
+    """Return whether nothing is close before the lens and the picture is not mostly walls and ceiling."""
     if _is_bare(part, 0.45 if close else 0.65):
         return False
     nearest, middle, far = np.percentile(z_m, [2.0, 50.0, 95.0])

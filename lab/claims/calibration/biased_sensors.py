@@ -1,4 +1,4 @@
-"""Two nodes with biased depth sensors, calibrated by views of a board and registered (SPEC 1.5)."""
+"""D09: two nodes with biased depth sensors, calibrated by views of a board and registered (SPEC 1.5)."""
 
 from __future__ import annotations
 
@@ -38,19 +38,19 @@ from pipeline.types import CameraIntrinsics, DepthMap, DepthNoise, FloatArray, P
 BOARD = Board()
 """The thesis's board."""
 ROOMS = range(260, 290)
-"""Seeds of ``box_room`` that were never used for tuning or trials."""
+"""Seeds of ``box_room`` that were never used for tuning or other trials."""
 SCALE, OFFSET_M = 0.01, 0.03
-"""Bias of the first node's sensor and of the second's; the signs are drawn for each room."""
+"""Bias of the first node's sensor (share of depth) and of the second's; the signs are drawn for each room."""
 ANGLE_DEG, START_DEG, START_M, GATE_M = 25.0, 3.0, 0.06, 0.3
 VIEWS, CORNER_PX, AWAY_M = 24, 0.1, (0.5, 1.7)
-"""Views of the board before each node, error of each coordinate of its circles' centres (more than C01 finds
-in photographs), and distances."""
+"""Number of views of the board in front of each node, standard deviation of the error of its circles' centres
+along u and v (more than C01 finds in photographs), and range of the board's distances."""
 BEHIND_M, WALL = 0.7, 0.6
 """Distance of the wall behind the board's middle, and its infrared albedo."""
 METHOD = tuned(Entrant("ceicp-a", "plane"))
 DRAWS = 8
-"""Random subsets of the points that are registered in each room: the choice of points alone moves a room's
-error from a quarter of a centimetre to more than one."""
+"""Number of random subsets of the points that are registered in each room. The choice of points alone changes
+a room's error from 0.25 cm to more than 1 cm."""
 CASES = ("unbiased", "unbiased, calibrated", "biased", "biased, calibrated")
 MOST_RATIO = 1.2
 RANGES_M = (1.0, 2.0, 3.0, 4.0)
@@ -82,11 +82,11 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """Views of the board before a node, and the lens estimated from them."""
+    """Views of the board in front of a node, and the lens estimated from them."""
 
     lens: Calibration
     sensed: tuple[DepthMap, ...]
-    """Depth from an unbiased sensor."""
+    """Depth of each view from an unbiased sensor."""
 
     @property
     def camera(self) -> CameraIntrinsics:
@@ -107,10 +107,12 @@ class Found:
     camera: CameraIntrinsics
     correction: DepthCorrection
     terms: tuple[str, ...]
+    """Terms of the depth model that the fit kept."""
 
 
 def sensors_trial(task: SensorsTask) -> dict[str, float | str]:
-    """Return the mean point error of the registrations by case, cm, and the remaining depth error."""
+    """Return the mean point error of the registrations by case in cm, and for each node the kept terms of the
+    depth model, the focal length's relative error and the remaining depth error in metres."""
     rng = np.random.default_rng([task.room, 15])
     nodes = [_node(task.room, index, bias, rng) for index, bias in enumerate(_biases(rng))]
     boards = [_board_session(node, rng) for node in nodes]
@@ -155,7 +157,7 @@ def _biases(rng: np.random.Generator) -> tuple[DepthBias, DepthBias]:
 
 
 def _node(room: int, index: int, bias: DepthBias, rng: np.random.Generator) -> Node:
-    """Return one of two nodes of a room, as in the registration benchmark but with a Kinect's 640 pixels."""
+    """Return one of two nodes of a room, as in the registration benchmark but with a Kinect's 640 columns."""
     chord_m = 2.0 * NODE_REACH_M * float(np.sin(np.radians(ANGLE_DEG) / 2.0))
     scene = box_room(room, 2, ANGLE_DEG, chord_m)
     camera = scaled(scene.intrinsics, 2.0)
@@ -166,7 +168,7 @@ def _node(room: int, index: int, bias: DepthBias, rng: np.random.Generator) -> N
 def _cloud(
     node: Node, depth: DepthMap, camera: CameraIntrinsics, noise: DepthNoise | None = None
 ) -> PointCloud:
-    """Return sensor points as the chain takes them."""
+    """Return the cloud of a depth image, back-projected as in the chain."""
     rgb = np.zeros((*depth.z_m.shape, 3), np.uint8)
     return back_project(RgbdFrame("node", rgb, depth, camera, node.T_world_camera, noise=noise))
 
@@ -177,7 +179,7 @@ def _corrected(node: Node, depth: DepthMap, found: Found) -> PointCloud:
 
 
 def _board_session(node: Node, rng: np.random.Generator) -> Session:
-    """Return views over image and distances, with noisy circle centres and the sensor model's depth."""
+    """Return views spread over image and distances, with noisy circle centres and simulated sensor depth."""
     alone, seed = BoardCamera(node.camera, np.eye(4)), int(rng.integers(1 << 31))
     poses = propose_poses(BOARD, [alone], VIEWS, seed, distances_m=AWAY_M)
     views = []
@@ -190,7 +192,7 @@ def _board_session(node: Node, rng: np.random.Generator) -> Session:
 
 
 def _board_view(T_camera_board: FloatArray, camera: CameraIntrinsics) -> Render:
-    """Render the printed board before a wall, as the depth sensor sees it."""
+    """Render the printed board in front of a wall, as the depth sensor sees it."""
     rays = pixel_rays(camera)
     normal = T_camera_board[:3, 2]
     z_m = (normal @ T_camera_board[:3, 3]) / (rays @ normal)
@@ -212,7 +214,7 @@ def _board_view(T_camera_board: FloatArray, camera: CameraIntrinsics) -> Render:
 
 
 def _left_m(node: Node, correction: DepthCorrection, away_m: float) -> float:
-    """Return the RMS over the image of the corrected minus the true depth."""
+    """Return the RMS over the image of corrected minus true depth, in metres, of a plane at ``away_m``."""
     flat = DepthMap(np.full((node.camera.height_px, node.camera.width_px), away_m, np.float32))
     left_m = correction.apply(node.bias.measured(flat)).z_m - away_m
     return float(np.sqrt(np.mean(left_m**2)))

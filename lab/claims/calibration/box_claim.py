@@ -20,7 +20,7 @@ MOST_M = 0.01
 RAW, LENS, CALIBRATED, EXACT = STATES
 DIMENSIONS = ("length", "width", "height")
 TABLE_4_5_CM = ((0.63, 0.59, 0.65), (0.57, 0.61, 0.62), (0.81, 0.78, 0.82))
-"""Table 4.5 of the thesis: errors at 0, 45 and 90 degrees."""
+"""Table 4.5 of the thesis: errors of width, length and height (SPEC 7), at 0, 45 and 90 degrees."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,11 +28,11 @@ class BoxStudy:
     """All trials of C25."""
 
     errors_m: dict[str, FloatArray]
-    """(TRIALS, sizes, positions, 3) measured minus true size, by the knowledge of the camera."""
+    """By state of the camera (``STATES``): (TRIALS, sizes, positions, 3) measured minus true size."""
 
 
 def box_study(folder: Path, scheduler: str | None) -> Generator[Progress, None, BoxStudy]:
-    """Run twenty cameras, each calibrated alone, before three boxes at three positions."""
+    """Run twenty cameras, each with a calibration of its own, on three boxes at three positions."""
     tasks = [BoxTask(seed) for seed in range(TRIALS)]
     found = yield from iterate_trials("C25, boxes", box_trial, tasks, folder, scheduler)
     return BoxStudy({state: np.array([one[state] for one in found]) for state in STATES})

@@ -1,4 +1,4 @@
-"""Measure length, width and height of a box in a point cloud of one view of it on a plane (SPEC 7)."""
+"""Length, width and height of a box, measured in the point cloud of one view of it on a plane (SPEC 7)."""
 
 from __future__ import annotations
 
@@ -29,25 +29,26 @@ WITHIN = (0.01, 0.99)
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """n . x = d."""
+    """The plane n . x = d."""
 
     normal: FloatArray
-    """(3,) unit."""
+    """(3,) unit normal n."""
     offset_m: float
+    """Offset d."""
 
     def heights_m(self, points_m: FloatArray) -> FloatArray:
-        """Return (N,) signed distances."""
+        """Return (N,) signed distances of (N, 3) points from the plane."""
         return points_m @ self.normal - self.offset_m
 
 
 def box_size_m(points_m: FloatArray, seed: int = 0) -> FloatArray:
-    """Return (3,) length, width and height; the length is the longer horizontal one.
+    """Return (3,) length, width and height in metres; the length is the longer horizontal one.
 
-    The ground is the plane with most points (RANSAC, 5 mm, then least squares), the box the largest object on
-    it, and its faces are the planes in that. The height is that of the top face above the ground. The sides
-    go along the largest upright face or, if none is visible, along the smallest rectangle around the top; the
-    extents are those of the top face along them, from the 1st to the 99th percentile of its area, which is 98
-    % of it.
+    The ground is the plane with the most points (RANSAC with 5 mm, then least squares). The box is the
+    largest connected object above it, and its faces are planes in that object. The height is the top face's
+    mean height above the ground. The horizontal axes follow the largest upright face or, if none is visible,
+    the smallest rectangle around the top face. Length and width are extents of the top face along these axes,
+    from the 1st to the 99th percentile of its area, divided by 0.98.
 
     Args:
         points_m: (N, 3) points of one view from above, in the camera's frame, one per pixel.
@@ -68,13 +69,13 @@ def box_size_m(points_m: FloatArray, seed: int = 0) -> FloatArray:
         raise ReconstructionError("Nothing on the plane has a flat top; is the object a box seen from above?")
     top_m = box_m[np.abs(tops[0].heights_m(box_m)) < ON_FACE_M]
     axes = _axes(ground.normal, upright[0].normal if upright else None, top_m)
-    area = top_m[:, 2] ** 3  # area of a pixel on a plane
+    area = top_m[:, 2] ** 3  # proportional to the area of a pixel on a plane
     width_m, length_m = sorted(_extent_m(top_m @ axis, area) for axis in axes)
     return np.array([length_m, width_m, ground.heights_m(top_m).mean()])
 
 
 def _extent_m(along_m: FloatArray, area: FloatArray) -> float:
-    """Return the extent of a face along one of its sides."""
+    """Return a face's extent along one of its sides, from its points' positions there and their areas."""
     order = np.argsort(along_m)
     share = np.cumsum(area[order]) / area.sum()
     low_m, high_m = np.interp(WITHIN, share, along_m[order])
@@ -82,7 +83,7 @@ def _extent_m(along_m: FloatArray, area: FloatArray) -> float:
 
 
 def _plane(points_m: FloatArray, rng: np.random.Generator) -> Plane:
-    """Return the plane with most points, fitted to them."""
+    """Return the plane with the most points near it, fitted to them."""
     if len(points_m) < 3:
         raise ReconstructionError("There are too few points for a plane; is the object in the picture?")
     some = points_m[rng.choice(len(points_m), min(SOME, len(points_m)), replace=False)]

@@ -1,4 +1,4 @@
-"""A box of known size before an uncalibrated camera, and the board views that calibrate it (SPEC 7)."""
+"""A box of known size in front of a camera, and the board views that calibrate the camera (SPEC 7)."""
 
 from __future__ import annotations
 
@@ -38,7 +38,8 @@ GROUND_M = 1.6
 STATES = ("as bought", "lens calibrated", "lens and depth calibrated", "known exactly")
 BOARD, MOMENTS = Board("circles", 11, 9, 0.05), 12
 FOCAL_SHARE, CENTER_PX = 0.02, 8.0
-"""Largest deviation of the camera from its data sheet: focal lengths, and principal point."""
+"""Deviation of the camera from its data sheet: of the focal lengths (more or less by this share, with 0.2 %
+of noise), and of the principal point (at most)."""
 SCALE, OFFSET_M, WAVE = 0.01, 0.03, 0.002
 """Largest biases of the depth sensor; such sizes were measured on an Astra and on Kinects (SPEC 1.5)."""
 
@@ -51,7 +52,7 @@ class BoxTask:
 
 
 def bought(rng: np.random.Generator) -> BoardCamera:
-    """Return a camera with its true parameters; known is only that it is similar to ``VGA``."""
+    """Return a camera with its true parameters; its buyer knows only ``VGA``, from which they deviate."""
     focal_px = VGA.fx_px * (1.0 + FOCAL_SHARE * rng.choice([-1.0, 1.0])) * (1.0 + 0.002 * rng.normal(size=2))
     center_px = np.array([VGA.cx_px, VGA.cy_px]) + rng.uniform(-CENTER_PX, CENTER_PX, 2)
     k1 = rng.uniform(0.05, 0.15) * rng.choice([-1.0, 1.0])

@@ -32,7 +32,7 @@ TABLE_4_2 = (
     (60.126, -10.169, 17.973, 30.002, 21.67, 17.999),
 )
 LAST_ROW = (0.3535, 0.3422, 0.5001, 0.0035, 40794.0, 0.0071)
-"""Last row of Table 4.2, which reads like a noise of 1.0."""
+"""Last row of Table 4.2, which the table labels as noise 1.0."""
 MISPRINT = 4
 """Column (ty) of 21.67 and 40794."""
 
@@ -43,7 +43,7 @@ def rmse(values: FloatArray) -> float:
 
 
 def within_share(cell: dict[str, FloatArray]) -> FloatArray:
-    """Return (TRIALS,) 1 where all of fx, fy, cx and cy are within 0.5 %."""
+    """Return (TRIALS,) 1 for each trial with fx, fy, cx and cy all within 0.5 %, else 0."""
     relative = np.array([np.abs(cell[name]) / TRUTH[name] for name in PLACES])
     return (relative <= WITHIN).all(axis=0).astype(float)
 

@@ -41,7 +41,7 @@ def photograph(board: Board, T_camera_board: FloatArray, camera: CameraIntrinsic
 
 @lru_cache(2)
 def _rays(lens: tuple[float, ...], width_px: int, height_px: int) -> FloatArray:
-    """Return (3, N) directions of all rays; those through a pixel are neighbours."""
+    """Return (3, N) directions of all rays, row by row of an image ``OVER`` times as wide and as high."""
     v, u = np.mgrid[0 : OVER * height_px, 0 : OVER * width_px].astype(np.float64)
     pixels = (np.stack([u, v], axis=-1).reshape(-1, 1, 2) + 0.5) / OVER - 0.5
     until = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-9)

@@ -47,19 +47,21 @@ PHOTOGRAPHS, MOST_TILT_DEG, GREY_SD, AWAY_LARGE_M = 40, 50.0, 3.0, 0.65
 
 @dataclass(frozen=True, slots=True)
 class JointTask:
-    """E1: lens and poses together, a part of the trials of a cell."""
+    """E1: lens and poses estimated together; ``CHUNK`` of the trials with this number of views and noise."""
 
     views: int
     sigma_px: float
     first: int
+    """Seed of the first trial; the others follow."""
 
 
 @dataclass(frozen=True, slots=True)
 class PoseTask:
-    """E2: the pose alone, with a known lens."""
+    """E2: the pose estimated alone, with a known lens; ``CHUNK`` of the trials with this noise."""
 
     sigma_px: float
     first: int
+    """Seed of the first trial; the others follow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +69,7 @@ class PhotographTask:
     """C01: one rendered photograph of the board."""
 
     index: int
+    """Number of the photograph, from 0; the tilt grows with it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +84,7 @@ class CalibrationStudy:
 
 
 def random_pose(rng: np.random.Generator) -> FloatArray:
-    """Return the (4, 4) pose of a board that is completely in the picture."""
+    """Return a random (4, 4) T_camera_board with the whole board in the picture."""
     while True:
         axis, turn = rng.uniform(0.0, 2.0 * np.pi), np.radians(rng.uniform(-TURN_DEG, TURN_DEG))
         tilt = np.radians(rng.uniform(*TILT_DEG))
@@ -96,13 +99,14 @@ def random_pose(rng: np.random.Generator) -> FloatArray:
 
 
 def noisy_view(T: FloatArray, sigma_px: float, rng: np.random.Generator) -> View:
-    """Return the board's points with noise."""
+    """Return a view of the board at the pose T, with Gaussian noise on its image points."""
     points_px = seen_px(BOARD, T, CAMERA)
     return View("", points_px + sigma_px * rng.standard_normal(points_px.shape), BOARD.points_m)
 
 
 def joint_trials(task: JointTask) -> dict[str, list[float]]:
-    """Return, for each trial, parameter errors, their predicted standard errors, and errors in pixels."""
+    """Return by name, for each trial: parameter errors, their predicted standard errors, RMS in pixels of the
+    used and held-out views, and mean errors of the poses (degrees, and share of the distance)."""
     found: dict[str, list[float]] = {}
     for seed in range(task.first, task.first + CHUNK):
         rng = np.random.default_rng((task.views, seed))
@@ -126,7 +130,7 @@ def joint_trials(task: JointTask) -> dict[str, list[float]]:
 
 
 def pose_trials(task: PoseTask) -> list[list[float]]:
-    """Return (CHUNK, 6) errors of the pose."""
+    """Return (CHUNK, 6) errors of the pose: degrees about x, y, z and metres along x, y, z."""
     rx, ry, rz = np.radians(EULER_DEG)
     R = rotation_exp(np.array([0.0, 0.0, rz])) @ rotation_exp(np.array([0.0, ry, 0.0]))
     true = rigid(R @ rotation_exp(np.array([rx, 0.0, 0.0])), np.array(MOVE_M))
@@ -140,7 +144,7 @@ def pose_trials(task: PoseTask) -> list[list[float]]:
 
 
 def euler_deg(T: FloatArray) -> tuple[float, float, float]:
-    """Return the angles about x, y, z of R = Rz Ry Rx."""
+    """Return the angles about x, y, z, in degrees, of the rotation R = Rz Ry Rx in T."""
     R = T[:3, :3]
     angles = (np.arctan2(R[2, 1], R[2, 2]), -np.arcsin(R[2, 0]), np.arctan2(R[1, 0], R[0, 0]))
     rx, ry, rz = np.degrees(angles).tolist()
@@ -148,7 +152,8 @@ def euler_deg(T: FloatArray) -> tuple[float, float, float]:
 
 
 def photograph_trial(task: PhotographTask) -> dict[str, float]:
-    """Return whether the board is found the right way up in a noisy photograph, and its centres' error."""
+    """Return, for a noisy photograph, whether the board is found, whether it is the right way up, and the
+    mean error of its centres in pixels (NaN if it is not found)."""
     rng = np.random.default_rng((3, task.index))
     axis, turn = rng.uniform(0.0, 2.0 * np.pi), np.radians(rng.uniform(-180.0, 180.0))
     tilt = np.radians(MOST_TILT_DEG * task.index / max(PHOTOGRAPHS - 1, 1))

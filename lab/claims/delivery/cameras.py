@@ -35,7 +35,7 @@ Scores = dict[tuple[int, ...], float]
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A rig's cameras as known to a program that chooses before anything is sent."""
+    """Data from which a program chooses among a rig's cameras before any of them sends."""
 
     q: FloatArray
     """(N, V) quality with which each camera sees each voxel."""
@@ -50,7 +50,7 @@ Found = dict[str, tuple[Choice, Scores]]
 
 
 def choice(rig: Rig) -> Choice:
-    """Return what is known of a rig's cameras before they send."""
+    """Return the data for the choice among a rig's cameras."""
     places_m = np.array(places_of(rig, PRESETS["office"].nodes.spacing_m)).reshape(-1, 2)
     coding = coding_named(CODING)
     costs = [float(len(coding.encode(images_of(frame), LARGE))) for frame in rig.frames]
@@ -62,7 +62,7 @@ def choice(rig: Rig) -> Choice:
 
 
 def subset_study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Found]:
-    """Run every subset of every rig's cameras."""
+    """Run the chain with every subset of every rig's cameras."""
     rigs = {name: load_demo(name) for name in RIGS}
     tasks = [SubsetTask(name, nodes) for name, rig in rigs.items() for nodes in _subsets(len(rig.frames))]
     found: list[Values] = yield from iterate_trials(
@@ -79,10 +79,10 @@ def _subsets(count: int) -> list[tuple[int, ...]]:
 
 
 def chosen(cameras: Choice, scores: Scores, m: int) -> dict[str, float]:
-    """Return the F-score of ``m`` cameras by program; *at random* is the mean of all sets of this size.
+    """Return the F-score, 0 to 1, of ``m`` cameras by program; ``random`` is the mean of all sets of ``m``.
 
-    Greedy takes quality as in SPEC 6.3; greedy by sight counts a voxel fully once it has been seen. Greedy by
-    bytes may spend ``m`` mean images, on any number of cameras.
+    ``greedy`` takes quality as in SPEC 6.3; ``greedy by sight`` counts a voxel fully once a camera sees it.
+    ``greedy by bytes`` may spend the bytes of ``m`` mean images, on any number of cameras.
     """
     budget = m * float(cameras.costs.mean())
     sets = {

@@ -137,7 +137,7 @@ def _d04(study: Study) -> Outcome:
 
 
 def _gained(study: Study, task: LossTask) -> FloatArray:
-    """(2,) terms of the points of coverage that fusion gains more than without losses, over packets lost."""
+    """Return (2,) slope terms: fusion's gain in coverage less its lossless gain, in points, over % lost."""
     reference = lossless(task.rig, task.coding)
     more = [study.value(t, "no_hit_before") - study.value(t, "no_hit_after") for t in (task, reference)]
     return slope_terms([study.lost_percent(task)], [100.0 * (more[0] - more[1])])

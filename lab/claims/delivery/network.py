@@ -14,7 +14,7 @@ from pipeline.sources import Demo
 from pipeline.spec import Spec
 
 NETWORKS = {"thesis-link": "802.15.4", "office": "802.11b"}
-"""The presets with their medium access."""
+"""Presets with the name of their medium access."""
 LONGEST_S = 14_400.0
 
 
@@ -29,13 +29,16 @@ class SendTask:
 
 
 def patient(network: NetworkConfig) -> NetworkConfig:
-    """Return the network without a deadline."""
+    """Return the network without a deadline, run for up to four hours."""
     nodes = replace(network.nodes, deadline_s=None)
     return replace(network, nodes=nodes, run=replace(network.run, horizon_s=LONGEST_S))
 
 
 def send_trial(task: SendTask) -> Values:
-    """Return the cost until the sink has everything; no values if it never has."""
+    """Return the bytes and packets of a rig's images, and the cost until the sink has them all.
+
+    The cost is missing if they have not all arrived within four hours.
+    """
     network = patient(PRESETS[task.network])
     source = Demo(task.rig)
     sending = send(DeliverySpec(Spec(source), network, task.coding, moments=1), source.load())

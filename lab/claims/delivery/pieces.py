@@ -1,4 +1,4 @@
-"""D07: the sixteen pieces of a frame that are worth their energy."""
+"""D07: the worth and the energy of each of the sixteen pieces of a depth image."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Pieces:
 
 
 def alone_shares(rig: Rig, node: int) -> FloatArray:
-    """Return (16,) shares of a frame's pixels whose surface no other camera has measured."""
+    """Return (16,) the share of each piece's pixels whose surface this node alone has measured."""
     cloud, shape = sparse_points(rig.frames[node]), rig.frames[node].depth.z_m.shape
     others = [frame for index, frame in enumerate(rig.frames) if index != node]
     alone = ~np.any([sees(other, cloud.points_m) for other in others], axis=0)
@@ -67,7 +67,7 @@ def alone_shares(rig: Rig, node: int) -> FloatArray:
 
 
 def piece_bytes(rig: Rig, node: int) -> FloatArray:
-    """Return (16,) sizes of each piece's depth in RVL coding."""
+    """Return (16,) sizes of each piece's depth in RVL coding, bytes."""
     depth = images_of(rig.frames[node]).depth
     return np.array(
         [len(rvl.encode(depth[piece_area(depth.shape, piece)])) for piece in range(COUNT_OF_PIECES)], float
@@ -77,7 +77,7 @@ def piece_bytes(rig: Rig, node: int) -> FloatArray:
 def piece_study(
     folder: Path, scheduler: str | None, rigs: Sequence[str] = RIGS[:1]
 ) -> Generator[Progress, None, list[Pieces]]:
-    """Run the pieces of every node of some rigs."""
+    """Leave out each piece of every node of some rigs in turn, and send the rigs' images for their energy."""
     run = partial(iterate_trials, folder=folder, scheduler=scheduler, data=DATA)
     loaded = {name: load_demo(name) for name in rigs}
     tasks = [
@@ -113,7 +113,7 @@ def piece_study(
 
 
 def full_piece_study(folder: Path, scheduler: str | None) -> Generator[Progress, None, list[Pieces]]:
-    """Run the pieces of all rigs."""
+    """Run ``piece_study`` with all rigs."""
     return (yield from piece_study(folder, scheduler, RIGS))
 
 

@@ -35,7 +35,7 @@ def mean_terms(values: Iterable[float]) -> FloatArray:
 
 
 def mean_ratio(sums: FloatArray) -> FloatArray:
-    """Return (...) means over rigs of the ratios of (..., R, 2) sums; NaN if a rig has lost nothing."""
+    """Return (...) means over rigs of the ratios of (..., R, 2) sums; NaN if a rig's second sum is 0."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.mean(sums[..., 0] / sums[..., 1], axis=-1)
 

@@ -26,11 +26,11 @@ DATA = (SHIPPED_MODEL, SHIPPED_COMPLETION, SCENES)
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """Every trial's task with its values."""
+    """The tasks of all trials, each with its values."""
 
     losses: dict[LossTask, Values]
     colorless: dict[str, Values]
-    """Values by rig if all depth has arrived, and no colour."""
+    """Values by rig of the trials in which all depth arrives, and no colour."""
     sent: dict[SendTask, Values]
 
     @property
@@ -67,7 +67,7 @@ class Study:
         return 100.0 * (self.value(lossless(task.rig, task.coding), name) - self.value(task, name))
 
     def rate_terms(self, coding: str, when: str) -> list[FloatArray]:
-        """Return, by rig, (S, 2) terms per seed: F-score points over burst losses, up to a tenth."""
+        """Return each rig's (S, 2) slope terms by seed: F-score points over % lost in bursts, up to 10 %."""
         groups = []
         for rig in self.rigs:
             by_seed: dict[int, list[LossTask]] = {}

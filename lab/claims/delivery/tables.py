@@ -1,4 +1,4 @@
-"""Tables, and the chart of the exchange rates."""
+"""Tables of exchange rates, sending and losses, and the chart of the F-score over losses."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _sending_cells(study: Study, coding: str) -> list[float | None]:
 
 
 def sending_table(study: Study) -> Table:
-    """Return everything on the air, by coding and network."""
+    """Return bytes, packets, time and energy until everything has arrived, by coding and network."""
     rows = tuple(
         (
             *(title(task.coding), NETWORKS[task.network]),
@@ -138,7 +138,7 @@ def _order(key: tuple[str, int, str, float]) -> tuple[int, int, str, float]:
 
 
 def _mean(study: Study, tasks: Sequence[LossTask], name: str, factor: float) -> float | None:
-    """Return the mean over the trials that have the value."""
+    """Return ``factor`` times the mean over the trials that have the value; None if none has it."""
     values = np.array([study.value(task, name) for task in tasks])
     return factor * float(np.nanmean(values)) if np.isfinite(values).any() else None
 

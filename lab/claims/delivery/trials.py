@@ -52,6 +52,7 @@ class LossTask:
     """Image bytes in a packet."""
     loss: Loss
     share: float
+    """Expected share of lost packets; of ``deadline`` the exact share, up to rounding."""
     seed: int
     alignment: AlignmentMode = "local"
     """Method that makes inferred depth metric."""
@@ -88,14 +89,14 @@ def yardstick(name: str) -> Yardstick | None:
 
 
 def loss_trial(task: LossTask) -> Values:
-    """Code, lose packets, decode the others and run the chain on them once."""
+    """Encode a rig's images, drop packets, decode the others, and run the chain once on the result."""
     rig = demo(task.rig)
     frames, traffic = frames_left(rig, task)
     return rebuilt(rig, frames, task.alignment) | traffic
 
 
 def frames_left(rig: Rig, task: LossTask) -> tuple[list[RgbdFrame], Values]:
-    """Return the sink's frames after the task's losses, and the sent, delivered and lost packets."""
+    """Return the sink's frames after the losses; bytes sent and delivered; packets, and lost ones."""
     coding = coding_named(task.coding)
     streams = [np.frombuffer(coding.encode(images_of(f), task.packet_bytes), np.uint8) for f in rig.frames]
     counts = [-(-stream.size // task.packet_bytes) for stream in streams]
@@ -180,7 +181,7 @@ def rebuilt(rig: Rig, frames: Sequence[RgbdFrame], alignment: AlignmentMode = "l
     Returns:
         For the surface ``before`` (of measured depth) and ``after`` fusion: ``f`` (F-score at 5 cm),
         ``no_hit`` (share of the rays of all cameras without a surface), ``hole_area_m2`` and
-        ``median_depth_error_m``; the number of nodes that were ``heard``; the computing time, core seconds.
+        ``median_depth_error_m``; the number of nodes that were ``heard``; and ``core_s``, CPU seconds.
         If nothing can be rebuilt, F-scores are 0, all rays hit nothing, and other values are None.
     """
     started = time.process_time()

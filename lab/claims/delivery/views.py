@@ -41,7 +41,10 @@ def sparse_points(frame: RgbdFrame) -> PointCloud:
 
 
 def rig_quality(rig: Rig) -> FloatArray:
-    """Return (N, V) how well each camera sees each voxel seen by any: sight x resolution x incidence."""
+    """Return (N, V) quality, 0 to 1, of each camera's view of each voxel that any camera has measured.
+
+    The quality is visibility x resolution x incidence (SPEC 6.3).
+    """
     clouds = [sparse_points(frame) for frame in rig.frames]
     points_m = np.concatenate([cloud.points_m for cloud in clouds])
     normals = np.concatenate([cloud.normals for cloud in clouds if cloud.normals is not None])

@@ -42,7 +42,7 @@ NOTES = {
 
 
 def infer_all(folder: Path, scheduler: str | None) -> Generator[Progress, None, tuple[SceneErrors, ...]]:
-    """Infer and compare all images on this machine."""
+    """Infer the depth of all images of all sites and compare it with their references."""
     data = (SHIPPED_MODEL, SCENES, *real_folders())
     found = yield from iterate_trials("C12 and C14, depth", site_trial, sites(), folder, scheduler, data=data)
     return tuple(from_trial(site, result) for site, result in zip(sites(), found, strict=True))
@@ -103,7 +103,7 @@ def _row(scene: SceneErrors, alignment: str) -> tuple[str | float, ...]:
 
 
 def distance_charts(measured: Sequence[SceneErrors]) -> tuple[Chart, ...]:
-    """Return charts of AbsRel over true distance, one for indoor and one for outdoor images."""
+    """Return charts of AbsRel over true depth, one per ``cap_m``: indoor, and outdoor if there are any."""
     return tuple(
         Chart(
             f"Error against distance, up to {cap_m:g} m",

@@ -25,7 +25,7 @@ from pipeline.types import BoolArray, FloatArray
 EDGES = np.linspace(0.0, 1.0, 11)
 """Edges of the confidence bins."""
 LARGEST_GAP = 0.1
-"""Largest accepted difference between confidence and correct share, averaged over pixels by bin."""
+"""Largest accepted difference between a bin's confidence and correct share, averaged over pixels."""
 NOTE = (
     "Pixels of hidden depth, and of the sensors' own holes where the truth is known, before any is left out "
     "for little confidence. Said: mean confidence in the bin. True: share within 5 % of what judges, and its "
@@ -63,7 +63,7 @@ class Reliability:
 
     @property
     def gap(self) -> float:
-        """Mean over pixels of their bin's difference between confidence and correct share."""
+        """Difference between a bin's mean confidence and correct share, absolute, averaged over pixels."""
         return gap_of(self.counts)
 
     @property
@@ -95,7 +95,7 @@ def gap_of(counts: FloatArray) -> float:
 
 
 def binned(confidence: FloatArray, right: BoolArray) -> FloatArray:
-    """Return (3, 10) pixels, sums of confidence and correct pixels of (N,) confidences and answers."""
+    """Return (3, 10) counts by bin of (N,) confidences: pixels, sum of confidences, pixels with ``right``."""
     confidence = confidence.astype(np.float64)
     return np.stack(
         [np.histogram(confidence, EDGES, weights=weights)[0] for weights in (None, confidence, right * 1.0)]
@@ -122,7 +122,7 @@ def confidence_trial(site: Site) -> list[dict[str, Any]]:
 def all_confidences(
     folder: Path, scheduler: str | None
 ) -> Generator[Progress, None, tuple[Reliability, ...]]:
-    """Run every group of images on this machine."""
+    """Run the trials of all sites and return the counts of every group of images."""
     data = (SHIPPED_MODEL, SHIPPED_COMPLETION, SCENES, *real_folders())
     trials = yield from iterate_trials(
         "D10, confidence", confidence_trial, sites(), folder, scheduler, data=data

@@ -22,7 +22,7 @@ ALIGNMENTS: dict[str, AlignmentMode] = {
     "median-scaled": "median",
     "affine-aligned": "affine_depth",
 }
-"""Alignments of the literature: to the reference depth. Raw takes the network's numbers as metres."""
+"""Alignments to the reference depth, as in the literature; raw takes the network's numbers as metres."""
 JUDGED = "median-scaled"
 SENSOR = "sensor"
 CHAIN = "aligned as in the chain"
@@ -41,7 +41,7 @@ class FrameErrors:
     aligned: dict[str, DepthErrors]
     """By the names of ``ALIGNMENTS``."""
     binned: dict[str, FloatArray]
-    """Sums by alignment, from ``by_distance``."""
+    """By alignment: the sums that ``by_distance`` returns."""
     beside_sensor: dict[str, float]
     """AbsRel over the sensor's pixels: of its own depth (``SENSOR``), by alignment, and for ``CHAIN``; empty
     if the sensor is the reference."""
@@ -54,7 +54,8 @@ class SceneErrors:
     site: Site
     frames: tuple[FrameErrors, ...]
     strip: ByteArray
-    """(H, 4 W, 3) of the first: colour, truth, inferred median-scaled, relative error; black: unknown."""
+    """(H, 4 W, 3) picture of the first image: colour, true depth, inferred depth (median-scaled) and relative
+    error; black where unknown."""
 
     def series(self, alignment: str, measure: str) -> FloatArray:
         """Return (frames,) one measure of ``DepthErrors``."""
@@ -65,7 +66,7 @@ class SceneErrors:
         return float(self.series(alignment, measure).mean())
 
     def pooled_abs_rel(self, alignment: str) -> float:
-        """Return the mean over pixels, with equal weights."""
+        """Return AbsRel over the pixels of all images, with equal weights."""
         total, pixels = (sum(frame.binned[alignment][row].sum() for frame in self.frames) for row in (0, 1))
         return float(total / pixels)
 
@@ -118,7 +119,7 @@ def scene_errors(site: Site, network: DepthNetwork) -> SceneErrors:
 
 
 def within(truth_m: FloatArray, cap_m: float) -> FloatArray:
-    """Return the reference depths within the range, NaN elsewhere."""
+    """Return (H, W) the reference depths between ``NEAREST_M`` and ``cap_m``, NaN elsewhere."""
     with np.errstate(invalid="ignore"):
         return np.where((truth_m > NEAREST_M) & (truth_m < cap_m), truth_m, np.nan)
 
@@ -130,9 +131,9 @@ def frame_errors(
 
     Args:
         example: the image with its sensor depth.
-        inferred: (H, W) by the network.
+        inferred: (H, W) output of the network.
         judging_m: (H, W) reference depths, NaN elsewhere.
-        aligned_m: (H, W) each, the inferred depth by alignment.
+        aligned_m: by alignment, the (H, W) inferred depth.
         site: site of the image.
     """
     beside = {}

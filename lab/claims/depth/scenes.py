@@ -27,8 +27,9 @@ OUTDOOR_SETS = ("kitti",)
 SETS_VARIABLE = "PACKETMESH_DEPTH_SETS"
 """Variable that names more sets as ``kind=path``, separated like the folders of PATH."""
 DATA_VARIABLE = "PACKETMESH_SHARED_DATA"
+"""Variable that names the folder of real frames."""
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data"
-"""Default folder of real frames, next to the repository."""
+"""Folder of real frames, next to the repository, if ``PACKETMESH_SHARED_DATA`` is not set."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +40,7 @@ class Site:
     group: str
     """``held-out rooms``, ``demo scenes``, ``real frames`` or a user's set."""
     examples: Callable[[], Iterator[Example]] = field(repr=False)
-    """Returns the images; they depend only on the name and the code."""
+    """Returns the images; they depend only on the site's name, the code and the files of the site."""
     truth: bool = True
     """Whether the reference is the truth; otherwise it is the sensor's own depth, with unknown errors."""
     cap_m: float = INDOOR_CAP_M
@@ -47,7 +48,7 @@ class Site:
 
 
 def sites() -> tuple[Site, ...]:
-    """Return all sites on this machine; the thesis's three scenes first."""
+    """Return all sites on this machine, the three held-out scenes first."""
     return (*held_out_scenes(), *demo_scenes(), *real_frames(), *user_sets())
 
 
@@ -61,19 +62,19 @@ def held_out_scenes(rooms: int = ROOMS_PER_SCENE, views: int = VIEWS_PER_ROOM) -
 
 
 def demo_scenes() -> tuple[Site, ...]:
-    """Return the nodes of every demo scene."""
+    """Return a site for each demo scene that needs no calibration, with the images of its nodes."""
     return tuple(Site(name, "demo scenes", partial(demo, name)) for name in CALIBRATED_SCENES)
 
 
 def real_frames() -> tuple[Site, ...]:
-    """Return every registered RGB-D pair of the real data; none without such a folder."""
+    """Return a site for each registered RGB-D pair of the real data; none if there is no such folder."""
     return tuple(
         Site(folder.name, REAL, partial(real_frame, folder), truth=False) for folder in real_folders()
     )
 
 
 def real_folders() -> tuple[Path, ...]:
-    """Return the folders with color.png, depth.png and intrinsics.json below ``PACKETMESH_SHARED_DATA``."""
+    """Return the sorted folders of real frames: those with a depth.png; their other files are not checked."""
     data = Path(os.environ.get(DATA_VARIABLE, DATA))
     return tuple(sorted(depth.parent for depth in data.glob("*/depth.png")))
 
@@ -91,7 +92,7 @@ def real_frame(folder: Path) -> Iterator[Example]:
 
 
 def user_sets() -> tuple[Site, ...]:
-    """Return the sets that ``PACKETMESH_DEPTH_SETS`` names, with all their images."""
+    """Return a site for each set that ``PACKETMESH_DEPTH_SETS`` names, with all its images."""
     named = named_sets()
     kinds = [text.partition("=")[0].strip().lower() for text in named]
     return tuple(

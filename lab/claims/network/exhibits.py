@@ -38,7 +38,7 @@ Row = tuple[str | float | int | None, ...]
 
 
 def figure_4_10(found: Found) -> tuple[Exhibit, ...]:
-    """Return images per minute, coverage and requests over the number of vehicles, and their table."""
+    """Return charts of images, coverage and requests over the vehicles, and a table of all metrics."""
     rows = [(scheme, n, *_cells(found, Case(scheme, n))) for n in OBJECTS for scheme in SCHEMES]
     return (
         _over_objects(found, "images_per_minute", "Images received (Fig. 4.10)", "images/min"),
@@ -56,7 +56,7 @@ def figure_4_10(found: Found) -> tuple[Exhibit, ...]:
 
 
 def caps_exhibits(found: Found) -> tuple[Exhibit, ...]:
-    """Return charts and table of the effect of k."""
+    """Return charts of images and requests over k, and a table of all metrics."""
     x = [UNLIMITED_AT if k is None else float(k) for k in CAPS]
     cases = [Case("greedy", CAPPED_OBJECTS, k) for k in CAPS]
     note = f"The point at {UNLIMITED_AT:g} has no cap. {ORIGIN}"

@@ -44,13 +44,13 @@ class LinkRuns:
 
 
 def model_a(images: int) -> NetworkConfig:
-    """Return three nodes that share an unslotted IEEE 802.15.4 channel and always have data to send."""
+    """Return Model A's config: three nodes with data to send share an unslotted IEEE 802.15.4 channel."""
     config = replace(LINK, nodes=replace(LINK.nodes, images=images))
     return replace(config, run=replace(config.run, horizon_s=400.0 * images, keep="images"))
 
 
 def model_b(images: int) -> NetworkConfig:
-    """Return the same images over a serial line for each node."""
+    """Return Model B's config: each node sends the same images over a serial line of its own."""
     config = model_a(images)
     return replace(config, mac=replace(config.mac, kind="serial", link_bps=SERIAL_BPS))
 
@@ -75,9 +75,10 @@ def mape(model_s: FloatArray) -> float:
 
 
 def line_through_origin(best: Callable[[FloatArray], float] | None = None) -> float:
-    """Return seconds per image: by least squares, or the slope with the smallest ``best``.
+    """Return the slope of a line through the origin, seconds per image: by least squares, or by ``best``.
 
-    The mean absolute relative error is piecewise linear in the slope, so one of the rows gives the minimum.
+    ``best`` returns the error of (rows,) seconds. Only the slopes through single rows are tried: one of
+    them has the smallest ``mape``, which is piecewise linear in the slope with kinks there.
     """
     n, seconds = np.array(IMAGES, float), np.array(THESIS_S)
     if best is None:
@@ -174,7 +175,7 @@ def _c28(runs: LinkRuns) -> Outcome:
 
 
 def _undecided(radio_s: float, serial_s: float) -> str:
-    """Return a sentence on the table's evidence about models with these times for one image per node."""
+    """Return a sentence on whether the table's scatter excludes A or B, by their times for one image."""
     low, high = slope_interval()
     left = [name for name, one in (("A", radio_s), ("B", serial_s)) if low <= one <= high]
     verdict = (

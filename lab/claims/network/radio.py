@@ -35,10 +35,12 @@ PLACES = 4
 
 @dataclass(frozen=True, slots=True)
 class Throughputs:
-    """Saturated throughput in bit/s, by number of stations and run, and Bianchi's."""
+    """Saturated throughputs of simulation and model, bit/s."""
 
     runs: tuple[tuple[float, ...], ...]
+    """Simulated, by number of stations and run."""
     theory: tuple[float, ...]
+    """Bianchi's model, by number of stations."""
 
     @property
     def errors(self) -> list[float]:
@@ -53,7 +55,7 @@ class Throughputs:
 
 
 def crowd(stations: int, seed: int, wait_after_loss: bool, duration_s: float = DURATION_S) -> Crowd:
-    """Return stations that send 1000 bytes with 28 bytes of UDP and IP headers by the street grid's MAC."""
+    """Return the task of a crowd with the street grid's MAC, 1000-byte images and 28-byte headers."""
     headers_bytes = STREET.scheme.headers_bytes
     nodes = NodesConfig(
         payload_bytes=STREET.scheme.image_bytes + headers_bytes, header_bytes=headers_bytes, spacing_m=10.0
@@ -65,7 +67,7 @@ def crowd(stations: int, seed: int, wait_after_loss: bool, duration_s: float = D
 def crowd_runs(
     folder: Path, scheduler: str | None
 ) -> Generator[Progress, None, tuple[Throughputs, Throughputs]]:
-    """Run by the standard, with an EIFS after a collision, and as Bianchi assumes, without one."""
+    """Return the throughputs with an EIFS after collisions (the standard), and without (Bianchi)."""
     tasks = [crowd(n, seed, wait) for wait in (True, False) for n in STATIONS for seed in range(RUNS)]
     found = yield from iterate_trials("C32, saturated stations", saturated, tasks, folder, scheduler)
     bps = [float(values["throughput_bps"] or 0.0) for values in found]
@@ -108,7 +110,7 @@ def _c32(runs: tuple[Throughputs, Throughputs]) -> Outcome:
 
 
 def _setup_rows() -> list[tuple[str, str | float, str | float]]:
-    """Return rows of the radio in the thesis and in the preset."""
+    """Return rows of a parameter's name, the thesis's value and the preset's."""
     return [
         ("medium access", "ieee80211b", STREET.mac.kind),
         ("RTS/CTS", "no", "yes" if STREET.mac.rts else "no"),

@@ -1,8 +1,8 @@
 """C36: the choice of M of N cameras that together see the most surface (SPEC 6.3).
 
-Each scene is a floor with spheres on it, like plants on a bench, and cameras around it that look at its
-middle. Visibility is geometric: a voxel is seen if it is in the picture, faces the camera and no sphere is in
-between.
+Each scene has spheres on the ground, like plants on a bench, with voxels on their surfaces, and cameras
+around them that look at the middle. Visibility is geometric: a camera sees a voxel that is in its picture and
+faces it if no sphere is in between.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class View:
     q: FloatArray
     """(N, V) visibility x resolution x incidence."""
     distances_m: FloatArray
-    """(N,) from each camera to the sink, in the middle."""
+    """(N,) distance from each camera to the sink, which is in the middle."""
     costs: FloatArray
     """(N,) bytes of an image of each camera."""
 

@@ -2,7 +2,7 @@
 
 The schemes' formulas are our reconstruction (SPEC 6.2) of Bruno & Nurchis, "Efficient data collection in
 multimedia vehicular sensing platforms" (arXiv 1311.6013), of which only the abstract and the first lines were
-available; every exhibit states this.
+available; the exhibits of the study state this.
 """
 
 from __future__ import annotations
@@ -49,7 +49,10 @@ def large_images(folder: Path, scheduler: str | None) -> Generator[Progress, Non
 
 
 def least_jpeg_bytes(width_px: int, height_px: int) -> int:
-    """Return the size of the smallest JPEG file of this image size: one colour, with optimal tables."""
+    """Return the size of a colour JPEG file of one grey, at the lowest quality and with optimal tables.
+
+    OpenCV writes it as a baseline file with three channels; other JPEG files can be smaller.
+    """
     image = np.full((height_px, width_px, 3), 128, np.uint8)
     options = [cv2.IMWRITE_JPEG_QUALITY, 1, cv2.IMWRITE_JPEG_OPTIMIZE, 1]
     return len(cv2.imencode(".jpg", image, options)[1])

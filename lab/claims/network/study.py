@@ -34,11 +34,11 @@ class Case:
     objects: int
     """Number of vehicles."""
     k: int | None = None
-    """Most ids in a request of greedy."""
+    """Most ids in a request of greedy; None is unlimited."""
     image_bytes: int = STREET.scheme.image_bytes
 
     def config(self, horizon_s: float = STREET.run.horizon_s) -> NetworkConfig:
-        """Return the config of its runs."""
+        """Return the config of its first run; the others differ in the seed."""
         scheme = replace(STREET.scheme, name=self.scheme, k=self.k, image_bytes=self.image_bytes)
         street = replace(STREET.street, vehicles=self.objects)
         return replace(STREET, scheme=scheme, street=street, run=replace(STREET.run, horizon_s=horizon_s))
@@ -78,7 +78,7 @@ def run_cases(
 
 
 def values(found: Found, case: Case, metric: str) -> list[float]:
-    """Return one metric of a case's runs that have it."""
+    """Return the values of a metric in those runs of a case that have it."""
     return [float(value) for run in found[case] if (value := run[metric]) is not None]
 
 

@@ -61,7 +61,7 @@ class TimedRun:
 
 
 def transfer(config: NetworkConfig) -> Values:
-    """Return when the last image was complete at the sink; None if the run ended before."""
+    """Return ``transfer_s``, when the last image was complete at the sink; None if the run ended before."""
     trace = simulate(config)
     arrived_ns = trace.events.of(EventKind.ARRIVE).t_ns
     complete = len(arrived_ns) == config.nodes.count * config.nodes.images

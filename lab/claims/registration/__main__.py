@@ -14,7 +14,7 @@ logger = logging.getLogger(__name__)
 
 
 def main() -> None:
-    """Tune, and write the module ``tuned``."""
+    """Tune the methods' parameters and write the module ``tuned``."""
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     parser = argparse.ArgumentParser(prog="python -m lab.claims.registration")
     parser.add_argument("folder", type=Path, help="keeps the trials, so that an interrupted run resumes")

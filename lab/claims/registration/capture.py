@@ -27,14 +27,14 @@ class CaptureTask:
     condition: Condition
     """Condition of the clouds."""
     room: int
-    """Room, which also selects the axes and directions of the starts, equal for every entrant."""
+    """Seed of ``box_room``, and of the starts' axes and directions, which are equal for every entrant."""
     entrant: Entrant
     gate_by_start: bool
-    """Whether the gate is twice the translation, if that is wider than the entrant's (SPEC 4.4 sets T_d so);
-    otherwise it is the entrant's."""
+    """Whether a start whose doubled translation exceeds the entrant's gate widens the gate to it (SPEC 4.4);
+    otherwise the gate is always the entrant's."""
     max_points: int
     rotations_deg: tuple[float, ...] = ROTATIONS_DEG
-    """Rotations of the starts, about any axis through the source's centre."""
+    """Rotations of the starts, about random axes through the source's centre."""
     translations_m: tuple[float, ...] = TRANSLATIONS_M
     """Translations of the starts, for each rotation."""
 
@@ -55,7 +55,7 @@ def map_capture(task: CaptureTask) -> list[dict[str, Any]]:
             rng = np.random.default_rng([task.room, row, column])
             T = wrong_start(case.T_true, points_m, rotation_deg, translation_m, rng)
             gate_m = max(config.gate_m, 2.0 * translation_m) if task.gate_by_start else config.gate_m
-            with suppress(PacketMeshError):  # without any pair near enough the start stays
+            with suppress(PacketMeshError):  # if no pair is near enough, T stays the start
                 T = register(
                     case.source, case.target, replace(config, gate_m=gate_m), T, method=method
                 ).T_target_source

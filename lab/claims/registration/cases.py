@@ -24,9 +24,10 @@ Clouds = Literal["inferred", "sensor", "fused"]
 NODE_REACH_M = 1.0 / (2.0 * np.sin(np.radians(12.5)))
 """Distance from the middle at which cameras 25 degrees apart are 1 m from each other (SPEC 4.8)."""
 EDGE_BLUR_PX = 1.5
-"""Blur of depth edges, as in a network's depth; 1 / z is blurred, which leaves planes planar."""
+"""Standard deviation of the blur of depth edges, which imitates a network's depth; 1 / z is blurred, which
+leaves planes planar."""
 PARTNER_M = 0.05
-"""A point with another this near at the true pose belongs to the overlap."""
+"""A point belongs to the overlap if the other cloud has a point within this distance at the true pose."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,24 +37,26 @@ class Condition:
     name: str
     label: str
     clouds: Clouds
-    """``inferred``: a node's complete cloud onto its sensor cloud; else one node onto its neighbour, with
-    sensor clouds, or with complete clouds that fill the sensor's holes."""
+    """``inferred`` registers a node's complete cloud to its sensor cloud; ``sensor`` and ``fused`` register a
+    node to its neighbour, with the sensor clouds alone or with holes filled from the complete clouds."""
     bias: float = 0.0
-    """Relative depth bias of the complete cloud."""
+    """Standard deviation of the complete cloud's smooth relative depth error."""
     holes: float = 1.0
-    """Factor by which the sensor's holes are enlarged."""
+    """Factor by which the area of the sensor's holes grows."""
     outliers: float = 0.0
     """Share of the sensor cloud that is replaced by outliers."""
     start_deg: float = 3.0
     start_m: float = 0.06
+    """Rotation (``start_deg``) and translation of the start from the true pose."""
     angle_deg: float = 25.0
     """Angle between the directions of two nodes."""
     overlap: float | None = None
-    """Share of the source with a partner in the target; None leaves it unchanged, about 0.6."""
+    """Share of the source's points with a partner in the target; None leaves it unchanged: about 0.6 for two
+    nodes."""
 
     @property
     def gate_m(self) -> float:
-        """T_d of all methods: 0.3 m, or twice the distance of the start (SPEC 4.4)."""
+        """T_d of all methods: 0.3 m, or twice the start's translation if that is more (SPEC 4.4)."""
         return max(0.3, 2.0 * self.start_m)
 
 
@@ -102,7 +105,7 @@ class Case:
 
 
 def make_case(condition: Condition, room: int) -> Case:
-    """Return the condition's complete clouds in room number ``room``; equal arguments give equal cases."""
+    """Return a condition's case in ``box_room(room)``, with all points; equal arguments give equal cases."""
     rng = np.random.default_rng([room, 47])
     if condition.clouds == "inferred":
         sensor, inferred, _ = _node(box_room(room), 0, condition, room, rng)
@@ -123,7 +126,8 @@ def make_case(condition: Condition, room: int) -> Case:
 def wrong_start(
     T_true: FloatArray, points_m: FloatArray, angle_deg: float, distance_m: float, rng: np.random.Generator
 ) -> FloatArray:
-    """Return the (4, 4) true pose, randomly rotated about the (N, 3) points' centre and shifted."""
+    """Return the (4, 4) true pose, rotated by ``angle_deg`` about a random axis through the centre of the
+    (N, 3) points, and shifted by ``distance_m`` in a random direction."""
     axis, shift_m = rng.normal(size=(2, 3))
     rotation = rotation_exp(np.radians(angle_deg) * axis / np.linalg.norm(axis))
     center_m = apply(T_true, points_m.mean(axis=0, keepdims=True))[0]
@@ -132,7 +136,7 @@ def wrong_start(
 
 
 def random_subset(cloud: PointCloud, count: int, seed: int) -> PointCloud:
-    """Return at most ``count`` points, in their order."""
+    """Return a random subset of at most ``count`` points, in their order."""
     if len(cloud) <= count:
         return cloud
     chosen = np.random.default_rng([seed, 4000]).choice(len(cloud), count, replace=False)
@@ -142,7 +146,7 @@ def random_subset(cloud: PointCloud, count: int, seed: int) -> PointCloud:
 def _node_cloud(
     scene: Scene, index: int, condition: Condition, room: int, rng: np.random.Generator
 ) -> tuple[PointCloud, FloatArray]:
-    """Return the cloud of one of two nodes that is registered, and its true T_world_camera."""
+    """Return the cloud that one of two nodes registers, and the node's true T_world_camera."""
     sensor, inferred, T_world_camera = _node(scene, index, condition, room, rng)
     if condition.clouds == "sensor":
         return sensor, T_world_camera
@@ -167,7 +171,7 @@ def _node(
 
 
 def _blurred_edges(z_m: FloatArray) -> FloatArray:
-    """Return (H, W) depth whose edges extend over a few pixels; unknown where the true depth is."""
+    """Return (H, W) depth with edges blurred over a few pixels; NaN where ``z_m`` is not finite."""
     known = np.isfinite(z_m)
     inverse_m = np.where(known, 1.0 / np.where(known, z_m, 1.0), 0.0).astype(np.float64)
     weight = cv2.GaussianBlur(known.astype(np.float64), (0, 0), EDGE_BLUR_PX)
@@ -176,7 +180,7 @@ def _blurred_edges(z_m: FloatArray) -> FloatArray:
 
 
 def partnered(source: PointCloud, target: PointCloud, T_true: FloatArray) -> np.ndarray:
-    """Return (N,) whether each source point has a target point near it at the true pose."""
+    """Return (N,) whether each source point has a target point within ``PARTNER_M`` at the true pose."""
     tree = cKDTree(target.points_m)
     return tree.query(apply(T_true, source.points_m), distance_upper_bound=PARTNER_M)[0] <= PARTNER_M
 
@@ -184,7 +188,10 @@ def partnered(source: PointCloud, target: PointCloud, T_true: FloatArray) -> np.
 def _with_overlap(
     source: PointCloud, target: PointCloud, T_true: FloatArray, overlap: float, seed: int
 ) -> tuple[PointCloud, PointCloud]:
-    """Return both clouds with exactly this overlap: crop the target, or drop unpaired source points."""
+    """Return both clouds with this overlap: drop source points without a partner, or crop the target.
+
+    A crop reaches the overlap only approximately: a bisection measures it on 2,000 source points.
+    """
     shared = partnered(source, target, T_true)
     if shared.mean() < overlap:
         lone = np.flatnonzero(~shared)

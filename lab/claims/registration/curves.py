@@ -58,12 +58,12 @@ def convergence_charts(results: Results, condition: str) -> tuple[Chart, ...]:
 
 
 def held(values: Sequence[float], length: int) -> FloatArray:
-    """Return (length,) the values, the last one repeated."""
+    """Return the first ``length`` values; if there are fewer, the last one is repeated."""
     return np.array(values)[np.minimum(np.arange(length), len(values) - 1)]
 
 
 def error_by_time(trial: dict) -> FloatArray:
-    """Return (T,) point error that a run has reached at each of ``SECONDS``."""
+    """Return (T,) point error in cm that a run has reached at each of ``SECONDS``."""
     errors_cm = np.array(trial["curve_error_cm"])
     return errors_cm[np.searchsorted(trial["elapsed_s"], SECONDS, side="right")]
 

@@ -12,23 +12,25 @@ from pipeline.types import FloatArray, IntArray, PointCloud
 LEAST_PAIRS = 6
 MAX_ITERATIONS = 50
 TUKEY_WIDTH = 4.685 * 1.4826
-"""Cutoff over the median distance: pairs beyond it have no weight."""
+"""Ratio of the cutoff to the median distance: pairs beyond the cutoff have no weight."""
 STILL = 1e-9
 """Largest change of the pose's entries at convergence."""
 
 
 def pixel_pair_poses(source: PointCloud, target: PointCloud) -> tuple[FloatArray, ...]:
-    """Robust Procrustes on pairs of equal pixels, by Tukey's biweight (SPEC 4.6).
+    """Register one camera's two clouds by robust Procrustes on pairs of equal pixels (SPEC 4.6).
+
+    Tukey's biweight weighs the pairs.
 
     Args:
-        source: with the pixels of its points.
-        target: of the same camera.
+        source: the cloud that moves; both clouds have pixels.
+        target: the cloud that stays, of the same camera.
 
     Returns:
         (4, 4) T_target_source after every iteration.
 
     Raises:
-        ReconstructionError: the clouds share fewer than 6 pixels.
+        ReconstructionError: a cloud has no pixels, both share fewer than 6, or those points are collinear.
     """
     source_m, target_m = (
         cloud.points_m[rows]
@@ -59,7 +61,7 @@ def shared_pixels(source: PointCloud, target: PointCloud) -> tuple[IntArray, Int
 
 
 def _keys(cloud: PointCloud) -> IntArray:
-    """Return (N,) one number for each pixel."""
+    """Return (N,) an integer that identifies each point's pixel."""
     if cloud.pixels is None:
         raise ReconstructionError("Pixel pairs need clouds that know their pixels.")
     return cloud.pixels[:, 0].astype(np.int64) << 32 | cloud.pixels[:, 1].astype(np.int64)

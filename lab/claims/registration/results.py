@@ -12,7 +12,7 @@ from pipeline.types import FloatArray
 
 
 class Results:
-    """Every trial of a benchmark; values of different entrants are in the same order of cases.
+    """All trials of a benchmark; the values of all entrants have the same order of cases.
 
     Args:
         trials: trials from ``run_case``, case by case.
@@ -49,6 +49,6 @@ class Results:
         name: str = "point_error_cm",
         direction: Direction = "q2p",
     ) -> FloatArray:
-        """Return (N,) one number of every trial; NaN without one."""
+        """Return (N,) one measure of each of an entrant's trials; NaN where a trial has none."""
         found = (trial[name] for trial in self.trials(entrant, conditions, direction))
         return np.array([np.nan if value is None else float(value) for value in found])

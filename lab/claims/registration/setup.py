@@ -20,26 +20,26 @@ CAPTURE_ROOMS = 6
 CURVE_CONDITIONS = ("easy", "nodes-sensor")
 """Conditions with recorded convergence curves (Fig. 4.9)."""
 CURVED = ("icp", "picp", "ricp", "mricp", "ficp", "hicp", "ceicp-n", "ceicp-a", "icp plane", "ceicp-a plane")
-"""Entrants with curves: the methods of Table 4.4, and the plane metric."""
+"""Entrants with recorded curves: the methods of Table 4.4 (CEICP as N and A), and ICP and CEICP-A with the
+plane metric."""
 ABLATED = ("easy", "bias-3", "holes-x3", "outliers-20", "nodes-sensor", "nodes-fused")
 """Conditions of the ablations."""
 REVERSED = (
     *("icp", "icp-gated", "picp", "ricp", "mricp", "ficp", "hicp", "ceicp-literal", "ceicp-n", "ceicp-a"),
     *("icp plane", "icp-gated plane", "ceicp-n plane", "ceicp-a plane"),
 )
-"""Entrants that also match target to source: Table 4.4 and the plane metric. The overlap series has one
-direction."""
+"""Entrants that also run with the target matched to the source (p2q), except on the overlap series."""
 OVERLAPPING = ("ficp", "ceicp-a")
-"""Methods that also run point to point on the overlap series; those without a gate fail there."""
+"""The only methods that run point to point on the overlap series."""
 SLOW = {
     "kernel-correlation": ("easy", "nodes-sensor"),
     "ceicp-ml": ("easy", "holes-x3", "nodes-sensor"),
 }
-"""Methods that take several times as long as others, and their conditions."""
+"""Methods that take several times as long as others, and the only conditions in which they run."""
 PLANE = ("icp", "icp-gated", "picp", "ficp", "fast-robust-icp", "ceicp-n", "ceicp-a", "ceicp-r")
 """Methods that also run with the point-to-plane metric."""
 FAST_PEERS = ("open3d-plane", "open3d-gicp", "small-gicp", "small-gicp-staged", "small-vgicp-staged")
-"""Other programs that take well under a second; CPD takes minutes per condition."""
+"""Other programs that take well under a second; CPD is left out: it takes minutes per condition."""
 FIXED_GATE = "ceicp-n, T_d 0.3 m"
 CAPTURED = (
     (Entrant("icp"), True),
@@ -48,11 +48,11 @@ CAPTURED = (
     (Entrant("ceicp-n"), True),
     (Entrant("ceicp-a", "plane"), True),
 )
-"""Entrants with a capture map, and whether the gate grows with the start's distance."""
+"""Entrants with a capture map, and whether the gate grows with the start's translation."""
 
 
 def case_tasks() -> list[CaseTask]:
-    """Return a trial of each condition in each room, with tuned entrants."""
+    """Return one task for each condition in each room, with tuned entrants."""
     lineups = {name: standard_lineup(condition) for name, condition in CONDITIONS.items()}
     return [
         CaseTask(CONDITIONS[name], room, lineup, MAX_POINTS, CURVED if name in CURVE_CONDITIONS else ())
@@ -62,7 +62,7 @@ def case_tasks() -> list[CaseTask]:
 
 
 def capture_tasks() -> list[CaptureTask]:
-    """Return the capture ranges in each of the first few rooms."""
+    """Return one task for each entrant with a capture map in each of the first ``CAPTURE_ROOMS`` rooms."""
     return [
         CaptureTask(CONDITIONS["easy"], room, entrant, by_start, MAX_POINTS)
         for room in ROOMS[:CAPTURE_ROOMS]
@@ -71,10 +71,10 @@ def capture_tasks() -> list[CaptureTask]:
 
 
 def standard_lineup(condition: Condition) -> Lineup:
-    """Return the entrants of a condition.
+    """Return the entrants of a condition, each with its direction of matching.
 
-    Both metrics run everywhere, except on the overlap series, where few run point to point. A node's own two
-    clouds share their pixels, so pixel pairs take part.
+    Methods run point to point, on the overlap series only those in ``OVERLAPPING``; those in ``PLANE`` also
+    run with the plane metric. Pixel pairs take part where both clouds are one node's and share their pixels.
     """
     name, single = condition.name, condition.clouds == "inferred"
     everyone = [e for e in methods() if name in SLOW.get(e.method, CONDITIONS)]
@@ -99,7 +99,7 @@ def tuned(entrant: Entrant) -> Entrant:
 
 
 def methods(metric: Metric = "point") -> tuple[Entrant, ...]:
-    """Return every method, and ICP with a gate, with one metric."""
+    """Return all methods and gated ICP with one metric; with the plane metric only those in ``PLANE``."""
     names = ("icp", "icp-gated", *(name for name in METHODS if name != "icp"))
     return tuple(Entrant(name, metric) for name in names if metric == "point" or name in PLANE)
 
@@ -110,7 +110,7 @@ def peers() -> tuple[Entrant, ...]:
 
 
 def ablations(metric: Metric) -> tuple[Entrant, ...]:
-    """Return CEICP variants without a part; the thesis's own formula only exists point to point."""
+    """Return CEICP variants with one part removed or changed; the thesis's formula is point to point only."""
     name = "ceicp-a" if metric == "point" else "ceicp-a plane"
     shared = tuple(
         Entrant(f"ceicp-a-{part}", metric, f"{name}, {label}", _like(name))
@@ -132,5 +132,5 @@ def ablations(metric: Metric) -> tuple[Entrant, ...]:
 
 
 def _like(name: str) -> tuple[tuple[str, float | str], ...]:
-    """Return the tuned setting of another entrant."""
+    """Return the tuned setting of the entrant ``name``; empty if it was not tuned."""
     return ((TUNED[name][0], TUNED[name][1]),) if name in TUNED else ()

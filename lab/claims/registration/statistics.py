@@ -23,7 +23,7 @@ class Comparison:
     win_rate: float
     """Share of cases with the smaller error; equal errors count half."""
     p: float
-    """Two-sided Wilcoxon signed-rank test of the logarithms of the ratios, Holm-corrected by ``holm``."""
+    """p value of the two-sided Wilcoxon signed-rank test of the ratios' logarithms; ``holm`` corrects it."""
     cases: int
 
     @property
@@ -35,7 +35,10 @@ class Comparison:
 
 
 def compare(rival: str, ours: FloatArray, theirs: FloatArray) -> Comparison:
-    """Compare errors (N,) of two methods on the same cases, as logarithms: no condition outweighs another."""
+    """Compare (N,) errors of two methods on the same cases, with an uncorrected p.
+
+    The test uses the logarithms of the ratios, so that no condition outweighs another.
+    """
     ours, theirs = np.asarray(ours, float), np.asarray(theirs, float)
     log_ratio = np.log(np.maximum(ours, 1e-12)) - np.log(np.maximum(theirs, 1e-12))
     p = float(wilcoxon(log_ratio).pvalue) if np.any(log_ratio) else 1.0

@@ -38,7 +38,7 @@ ABLATIONS: tuple[tuple[str, str, str], ...] = (
     ("scale held at T_d / 3, A plane", "ceicp-a plane, fixed sigma", "ceicp-a plane"),
     ("both directions, A plane", "ceicp-a plane, both directions", "ceicp-a plane"),
 )
-"""Description of the change, the entrant with it and the one without."""
+"""Description of the change, the entrant with it, and the entrant without it."""
 
 
 def table_4_4(results: Results) -> Table:
@@ -163,7 +163,7 @@ def ablation_table(results: Results) -> Table:
 
 
 def tuning_table() -> Table:
-    """Return the tuned parameters, the tried values and the choice."""
+    """Return a table of each entrant's tuned parameter, chosen value, and scores of all tried values."""
     rows = []
     for name, (parameter, value, scores) in TUNED.items():
         tried = "; ".join(f"{key:g}: {score:.3g}" for key, score in scores.items())
@@ -194,7 +194,7 @@ def _ratio(changed_cm: np.ndarray, whole_cm: np.ndarray) -> str:
 
 
 def _starts(results: Results, conditions: Sequence[str]) -> str:
-    """Return a sentence on the start errors and the overlap of node clouds."""
+    """Return a sentence with each condition's median start error and mean overlap."""
     parts = []
     for condition in conditions:
         trials = results.trials(results.entrants((condition,))[0], (condition,))

@@ -21,8 +21,8 @@ from pipeline.surface.voxel import voxel_average
 from pipeline.types import FloatArray, PointCloud
 
 AHD_VOXEL_M = 0.01
-"""Spacing to which both clouds are thinned before their distance is measured (SPEC 4.7); at 8 cm the true
-pose already has 4 to 5 cm, and 2 cm of error add 0.6 (SPEC 4.10)."""
+"""Spacing to which both clouds are thinned before their distance is measured (SPEC 4.7). With 8 cm the
+distance is already 4 to 5 cm at the true pose, and an error of 2 cm adds only 0.6 cm (SPEC 4.10)."""
 AHD_POINTS = 4000
 """Most points of the overlap, in each cloud, over which the distance is averaged."""
 CURVE_ITERATIONS = (0, 1, 2, 3, 5, 8, 12, 20, 32, 50, 100)
@@ -40,7 +40,7 @@ class CaseTask:
     """Seed of ``box_room``."""
     lineup: Lineup
     max_points: int
-    """Number of points to which both clouds are thinned for all entrants."""
+    """Largest number of points of each cloud; all entrants get the same random subset."""
     curved: tuple[str, ...] = ()
     """Names of the entrants whose error after every iteration is also recorded."""
 
@@ -51,7 +51,9 @@ class Run:
 
     poses: tuple[FloatArray, ...]
     iterations: int | None
+    """None if another program does not report them, or if the entrant could not begin."""
     elapsed_s: tuple[float, ...]
+    """Time from the clouds to the end of each iteration; another program has one value, pixel pairs none."""
     stop_reason: str
 
 
@@ -74,14 +76,14 @@ class Ruler:
         return round(100.0 * float(np.sqrt(max(squared_m2, 0.0))), DIGITS)
 
     def ahd_cm(self, T: FloatArray) -> float:
-        """Return the average Hausdorff distance over points with a partner at the true pose."""
+        """Return the average Hausdorff distance in cm over points with a partner at the true pose."""
         onto_m = self._target_tree.query(apply(T, self._source_m))[0].mean()
         back_m = self._source_tree.query(apply(inverse(T), self._target_m))[0].mean()
         return round(50.0 * float(onto_m + back_m), DIGITS)
 
 
 def _overlapping_m(cloud: PointCloud, other: PointCloud, T_true: FloatArray) -> FloatArray:
-    """Return (N, 3) a random subset of the points that have a partner at the true pose."""
+    """Return (N, 3) points with a partner at the true pose: at most ``AHD_POINTS``, drawn at random."""
     return random_subset(cloud.select(partnered(cloud, other, T_true)), AHD_POINTS, 0).points_m
 
 
@@ -124,7 +126,7 @@ def run_case(task: CaseTask) -> list[dict[str, Any]]:
 
 
 def run_entrant(entrant: Entrant, case: Case, direction: Direction, gate_m: float) -> Run:
-    """Return all poses of one entrant; one that cannot begin stays at the start, with the reason."""
+    """Return all poses of one entrant; if it cannot begin, only the start, with the reason as stop reason."""
     try:
         if entrant.is_peer:
             return _run_peer(entrant, case, direction, gate_m)
@@ -154,7 +156,7 @@ def _run_peer(entrant: Entrant, case: Case, direction: Direction, gate_m: float)
 
 
 def k90(errors: Sequence[float]) -> int | None:
-    """Return the iterations until nine tenths of the drop from first to last error; None without a drop."""
+    """Return the iterations until 90 % of the drop from the first to the last error; None without a drop."""
     drop = errors[0] - errors[-1]
     if drop <= 0:
         return None

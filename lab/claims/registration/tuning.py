@@ -20,7 +20,7 @@ from packetmesh.progress import Progress
 from pipeline.config import Direction
 
 ROOMS = range(1000, 1004)
-"""Rooms that are used for nothing else."""
+"""Seeds of ``box_room`` that are used for nothing else."""
 TUNING_CONDITIONS = ("easy", "holes-x3", "large-start", "nodes-sensor")
 GATES = (0.25, 0.5, 1.0, 2.0)
 SMALLEST_M = (0.01, 0.02, 0.03, 0.04)
@@ -40,7 +40,8 @@ CANDIDATES: dict[str, tuple[str, tuple[float, ...]]] = {
     "kernel-correlation": (GATE_SCALE, GATES),
     "fast-robust-icp": ("nu_min_m", SMALLEST_M),
 }
-"""The most important parameter and its values. Plain ICP has none; other programs get ``gate_scale``."""
+"""By method: its most important parameter and the values to try. Plain ICP has none; other programs get
+``gate_scale``."""
 
 HEADER = '''"""What tuning chose; written by ``python -m lab.claims.registration``."""
 
@@ -81,7 +82,7 @@ def tune(
 
 
 def tuning_lineup() -> Lineup:
-    """Return every entrant with each of its values."""
+    """Return every entrant once for each value of its parameter."""
     lineup: list[tuple[Direction, Entrant]] = []
     for entrant in (*methods(), *methods("plane"), *peers()):
         parameter, values = CANDIDATES.get(entrant.method, (GATE_SCALE, GATES))

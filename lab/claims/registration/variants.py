@@ -1,4 +1,4 @@
-"""Methods without a part, for the ablations of SPEC 4.8, or with an exposed parameter, for tuning."""
+"""Variants of methods: a part removed for the ablations of SPEC 4.8, or a parameter exposed for tuning."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class GatedIcp(Icp):
 
 @dataclass(frozen=True, slots=True)
 class GaussianA(CeicpA):
-    """CEICP-A without the entropy factor: w = p."""
+    """CEICP-A without the entropy factor: w = p. With the plane metric p lacks the normals' factor, too."""
 
     def weigh(self, matching: Matching) -> PairWeights:
         """Return the pairs of CEICP-A, with plain Gaussian weights."""
@@ -64,7 +64,7 @@ class HardGateA(CeicpA):
 
 @dataclass(frozen=True, slots=True)
 class WeightedCentroidsLiteral(CeicpLiteral):
-    """The thesis's weights with the matching weighted centroids, instead of eq. 3.12."""
+    """The thesis's formula with centroids weighted like the pairs; those of eq. 3.12 are unweighted."""
 
     @property
     def unweighted_centroids(self) -> bool:
@@ -94,7 +94,7 @@ class GatedRicp(Ricp):
 
 @dataclass(frozen=True, slots=True)
 class FicpWithExponent(Ficp):
-    """FICP with another lambda than 0.95."""
+    """FICP with a settable lambda; Ficp's is 0.95."""
 
     exponent: float
 
@@ -112,7 +112,7 @@ def _gaussian(kept: PairWeights, matching: Matching) -> PairWeights:
 
 
 def _as_kind(kind: type[PairWeighting], method: str) -> MethodStart:
-    """Return a method's own first state, as a state of a subclass."""
+    """Return a function that makes a method's first state as an instance of its subclass ``kind``."""
 
     def start(config: RegistrationConfig, source: PointCloud, target: PointCloud) -> PairWeighting:
         state = METHODS[method](config, source, target)
@@ -136,10 +136,10 @@ VARIANTS: dict[str, tuple[str, MethodStart]] = {
     "ceicp-n-gaussian": ("ceicp-n", _as_kind(GaussianN, "ceicp-n")),
     "ceicp-literal-centroids": ("ceicp-literal", _as_kind(WeightedCentroidsLiteral, "ceicp-literal")),
 }
-"""Every variant's method in the config, and its first state."""
+"""By variant: the name of its method in the config, and the function that makes its first state."""
 
 TUNABLE: dict[str, MethodStart] = {
     "ricp": lambda config, source, target: GatedRicp(config.seed, fixed_gate_m=config.gate_m),
     "ficp": lambda config, source, target: FicpWithExponent(LAMBDA),
 }
-"""Methods whose constants are no settings: their first state has the tuned constant as a field."""
+"""Methods whose tuned constant is not a setting: the function makes a first state with it as a field."""

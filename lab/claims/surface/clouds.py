@@ -36,7 +36,7 @@ class ChainClouds:
 
 
 def single_node(rig: Rig, index: int) -> Rig:
-    """Return node ``index`` of a rig with known truth as a rig of its own, the thesis's set-up."""
+    """Return node ``index`` of a rig with known truth as a rig of its own, as in the thesis."""
     assert rig.truth is not None
     pose = rig.truth.T_world_camera[index]
     frame = replace(rig.frames[index], T_world_camera=pose)
@@ -50,7 +50,7 @@ def single_node(rig: Rig, index: int) -> Rig:
 
 
 def chain_clouds(rig: Rig, index: int, config: PipelineConfig) -> ChainClouds:
-    """Run a chain on node ``index`` of a rig with known truth, up to the ball."""
+    """Run a chain on node ``index`` of a rig with known truth, up to the clouds for ball pivoting."""
     alone = single_node(rig, index)
     assert alone.truth is not None
     frame = alone.frames[0]

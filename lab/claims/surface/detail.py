@@ -28,7 +28,7 @@ CLOUDS = 10
 SAMPLES = 10_000
 CLOSE_M = 0.01
 STRONG = -0.8
-"""Rank correlation below which a fall counts as monotone."""
+"""Largest rank correlation at which the accuracy counts as falling."""
 
 
 @dataclass(frozen=True, slots=True)

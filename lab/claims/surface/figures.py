@@ -16,7 +16,7 @@ FIGURES: tuple[tuple[str, str, str, float], ...] = (
     ("4.6", "after", "r_F", 0.0),
     ("4.7", "after", "r_F + sigma_D/2", 0.5),
 )
-"""Number, before or after fusion, the radius and its multiple of sigma_D."""
+"""Number of the figure, before or after fusion, name of the radius, and its multiple of sigma_D."""
 PICTURE_SIZE = 0.5
 """Picture size over the camera's own."""
 

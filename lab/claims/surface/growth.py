@@ -85,7 +85,10 @@ def size_trial(size: int) -> dict[str, Any]:
 
 
 def study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Growth]:
-    """Run terrains of one density one after the other on this machine: other work would disturb the times."""
+    """Run terrains of one density one after the other on this machine: other work would disturb the times.
+
+    ``scheduler`` is not used.
+    """
     found = yield from iterate_trials("C24, growth", size_trial, SIZES, folder, processes=1)
     return Growth(
         tuple(SurfaceRun(**entry["ours"]) for entry in found),

@@ -31,7 +31,7 @@ RULES: dict[str, tuple[float, ...]] = {
     "r_F to r_F + sigma_D": SIGMAS["thesis"],
     "r_F to r_F + 4 sigma_D": SIGMAS["thesis+"],
 }
-"""Multiples of sigma_D that are added to r_F."""
+"""Multiples of sigma_D that are added to r_F, by the rule's name."""
 JUDGED = "r_F + sigma_D"
 CLOUDS = (
     ("sensor, thesis preset", "thesis", "before"),
@@ -41,12 +41,12 @@ CLOUDS = (
 )
 """Name, chain and stage of each cloud."""
 OWN_RULES = {"thesis": "r_F to r_F + sigma_D", "packetmesh": "r_F to r_F + 4 sigma_D"}
-"""Each chain's own rule, by which its accuracy is reported."""
+"""Each chain's own rule, by which its median depth error is reported."""
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """A surface as its camera sees it."""
+    """Measures of a surface along the rays of its camera."""
 
     no_hit_share: float
     """Share of all pixel rays without a hit."""
@@ -59,7 +59,7 @@ class Seen:
 
 
 Measured = dict[tuple[str, str, str], list[Seen]]
-"""By chain, ``before`` or ``after`` fusion, and rule: one for each frame, in the same order."""
+"""By chain, ``before`` or ``after`` fusion, and rule: the measures of each frame, in the same order."""
 
 
 def seen(clouds: ChainClouds, when: str, sigmas: tuple[float, ...]) -> Seen:

@@ -23,7 +23,7 @@ READINGS: dict[str, tuple[float, ...]] = {
     "r_F + {0, 1/2, 1, 2} sigma_D": (0.0, 0.5, 1.0, 2.0),
     "r_F + {0, 1/3, 2/3, 1} sigma_D": (0.0, 1 / 3, 2 / 3, 1.0),
 }
-"""The rule, an alternative that exceeds r_F + sigma_D, and equal steps."""
+"""Multiples of sigma_D by reading: the rule, an alternative that exceeds r_F + sigma_D, and equal steps."""
 
 
 def inferred_spacing(sigmas: tuple[float, ...]) -> tuple[float, float]:

@@ -27,10 +27,11 @@ VIEWS = 2
 HIDDEN_SHARE = 0.15
 """Share of the measured pixels that is hidden in each view."""
 ONE_IN = 25
-"""Every n-th hole pixel is used, so that a large hole counts for more than a small one."""
+"""One in so many hole pixels of each view is used, so that a large hole counts more than a small one."""
 TAKEOVERS_PX = (0.0, 5.0, 10.0, 20.0, 40.0)
-"""Distances from a rim that are tried for ``COMPLETED_FROM``, at 640 x 480."""
+"""Distances from a hole's rim, at 640 x 480, that are tried for ``COMPLETED_FROM``."""
 DIAGONAL_PX = 800.0
+"""Diagonal of an image of 640 x 480 pixels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +58,7 @@ class Judged:
     aligned: Evidence
     completed: Evidence
     errors: FloatArray
-    """(5, N) AbsRel of the two methods joined at each of the ``TAKEOVERS_PX``."""
+    """(5, N) relative error of the two methods joined at each of the ``TAKEOVERS_PX``."""
 
     @staticmethod
     def joined(parts: list[Judged]) -> Judged:
@@ -70,7 +71,13 @@ class Judged:
 
 
 def fit_confidence(rooms: int) -> Iterator[str]:
-    """Yield errors by takeover, coefficients from every other room, and their calibration in the others."""
+    """Yield lines of text: the error at each takeover, and the fitted coefficients with their calibration.
+
+    Every other room fits, the others judge.
+
+    Args:
+        rooms: number of validation rooms, at least 2.
+    """
     network = DepthNetwork()
     judged = [judged_room(FIRST_SEED["validation"] + k, network) for k in range(rooms)]
     errors = np.concatenate([kind.errors for room in judged for kind in room], axis=1).mean(axis=1)
@@ -89,7 +96,7 @@ def fit_confidence(rooms: int) -> Iterator[str]:
 
 
 def judged_room(seed: int, network: DepthNetwork) -> tuple[Judged, Judged]:
-    """Return pixels of the sensor's own holes and of hidden depth, in all views of one room."""
+    """Return the judged pixels of the sensor's own holes, and of hidden depth, in all views of one room."""
     rng = np.random.default_rng(seed)
     own, measured = [], []
     for example in held_out_rooms(range(seed, seed + 1), VIEWS):
@@ -102,7 +109,7 @@ def judged_room(seed: int, network: DepthNetwork) -> tuple[Judged, Judged]:
 def judged_view(
     example: Example, hidden: BoolArray, network: DepthNetwork, rng: np.random.Generator
 ) -> Judged:
-    """Return some of the hidden pixels, or of the sensor's own holes if none are hidden."""
+    """Fill a view by both methods; return some hidden pixels, or some of its own holes if none is hidden."""
     sensor = DepthMap(np.where(hidden, np.float32(np.nan), example.sensor.z_m))
     measured, distance = sensor.valid, distance_to_measured(sensor.valid)
     alignment = align_depth(network.infer(example.rgb), sensor, "local")
@@ -132,7 +139,7 @@ def judged_view(
 
 
 def fit(evidence: Evidence) -> FloatArray:
-    """Return (1 + F,) constant and feature weights with the largest likelihood."""
+    """Return (1 + F,) most likely coefficients of the log odds: the constant, then a weight per feature."""
     sign = 2.0 * evidence.right - 1.0
     rows = np.hstack([np.ones((len(sign), 1)), evidence.features])
     start = np.zeros(rows.shape[1])
@@ -140,7 +147,7 @@ def fit(evidence: Evidence) -> FloatArray:
 
 
 def calibration(fitted: FloatArray, evidence: Evidence) -> Iterator[str]:
-    """Yield, for each tenth of confidence: mean confidence, true share and number of pixels."""
+    """Yield a line for each tenth of confidence: mean confidence, share of right pixels, number of pixels."""
     confidence = expit(fitted[0] + evidence.features @ fitted[1:])
     for low in np.arange(0.0, 1.0, 0.1):
         inside = (confidence >= low) & (confidence < low + 0.1)

@@ -1,4 +1,4 @@
-"""Training frames with holes: the losses of sensors, and shapes of every size."""
+"""Training frames with holes: those that sensors leave, and shapes of every size."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ class Lesson:
 
     grid: Grid
     log_z: FloatArray
-    """(H, W) measured log depth; in the sensor's holes, the depth it would have measured; NaN without a
-    surface. Differences from a measured pixel start at its noisy value, as when depth is completed."""
+    """(H, W) measured log depth, with its noise; in the holes, true log depth with the sensor's bias; NaN
+    without a surface. A difference from a measured pixel starts at its noisy value, as in completion."""
 
 
 def lesson(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> Lesson:
-    """Return a view of a room as a random sensor sees it.
+    """Return a view of a room as a random sensor sees it, with all depth scaled by a random factor.
 
     Args:
         rgb: (240, 320, 3).
-        depth_m: (240, 320) true depth, NaN where there is none.
+        depth_m: (240, 320) true depth, NaN without a surface.
         rng: draws colours, the sensor's errors, and the holes.
     """
     rgb, depth_m = augment(rgb, depth_m, rng)
@@ -70,7 +70,7 @@ def lesson(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> Les
 
 
 def ragged(log_z: FloatArray, there: BoolArray, rng: np.random.Generator) -> FloatArray:
-    """Return depth with edges displaced by up to a cell and a few pixels between front and back."""
+    """Return log depth with edges displaced by up to a cell, and a few pixels between front and back."""
     window = np.ones((3, 3), np.uint8)
     front, back = cv2.erode(log_z, window), cv2.dilate(log_z, window)
     rows, columns = log_z.shape
@@ -83,7 +83,7 @@ def ragged(log_z: FloatArray, there: BoolArray, rng: np.random.Generator) -> Flo
 
 
 def astray(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
-    """Return colours as a badly registered camera sees them; sometimes they are nearly invisible."""
+    """Return colours shifted and turned as by bad registration, or sometimes noise about a single colour."""
     if rng.random() < COLORLESS:
         level = rng.integers(0, 256, 3)
         noise = rng.normal(0.0, rng.uniform(1.0, 20.0), rgb.shape)
@@ -96,7 +96,7 @@ def astray(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
 
 
 def hidden(log_z: FloatArray, there: BoolArray, rgb: ByteArray, rng: np.random.Generator) -> BoolArray:
-    """Return (H, W) pixels lost by this sensor: margins, edges, dark, far and random shapes, objects."""
+    """Return (H, W) True at lost pixels: margins, edges, dark, bright, far, random shapes, objects."""
     rows, columns = log_z.shape
     lost = np.zeros(log_z.shape, bool)
     top, bottom, left, right = rng.integers(0, 7, 4) if rng.random() < 0.7 else (0, 0, 0, 0)
@@ -121,7 +121,7 @@ def hidden(log_z: FloatArray, there: BoolArray, rgb: ByteArray, rng: np.random.G
 
 
 def around_edges(log_z: FloatArray, width_px: int, rng: np.random.Generator) -> BoolArray:
-    """Return a ragged band along depth steps, sometimes only on the far side, like a projector's shadow."""
+    """Return (H, W) True in a ragged band along depth steps, often only on the far side, like a shadow."""
     window = np.ones((3, 3), np.uint8)
     low, high = cv2.erode(log_z, window), cv2.dilate(log_z, window)
     edge = high - low > rng.uniform(0.03, 0.15)
@@ -133,7 +133,7 @@ def around_edges(log_z: FloatArray, width_px: int, rng: np.random.Generator) -> 
 
 
 def ellipse(shape: tuple[int, int], rng: np.random.Generator) -> BoolArray:
-    """Return a rotated ellipse anywhere, with half axes of 2 to 35 cells, all sizes equally likely."""
+    """Return (H, W) True in a random ellipse of about 2 to 35 cells; the log of its size is uniform."""
     rows, columns = shape
     radius = np.exp(rng.uniform(np.log(2.0), np.log(35.0)))
     axes = radius * np.exp(rng.normal(0.0, 0.25, 2))
@@ -144,7 +144,7 @@ def ellipse(shape: tuple[int, int], rng: np.random.Generator) -> BoolArray:
 
 
 def an_object(log_z: FloatArray, there: BoolArray, rng: np.random.Generator) -> BoolArray:
-    """Return the smooth surface piece around a random pixel, if it is not too large, with a small margin."""
+    """Return (H, W) True in the smooth piece of surface around a random pixel; empty if it is too large."""
     seeds = np.argwhere(there)
     y, x = seeds[rng.integers(len(seeds))]
     mask = np.zeros((log_z.shape[0] + 2, log_z.shape[1] + 2), np.uint8)

@@ -8,7 +8,7 @@ from torch import Tensor
 from pipeline.depth.slopes import DISTANCES, LOG_SCALES
 
 MEASURED_WEIGHT = 0.1
-"""Weight of differences between two measured pixels, which are not needed."""
+"""Weight of differences between two measured pixels, which completion does not use."""
 
 
 def negative_log_likelihood(output: Tensor, planes: Tensor, start: Tensor, log_z: Tensor) -> Tensor:

@@ -29,7 +29,10 @@ class Block(nn.Module):
 
 
 class CompletionNet(nn.Module):
-    """Maps (N, 8, H, W) of ``pipeline.depth.slopes.network_input`` to (N, 14, H, W)."""
+    """Maps (N, 8, H, W) of ``pipeline.depth.slopes.network_input`` to (N, 14, H, W).
+
+    H and W are multiples of 16.
+    """
 
     def __init__(self) -> None:
         super().__init__()

@@ -31,7 +31,7 @@ VALIDATION_SEED = 5
 
 
 def train_completion(config: CompletionConfig) -> None:
-    """Train until the time budget is spent; the network is in ``out/last.pt``.
+    """Train until the time budget is spent; write the network to ``out/last.pt``.
 
     Raises:
         InputError: there are no shards.
@@ -75,7 +75,7 @@ def learn(model: CompletionNet, optimizer: torch.optim.Optimizer, batch: list[Te
 
 @torch.no_grad()
 def validate(model: CompletionNet, frames: list[Tensor]) -> float:
-    """Return the negative log likelihood of frames of validation rooms."""
+    """Return the mean negative log likelihood of ``collate``'s frames."""
     model.eval()
     planes, start, log_z = frames
     output = torch.cat([model(part) for part in planes.split(16)])
@@ -84,7 +84,7 @@ def validate(model: CompletionNet, frames: list[Tensor]) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Frames(IterableDataset):
-    """Endless frames with holes: each epoch has every view once, also of the shards added before it."""
+    """Endless frames with holes; an epoch has every view once, including those of shards added before it."""
 
     data: Path
     seed: int
@@ -108,7 +108,7 @@ def validation_frames(data: Path) -> Iterator[tuple[FloatArray, FloatArray, Floa
 def frame(
     rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the network's input, the start and the truth of one view, all padded to the input's size."""
+    """Return the network's input, the start and the true log depth of one view, padded to one size."""
     seen = lesson(rgb, depth_m, rng)
     planes, start = network_input(seen.grid)
     pad = [(0, whole - part) for whole, part in zip(planes.shape[1:], start.shape, strict=True)]

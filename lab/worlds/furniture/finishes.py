@@ -31,7 +31,7 @@ BOOKS = (
 
 
 def pick(rng: Rng, palette: Sequence[str], color: str | None = None) -> FloatArray:
-    """Return ``color`` or one of a palette, slightly varied."""
+    """Return (3,) linear RGB: ``color``, or if it is None a random one of the palette, slightly varied."""
     if color is not None:
         return linear(color)
     return np.clip(linear(palette[int(rng.integers(len(palette)))]) * rng.uniform(0.85, 1.15, 3), 0.0, 0.95)
@@ -55,7 +55,7 @@ def wood(rng: Rng, color: Color, along: int = 0, gloss: float = 0.05) -> Materia
 
 
 def painted(rng: Rng, color: Color, gloss: float = 0.08) -> Material:
-    """Paint or lacquer, hardly mottled."""
+    """Paint or lacquer with slight unevenness."""
     return Material(textures.paint(color, draw_seed(rng)), gloss)
 
 
@@ -65,12 +65,12 @@ def ceramic(color: Color) -> Material:
 
 
 def black_plastic(gloss: float = 0.2) -> Material:
-    """The black plastic of screens and keyboards, which swallows infrared."""
+    """The black plastic of screens and keyboards, which absorbs infrared."""
     return plain((0.014, 0.014, 0.015), gloss, infrared=0.25)
 
 
 def chrome() -> Material:
-    """Polished metal: a mirror, without depth for the sensor."""
+    """Polished metal: a mirror, of which the sensor measures no depth."""
     return plain((0.55, 0.56, 0.58), 0.95, infrared=0.3)
 
 
@@ -85,12 +85,12 @@ def leaf(rng: Rng, color: Color) -> Material:
 
 
 def cardboard(rng: Rng, size_m: float) -> Material:
-    """Corrugated board with tape, on a box about its part's origin."""
+    """Corrugated board with tape, on a box about its part's origin with a longest side of ``size_m``."""
     return Material(textures.cardboard("#b08a5b", draw_seed(rng), size_m))
 
 
 def book(rng: Rng, color: Color) -> Material:
-    """Cloth-bound books that stand on z = 0 with their spines towards -y: lettering there, paper on top."""
+    """Cloth-bound books that stand on z = 0 with lettering on their spines, towards -y, and pages on top."""
     cover, title, pages = linear(color), linear("#d8c48e"), linear("#e8e0cc")
     bands = rng.uniform(0.03, 0.2, (3, 1)) + np.array([0.0, 0.004])
     bands[1, 1] += rng.uniform(0.015, 0.04)

@@ -1,4 +1,4 @@
-"""Parts of a room: windows, doors, rugs, pictures; wall pieces have their back at y = 0."""
+"""Windows, doors, radiators, rugs, pictures, shelves and clocks; wall pieces have their back at y = 0."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def window(
     panes: int = 2,
     recess_m: float = 0.0,
 ) -> list[Part]:
-    """A window with an outdoor view, a white frame and a sill; the origin is in the middle below.
+    """A window with an outdoor view, a white frame and a sill; the origin is the middle of its lower edge.
 
-    ``recess_m`` sets it back into a hole of the wall.
+    ``recess_m`` is the distance by which it is set back into a hole of the wall.
     """
     white = painted(rng, PAINTS[0], 0.15)
     width, height = size_m
@@ -140,7 +140,7 @@ def wall_shelf(
 
 
 def wall_clock(rng: Rng, T_world: FloatArray = ORIGIN, radius_m: float = 0.15) -> list[Part]:
-    """A round clock, a quarter past ten; the origin is its middle, on the wall."""
+    """A round clock that shows three o'clock; the origin is its middle, on the wall."""
     upright = (np.pi / 2.0, 0.0, 0.0)
     r = radius_m
     rim = lathe([(r, 0.0), (r, 0.035), (r - 0.012, 0.035), (r - 0.014, 0.02)], 48, 0.002)

@@ -1,4 +1,4 @@
-"""Lamps. A piece only glows; the scene adds a ``Light`` at its bulb."""
+"""Lamps, whose parts only glow: to light a room, its scene needs a ``Light`` at the bulb."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def table_lamp(rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = None)
 
 
 def pendant_lamp(rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = None) -> list[Part]:
-    """A metal dome on a cable, one metre below the ceiling, where the origin is."""
+    """A metal dome on a cable; the origin is on the ceiling, one metre above the dome's rim."""
     shell = enamel(pick(rng, PAINTS, color))
     outside = [(0.2, 0.0), (0.185, 0.06), (0.13, 0.13), (0.05, 0.17), (0.028, 0.2)]
     inside = [(0.024, 0.196), (0.046, 0.166), (0.126, 0.126), (0.181, 0.058), (0.196, 0.0), (0.2, 0.0)]
@@ -51,7 +51,7 @@ def pendant_lamp(rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = Non
 
 
 def desk_lamp(rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = None) -> list[Part]:
-    """An architect's lamp: a heavy foot, two arms and a cone that looks down towards -y."""
+    """An architect's lamp: a heavy foot, two arms and a cone that is open downwards and towards -y."""
     paint = painted(rng, pick(rng, PAINTS, color), 0.25)
     elbow, head = np.array([0.0, 0.14, 0.36]), np.array([0.0, -0.16, 0.5])
     arms = []

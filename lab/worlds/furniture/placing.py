@@ -1,4 +1,4 @@
-"""Placement of solids: a piece stands on its own floor, its front towards -y, and is moved as a whole."""
+"""Placement of solids in pieces and of pieces in rooms; a piece stands on z = 0, its front towards -y."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.types import FloatArray
 
 ORIGIN = np.eye(4)
+"""Pose of a piece whose frame is that of the world."""
 
 
 def place(x_m: float, y_m: float, yaw_rad: float = 0.0, z_m: float = 0.0) -> FloatArray:
@@ -25,7 +26,7 @@ def solid(
     turn_rad: Vector = (0.0, 0.0, 0.0),
     smooth: bool = True,
 ) -> Part:
-    """Return a part of a piece, shifted, and turned about the axis ``turn_rad`` by its length."""
+    """Return a part, in its piece turned by the rotation vector ``turn_rad`` and then shifted by ``at_m``."""
     T_piece_part = rigid(rotation_exp(np.asarray(turn_rad, float)), np.asarray(at_m, float))
     return Part(*mesh, material, T_world @ T_piece_part, smooth)
 
@@ -38,7 +39,7 @@ def board(
     turn_rad: Vector = (0.0, 0.0, 0.0),
     edge_m: float = 0.0,
 ) -> Part:
-    """A flat-sided block about ``at_m``, its edges cut by ``edge_m``."""
+    """A block centred on ``at_m`` of its piece, its edges bevelled by ``edge_m``."""
     mesh = rounded_box(size_m, edge_m, steps=1, cells=1) if edge_m else box(size_m)
     return solid(mesh, material, T_world, at_m, turn_rad, smooth=False)
 

@@ -18,7 +18,7 @@ POTS = ("#a65a3a", "#e6e1d6", "#4a5357", "#c9b28a", "#8fa79b")
 def potted_plant(
     rng: Rng, T_world: FloatArray = ORIGIN, height_m: float = 1.1, color: str | None = None, leaves: int = 26
 ) -> list[Part]:
-    """A leafy plant (rubber tree or fig): stems from a pot, a broad leaf at every turn."""
+    """A leafy plant (rubber tree or fig): three stems in a pot, with broad leaves in a spiral."""
     pot_m = float(np.clip(0.16 * height_m, 0.06, 0.17))
     stems, blades = [], []
     for k in range(3):

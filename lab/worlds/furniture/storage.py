@@ -43,7 +43,7 @@ def bookshelf(
     color: str | None = None,
     fill: float = 0.75,
 ) -> list[Part]:
-    """An open shelf, its back at y = depth / 2, with books over a share ``fill`` of each board."""
+    """An open shelf, its back at y = depth / 2, with books along a share ``fill``, 0 to 1, of each board."""
     grain = pick(rng, (*WOODS, PAINTS[0]), color)
     along, upright = wood(rng, grain), wood(rng, grain, along=2)
     width, depth, height = size_m
@@ -67,7 +67,7 @@ def books(
     tallest_m: float = 0.3,
     depth_m: float = 0.28,
 ) -> list[Part]:
-    """A row of upright books along +x from the origin, spines towards -y; some lean, some lie in a pile."""
+    """A row of upright books along +x from the origin, spines towards -y; some lean, some follow a gap."""
     by_color: dict[int, list[Mesh]] = {}
     x = 0.005
     while x < length_m:
@@ -93,7 +93,7 @@ def cabinet(
     color: str | None = None,
     doors: int = 3,
 ) -> list[Part]:
-    """A sideboard with doors and round knobs on short legs; low and wide, it carries a television."""
+    """A cabinet with doors and round knobs, on short legs."""
     grain = pick(rng, (*WOODS, PAINTS[0], PAINTS[3]), color)
     timber, knob = wood(rng, grain), steel(rng, "#b59a5b")
     width, depth, height = size_m

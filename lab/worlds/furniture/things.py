@@ -43,7 +43,7 @@ def cup(rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = None) -> lis
 def bottle(
     rng: Rng, T_world: FloatArray = ORIGIN, color: str | None = None, label: bool = True
 ) -> list[Part]:
-    """A dark wine bottle, 0.3 m high: the sensor measures no depth on glass."""
+    """A dark wine bottle, 0.3 m high, on whose glass the sensor measures no depth."""
     body = [(0.0, 0.006), (0.03, 0.0), (0.037, 0.006), (0.037, 0.19), (0.03, 0.215)]
     neck = [(0.0145, 0.235), (0.0135, 0.29), (0.016, 0.292), (0.016, 0.302), (0.0, 0.302)]
     glass = plain(color or "#1f3a29", 0.9, infrared=0.1)
@@ -90,7 +90,7 @@ def fruit_bowl(
 
 
 def book_pile(rng: Rng, T_world: FloatArray = ORIGIN, count: int = 3) -> list[Part]:
-    """Books that lie on each other, each a little turned."""
+    """A pile of lying books, each a little turned."""
     parts, z = [], 0.0
     for _ in range(count):
         thick, wide, deep = rng.uniform(0.015, 0.035), rng.uniform(0.14, 0.19), rng.uniform(0.2, 0.26)

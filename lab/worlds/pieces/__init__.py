@@ -1,4 +1,4 @@
-"""The contents of random rooms: furniture with objects on it, wall pieces, clutter and plain solids.
+"""Contents of random rooms: furniture with objects on it, wall pieces, clutter and plain solids.
 
 A piece is a list of parts that stands on z = 0 about the origin, its front towards -y, as in ``furniture``.
 """

@@ -16,6 +16,7 @@ from pipeline.kernels.geometry import rigid, rotation_exp
 
 
 def sofa(rng: Rng) -> list[Part]:
+    """A sofa with up to two loose cushions."""
     seats = int(rng.integers(1, 4))
     parts = seating.sofa(rng, width_m=0.3 + 0.75 * seats * rng.uniform(0.9, 1.1), seats=seats)
     for _ in range(int(rng.integers(0, 3))):
@@ -78,12 +79,14 @@ def bed(rng: Rng) -> list[Part]:
 
 
 def television(rng: Rng) -> list[Part]:
+    """A television on a low cabinet."""
     cabinet = storage.cabinet(rng, size_m=rng.uniform((1.1, 0.35, 0.35), (1.8, 0.5, 0.6)))
     on_top = place(0.0, 0.0, 0.0, float(bounds(cabinet)[1][2]))
     return cabinet + electronics.television(rng, on_top, rng.uniform(0.7, 1.3), bool(rng.integers(2)))
 
 
 def filled_crate(rng: Rng) -> list[Part]:
+    """A crate with up to four small objects in it."""
     size = rng.uniform((0.35, 0.3, 0.2), (0.6, 0.45, 0.35))
     half = (0.35 * size[0], 0.35 * size[1])
     return storage.crate(rng, size_m=size) + things_on(rng, (-half[0], -half[1]), half, 0.02, 4)

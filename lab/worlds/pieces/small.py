@@ -40,7 +40,15 @@ def small_thing(rng: Rng) -> list[Part]:
 def things_on(
     rng: Rng, low_m: tuple[float, float], high_m: tuple[float, float], z_m: float, count: int
 ) -> list[Part]:
-    """Small objects at random places on a board, without overlaps."""
+    """Small objects at random places on a board, without overlaps.
+
+    Args:
+        rng: random generator.
+        low_m: (x, y) lower corner of the places; objects reach at most 6 cm beyond the corners.
+        high_m: (x, y) upper corner.
+        z_m: height of the board.
+        count: number of objects that are tried; one that does not fit is left out.
+    """
     parts: list[Part] = []
     taken: list[tuple[FloatArray, FloatArray]] = []
     for _ in range(count):
@@ -55,7 +63,7 @@ def things_on(
 
 
 def laden(rng: Rng, furniture: list[Part], share: float = 0.85) -> list[Part]:
-    """Furniture with objects on its top."""
+    """Furniture with up to eight objects at the height of its highest point, on ``share`` of its size."""
     low, high = bounds(furniture)
     (x, y, _), (half_x, half_y, _) = 0.5 * (low + high), 0.5 * share * (high - low)
     top, count = float(high[2]) + 1e-3, int(rng.integers(0, 9))

@@ -1,4 +1,4 @@
-"""Pieces (lists of parts) as wholes: their bounds, their motion, and a stock of prebuilt ones."""
+"""Bounds and motion of pieces (lists of parts), a stock of prebuilt ones, and a weighted random choice."""
 
 from __future__ import annotations
 
@@ -15,28 +15,30 @@ from pipeline.types import FloatArray
 
 _Made = TypeVar("_Made")
 VARIANTS = 400
+"""Number of prebuilt pieces per maker and stock."""
 SEEDS_OF_A_SPLIT = 1_000_000
+"""Number of consecutive room seeds that share a stock."""
 Makers = Sequence[tuple[float, Callable[[], _Made]]]
 """Weights and makers of pieces or other objects."""
 
 
 @lru_cache(maxsize=2048)
 def stocked(maker: Callable[[Rng], _Made], variant: int) -> _Made:
-    """Return a maker's piece for its own seed, cached because building costs more than rendering."""
+    """Return a maker's piece for the seed ``variant``, cached because building costs more than rendering."""
     return maker(np.random.default_rng([variant, 404]))
 
 
 def from_stock(maker: Callable[[Rng], _Made], room_seed: int, rng: Rng) -> _Made:
-    """Return a random prebuilt piece of a kind, before recolouring, from the stock of the room's split.
+    """Return a random prebuilt piece of a maker, before recolouring, from the stock of the room's seed.
 
-    Seeds below a million are for training, below two million for validation, others for tests; the splits
-    share no piece.
+    Rooms whose seeds are in the same million share a stock; those of different millions share no piece. The
+    first million is for training, the second for validation, the others are for tests.
     """
     return stocked(maker, room_seed // SEEDS_OF_A_SPLIT * VARIANTS + int(rng.integers(VARIANTS)))
 
 
 def bounds(parts: list[Part]) -> tuple[FloatArray, FloatArray]:
-    """Return the (3,) lowest and (3,) highest corner."""
+    """Return the (3,) low and (3,) high corner of the parts' bounding box, along the axes of the world."""
     places = [apply(part.T_world_part, part.vertices_m) for part in parts]
     return np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
 
@@ -47,6 +49,6 @@ def moved(parts: list[Part], T: FloatArray) -> list[Part]:
 
 
 def draw(rng: Rng, makers: Makers[_Made]) -> _Made:
-    """Call one of the (weight, maker) pairs, chosen by weight."""
+    """Call a random maker, drawn with a probability in proportion to its weight; return its product."""
     weight = np.array([w for w, _ in makers])
     return makers[int(rng.choice(len(makers), p=weight / weight.sum()))][1]()

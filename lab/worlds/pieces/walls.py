@@ -13,7 +13,7 @@ from lab.worlds.scene import Part, Rng
 
 @dataclass(frozen=True, slots=True)
 class WallPiece:
-    """A piece with its back at y = 0."""
+    """A piece with its back at y = 0, and the place that it needs on a wall."""
 
     parts: list[Part]
     width_m: float

@@ -1,7 +1,7 @@
-"""Procedural surfaces: each function returns a Texture, a solid or box-mapped linear albedo.
+"""Procedural textures: each function but ``random_palette`` returns a Texture, solid or box-mapped.
 
-Colours are linear RGB, 0 to 1, or "#rrggbb" in sRGB; lengths are metres. A box-mapped texture is projected on
-the box face that the normal points out of, so boxes need no unwrapping.
+Colours are linear RGB, 0 to 1, or "#rrggbb" in sRGB; lengths are metres. A solid texture depends on the
+position in space. A box-mapped one is projected along the axis of the part that is nearest to the normal.
 """
 
 from lab.worlds.textures.building import brick, concrete, marble, paint, parquet, planks, plaster, tiles

@@ -42,7 +42,7 @@ def fabric(color: Color, second: Color | None = None, seed: int = 0, thread_m: f
 def stripes(
     color: Color, second: Color, seed: int = 0, width_m: float = 0.08, vertical: bool = True
 ) -> Texture:
-    """Wallpaper or cloth with stripes of uneven widths."""
+    """Wallpaper or cloth with stripes of uneven widths, ``width_m`` on average."""
     color, second = as_color(color), as_color(second)
 
     def texture(points_m: FloatArray, normals: FloatArray) -> FloatArray:
@@ -88,7 +88,7 @@ def rug(colors: Sequence[Color], seed: int = 0, size_m: Vector = (2.0, 1.4)) -> 
     """A woven rug about the part's origin: frames around a field of diamonds.
 
     Args:
-        colors: field, border and motif colours (three or more).
+        colors: colours that alternate in the diamonds and the frames (three or more).
         seed: chooses the pattern.
         size_m: (x, y) size of the rug.
     """

@@ -32,7 +32,7 @@ def brushed_metal(color: Color, seed: int = 0, axis: int = 0) -> Texture:
 
 
 def patches(colors: Sequence[Color], seed: int = 0, scale_m: float = 0.15) -> Texture:
-    """Camouflage-like patches: globes, clothes, bags, terrazzo (small scale), art."""
+    """Camouflage-like patches, for globes, clothes, bags, art and, at a small scale, terrazzo."""
     palette = np.array([as_color(c) for c in colors], np.float32)
 
     def texture(points_m: FloatArray, normals: FloatArray) -> FloatArray:
@@ -44,7 +44,7 @@ def patches(colors: Sequence[Color], seed: int = 0, scale_m: float = 0.15) -> Te
 
 
 def cardboard(color: Color = (0.42, 0.27, 0.14), seed: int = 0, size_m: float = 0.4) -> Texture:
-    """A corrugated box with parcel tape along the middle of its faces and a printed mark."""
+    """A corrugated box about the part's origin, with tape on top and bottom and printed marks."""
     color, tape, ink = as_color(color), np.array([0.5, 0.4, 0.24], np.float32), np.full(3, 0.05, np.float32)
 
     def texture(points_m: FloatArray, normals: FloatArray) -> FloatArray:

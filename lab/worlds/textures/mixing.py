@@ -37,22 +37,25 @@ def as_color(color: Color) -> FloatArray:
 
 
 def mix(a: FloatArray, b: FloatArray, share: FloatArray) -> FloatArray:
-    """Return the (N, 3) blend of two colours ((3,) or (N, 3)), by (N,) share of the second, within 0 to 1."""
+    """Return the (N, 3) blend of two colours ((3,) or (N, 3)) by (N,) shares of the second, in 0 to 1."""
     return np.clip(a + (b - a) * np.asarray(share, np.float32)[:, None], 0.0, 1.0)
 
 
 def shade(color: FloatArray, tone: FloatArray) -> FloatArray:
-    """Return (N, 3) a (3,) colour, or (N, 3) colours, times an (N,) brightness, within 0 to 1."""
+    """Return (N, 3) colours: a (3,) colour, or (N, 3) ones, times (N,) brightness, clipped to 0 to 1."""
     return np.clip(color * np.asarray(tone, np.float32)[:, None], 0.0, 1.0)
 
 
 def soft_step(x: FloatArray, softness: float) -> FloatArray:
-    """Return (N,) 0 below zero, 1 above, with a ramp about zero."""
+    """Return (N,) 0 below zero and 1 above, with a ramp of width ``softness`` about zero."""
     return np.clip(0.5 + x / softness, 0.0, 1.0)
 
 
 def joint_share(a: FloatArray, b: FloatArray, a_m: float, b_m: float, joint_m: float) -> FloatArray:
-    """Return (N,) 1 within half a joint of the border of a cell, given the position in the cell, 0 to 1."""
+    """Return (N,) share of joint at positions (a, b), 0 to 1, in a cell of ``a_m`` x ``b_m``.
+
+    It is 1 at the cell's border, 0.5 at half a joint's width from it, and 0 farther inside.
+    """
     distance_m = np.minimum((0.5 - np.abs(a - 0.5)) * a_m, (0.5 - np.abs(b - 0.5)) * b_m)
     return np.clip(1.5 - 2.0 * distance_m / joint_m, 0.0, 1.0)
 

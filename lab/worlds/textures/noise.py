@@ -1,4 +1,4 @@
-"""Lattice noise and face coordinates, the compiled base of all procedural textures."""
+"""Lattice noise, coordinates on box faces and random numbers of cells: compiled base of the textures."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ def fbm(
 
     Args:
         points_m: (N, 3).
-        scale_m: size of the largest blobs, in all directions or (3,) one for each axis.
-        seed: chooses the part of the (tileable) noise.
+        scale_m: size of the largest blobs, in all directions or (3,) along each axis.
+        seed: chooses the offset in one periodic lattice of noise.
         octaves: number of octaves; each is half the size of the one before.
         gain: strength of an octave relative to the one before.
     """
@@ -85,7 +85,7 @@ def face_uv(points, normals):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def cell_random(i, j, seed):  # type: ignore[no-untyped-def]
-    """Return (N,) float32 uniform random numbers, one for each pair of (N,) whole numbers."""
+    """Return (N,) float32 uniform random numbers, 0 to 1, by hashing (N,) pairs of whole numbers."""
     out = np.empty(len(i), np.float32)
     for n in range(len(i)):
         h = np.uint32(np.int64(i[n])) * np.uint32(0x9E3779B1)

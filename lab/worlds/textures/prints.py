@@ -1,4 +1,4 @@
-"""Textures of pictures: paintings, books, pages, screens, the view from a window."""
+"""Textures of pictures: paintings, pages, screens, the view from a window."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def display(seed: int, size_m: Vector) -> Texture:
 
 
 def outdoors(seed: int) -> Texture:
-    """A view through a window: a bright sky, clouds, far trees or houses below z = -0.2."""
+    """A view through a window: a bright sky, clouds, far trees or houses below about z = -0.2."""
     rng = np.random.default_rng(seed)
     sky, haze = np.array([0.45, 0.68, 0.98]), np.array([0.93, 0.95, 0.97])
     ground = np.array([[0.12, 0.22, 0.08], [0.32, 0.29, 0.26]][int(rng.integers(2))])
