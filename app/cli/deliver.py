@@ -36,8 +36,8 @@ def deliver(
         images: Images that the nodes send; of a recording each node sends a keyframe.
         out: Folder for the final result (the files of `reconstruct`), moments.csv and delivery.html.
         preset: The network: thesis-link, greenhouse, office, or the config.json of a finished simulation.
-        coding: How images are encoded: raw, raw-color-first, raw-rows, raw-tiles, png, jpeg, rvl, tiles or
-            layered.
+        coding: How images are encoded: raw, raw-color-first, raw-rows, raw-tiles, png, jpeg, rvl, tiles,
+            layered or exact.
         moments: Number of times at which the scene is rebuilt, after equal shares of the bytes.
         link_trace: A recorded link (s, Mbit/s, round trip ms, loss share) over which every node sends.
         down: Names of nodes that have failed and send nothing, for example node_02.

@@ -8,6 +8,9 @@ import numpy as np
 
 from pipeline.acquisition import acquire
 from pipeline.config import AcquisitionConfig, RegistrationConfig
+from pipeline.delivery import levels
+from pipeline.delivery.sink import images_of
+from pipeline.delivery.tiled import TILE, areas_of
 from pipeline.depth.extension import extrapolated
 from pipeline.depth.robust import best_random_line
 from pipeline.kernels.rays import Camera, camera_hits, triangle_scene
@@ -20,7 +23,8 @@ from pipeline.types import CameraIntrinsics, DepthMap, PointCloud, RgbdFrame
 
 def warm_up() -> Iterator[None]:
     """Run each compiled function once, with yields between them: roll a ball; thin, smooth and register
-    points; acquire and fill a depth image; cast rays at a mesh. The compiled code stays on disk.
+    points; acquire, encode, decode and fill a depth image; cast rays at a mesh. The compiled code stays on
+    disk.
     """
     compile_all()
     yield
@@ -35,6 +39,12 @@ def warm_up() -> Iterator[None]:
         yield
     frame = _frame()
     acquire(frame, AcquisitionConfig())
+    yield
+    depth = images_of(frame).depth
+    areas = areas_of(depth.shape, TILE)
+    coded = levels.encode(depth, areas)
+    for area, tile in zip(areas, coded.tiles, strict=True):
+        levels.decode_tile(np.frombuffer(tile, np.uint8), levels.read_header(coded.header), depth[area].shape)
     yield
     extrapolated(frame.depth.z_m, frame.depth.valid, frame.rgb)
     best_random_line(np.arange(8.0), np.arange(8.0), np.random.default_rng(0))

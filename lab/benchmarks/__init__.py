@@ -1,4 +1,4 @@
-"""Speed and memory compared with other programs in one run, each case in a fresh process."""
+"""Benchmark cases: speed and memory of PacketMesh and of other programs, each case in a fresh process."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from packetmesh.errors import InputError
 
 
 def _measure(module: str, function: str = "benchmark", **options: Any) -> Benchmark:
-    """Call a function of a module of this package, imported here: other cases' imports would count."""
+    """Import a module of this package and call its function; the modules of other cases are not imported."""
     result: Benchmark = getattr(import_module(f"lab.benchmarks.{module}"), function)(**options)
     return result
 
@@ -34,15 +34,20 @@ CASES: dict[str, Callable[[], Benchmark]] = {
     "surface": partial(_measure, "surface"),
     "measuring": partial(_measure, "measuring"),
     "depth": partial(_measure, "depth"),
+    "codings": partial(_measure, "codings"),
     "network": partial(_measure, "network"),
 }
-"""Cases by name; the part before a colon names several cases at once."""
+"""Cases by name; the part of the name before a colon is the name of a group of cases."""
 
 
 def run_benchmarks(
     only: Iterable[str] = (), cases: Mapping[str, Callable[[], Benchmark]] = CASES
 ) -> Iterator[tuple[str, Benchmark]]:
-    """Measure the named cases or groups of cases, or all, one after the other.
+    """Measure cases one after the other; yield the name and the result of each.
+
+    Args:
+        only: names of cases or groups; none measures all.
+        cases: all cases by name.
 
     Raises:
         InputError: a name is neither a case nor a group.

@@ -42,13 +42,15 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "bench_recording": ("packetmesh", "bench", "--only", "recording"),
     "bench_measuring": ("packetmesh", "bench", "--only", "measuring"),
     "bench_depth": ("packetmesh", "bench", "--only", "depth"),
+    "bench_codings": ("packetmesh", "bench", "--only", "codings"),
     "bench_network": ("packetmesh", "bench", "--only", "network"),
     "real_frames": ("python", "-m", "lab.benchmarks.real_frames"),
     "calibration_verdicts": ("python", "-m", "lab.verdicts", "--seed", "2026", "--sessions", "400"),
     "ns3_saturation": ("python", "tests/benchmarks/ns3_saturation.py"),
 }
 """Command of each record; ``bench_problems`` and ``bench_places`` need lists in runs/problems, written there
-by ``python -m lab.benchmarks.problem_lists runs/problems --lidar DATA``, and the last one needs ns-3."""
+by ``python -m lab.benchmarks.problem_lists runs/problems --lidar DATA``, and ``ns3_saturation`` needs
+ns-3."""
 RECONSTRUCT = "reconstruct"
 RECORDS = (RECONSTRUCT, *COMMANDS)
 PROGRAMS = {"packetmesh": (sys.executable, "-m", "app.cli"), "python": (sys.executable,)}
@@ -57,7 +59,7 @@ VERDICT_KEYS = ("claim", "thesis", "tolerance", "verdict", "why", "ours", "ci95"
 
 
 def measure(name: str, runs: Path = Path("runs/results")) -> Record:
-    """Run the command of a record, which takes seconds to an hour.
+    """Run the command of a record and return the record; a command takes seconds to an hour.
 
     Args:
         name: a name of ``RECORDS``.
@@ -89,7 +91,7 @@ def measure(name: str, runs: Path = Path("runs/results")) -> Record:
 
 
 def _reconstructions(runs: Path) -> dict[str, Any]:
-    """Reconstruct every demo scene and every real frame on this machine, by both presets."""
+    """Reconstruct every calibrated demo scene and every real frame on this machine, with each preset."""
     sources = {scene: ["--scene", scene] for scene in CALIBRATED_SCENES}
     for folder in real_folders():
         files = {"color": "color.png", "depth": "depth.png", "intrinsics": "intrinsics.json"}

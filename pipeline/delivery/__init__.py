@@ -1,6 +1,7 @@
 """Codings of a node's images: encoding at the node, decoding of the bytes that reach the sink (SPEC 6.5)."""
 
 from packetmesh.errors import InputError
+from pipeline.delivery import tiled
 from pipeline.delivery.coding import Coding
 from pipeline.delivery.raw import Raw, raster, spread_rows, tile_after_tile
 from pipeline.delivery.tiled import Tiled
@@ -14,8 +15,9 @@ _ALL: tuple[Coding, ...] = (
     Whole("png", "PNG depth, PNG colour", PNG, PNG),
     Whole("jpeg", "RVL depth, JPEG colour", RVL, JPEG),
     Whole("rvl", "RVL depth, PNG colour", RVL, PNG),
-    Tiled("tiles", "Tiles that stand alone", base=False, repair_every=64),
-    Tiled("layered", "Coarse base, then tiles", base=True, repair_every=12),
+    Tiled("tiles", "Tiles that stand alone", tiled.JPEG, base=False, repair_every=64),
+    Tiled("layered", "Coarse base, then tiles", tiled.JPEG, base=True, repair_every=24),
+    Tiled("exact", "Coarse base, then tiles, AVIF colour", tiled.AVIF, base=True, repair_every=24),
 )
 
 CODINGS: dict[str, Coding] = {coding.name: coding for coding in _ALL}

@@ -8,21 +8,23 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.delivery import rvl
+from pipeline.delivery import levels
 from pipeline.delivery.coding import DepthArray
-from pipeline.delivery.pictures import read_scan, write_scan
+from pipeline.delivery.pictures import read_av1, write_av1
 from pipeline.types import ByteArray
 
 DEPTH_BLOCK = 8
 """Side in pixels of the blocks that share one depth."""
 COLOR_BLOCK = 4
-COLOR_QUALITY = 75
+COLOR_QUALITY = 60
+"""Of AVIF: smaller than JPEG's 75, and more similar to the image."""
+_LENGTH_BYTES = 3
 SAME_SURFACE = 0.05
 """Neighbouring depths with a larger relative difference are not blended: no surface is between them."""
 
 
 def write_depth(depth: DepthArray) -> bytes:
-    """Encode the medians of depth blocks as an RVL stream, 0 where most of a block has no depth."""
+    """Encode the medians of depth blocks as one tile of levels, 0 where most of a block has no depth."""
     height, width = depth.shape
     padded = np.pad(depth, ((0, -height % DEPTH_BLOCK), (0, -width % DEPTH_BLOCK)))
     shape = (padded.shape[0] // DEPTH_BLOCK, DEPTH_BLOCK, padded.shape[1] // DEPTH_BLOCK, DEPTH_BLOCK)
@@ -32,33 +34,45 @@ def write_depth(depth: DepthArray) -> bytes:
     middle = np.minimum(middle, blocks.shape[2] - 1)
     medians = np.take_along_axis(blocks, middle[..., None], axis=2)[..., 0]
     inside = np.outer(_inside(height, shape[0]), _inside(width, shape[2]))
-    return rvl.encode(np.where(2 * known >= inside, medians, 0).astype(np.uint16))
+    grid = np.where(2 * known >= inside, medians, 0).astype(np.uint16)
+    coded = levels.encode(grid, [_whole(grid.shape)])
+    return len(coded.header).to_bytes(_LENGTH_BYTES, "big") + coded.header + coded.tiles[0]
 
 
 def write_color(rgb: ByteArray) -> bytes:
-    """Encode a reduced colour image as JPEG, without its header."""
+    """Encode a reduced colour image as AVIF, without its header."""
     height, width = rgb.shape[:2]
     size = (-(-width // COLOR_BLOCK), -(-height // COLOR_BLOCK))
-    return write_scan(cv2.resize(rgb, size, interpolation=cv2.INTER_AREA), COLOR_QUALITY)
+    return write_av1(cv2.resize(rgb, size, interpolation=cv2.INTER_AREA), COLOR_QUALITY)
 
 
 @lru_cache(maxsize=16)
 def read_depth(stream: bytes, shape: tuple[int, int]) -> DepthArray:
     """Decode (H, W) depth, interpolated between the blocks' centres; 0 where a block has none; read-only."""
     grid_shape = (-(-shape[0] // DEPTH_BLOCK), -(-shape[1] // DEPTH_BLOCK))
-    grid = rvl.decode(np.frombuffer(stream, np.uint8), grid_shape[0] * grid_shape[1]).reshape(grid_shape)
+    tile = _LENGTH_BYTES + int.from_bytes(stream[:_LENGTH_BYTES], "big")
+    grid = np.zeros(grid_shape, np.uint16)
+    if stream[tile:]:
+        listed = levels.read_header(stream[_LENGTH_BYTES:tile])
+        values = levels.decode_tile(np.frombuffer(stream[tile:], np.uint8), listed, grid_shape)
+        grid[:] = values.reshape(grid_shape)
+
     depth = _blended(grid.astype(np.float32), shape)
     depth.setflags(write=False)
     return depth
 
 
 @lru_cache(maxsize=16)
-def read_color(scan: bytes, shape: tuple[int, int]) -> ByteArray:
+def read_color(frame: bytes, shape: tuple[int, int]) -> ByteArray:
     """Decode (H, W, 3) RGB; read-only."""
-    small = read_scan(scan, (-(-shape[0] // COLOR_BLOCK), -(-shape[1] // COLOR_BLOCK)), COLOR_QUALITY)
+    small = read_av1(frame, (-(-shape[0] // COLOR_BLOCK), -(-shape[1] // COLOR_BLOCK)), COLOR_QUALITY)
     rgb = cv2.resize(small, (shape[1], shape[0]), interpolation=cv2.INTER_CUBIC)
     rgb.setflags(write=False)
     return rgb
+
+
+def _whole(shape: tuple[int, ...]) -> tuple[slice, slice]:
+    return slice(0, shape[0]), slice(0, shape[1])
 
 
 def _inside(size: int, blocks: int) -> NDArray[np.integer]:

@@ -1,4 +1,4 @@
-"""PNG and JPEG streams, and JPEG images without the header, which sender and sink both know."""
+"""PNG and JPEG streams, and JPEG and AVIF images without their headers, which sender and sink both know."""
 
 from __future__ import annotations
 
@@ -13,9 +13,13 @@ from pipeline.types import ByteArray
 
 COLOR_QUALITY = 90
 """JPEG quality, 0 to 100 (SPEC 6.5)."""
+AV1_QUALITY = 82
+"""Of 100; its images are as similar to those sent (SSIM) as JPEG's of ``COLOR_QUALITY``."""
+_AV1_SPEED = 8  # 6 takes 4 % less bytes and about twice the time, 10 takes 10 % more
 _PNG_LEVEL = 6  # OpenCV's default, 1, is three times as fast and makes depth a quarter larger
 _END_OF_IMAGE = b"\xff\xd9"
 _START_OF_SCAN = 0xDA
+_EXTENT_LENGTH = 22  # of the box iloc with one image, from its name
 
 
 def write_png(image: NDArray[np.unsignedinteger]) -> bytes:
@@ -57,6 +61,55 @@ def read_scan(scan: bytes, shape: tuple[int, int], quality: int = COLOR_QUALITY)
     image = read_picture(_header(shape, quality) + scan + _END_OF_IMAGE)
     image.setflags(write=False)
     return image
+
+
+def write_av1(rgb: ByteArray, quality: int = AV1_QUALITY) -> bytes:
+    """Encode an image as AVIF and omit what is equal for all images of one size, some 290 bytes.
+
+    Raises:
+        InputError: this OpenCV writes no AVIF, or not with the same header for all.
+    """
+    stream = _write_avif(rgb, quality)
+    frame = stream[len(_av1_header(rgb.shape[:2], quality)) :]
+    if _with_av1_header(frame, rgb.shape[:2], quality) != stream:
+        raise InputError("This OpenCV's AVIF images differ in their headers; try the coding layered")
+    return frame
+
+
+@lru_cache(maxsize=4096)
+def read_av1(frame: bytes, shape: tuple[int, int], quality: int = AV1_QUALITY) -> ByteArray:
+    """Decode an image of (H, W) pixels from ``write_av1``; read-only, and cached as in ``read_scan``."""
+    image = read_picture(_with_av1_header(frame, shape, quality))
+    image.setflags(write=False)
+    return image
+
+
+def _write_avif(rgb: ByteArray, quality: int) -> bytes:
+    options = [cv2.IMWRITE_AVIF_QUALITY, quality, cv2.IMWRITE_AVIF_SPEED, _AV1_SPEED]
+    return cv2.imencode(".avif", _swapped(rgb), options)[1].tobytes()
+
+
+@lru_cache(maxsize=32)
+def _av1_header(shape: tuple[int, int], quality: int) -> bytes:
+    """Return everything before the coded frame: the file's boxes, and AV1's sequence header.
+
+    The last box, mdat, holds the units of AV1: a temporal delimiter of two bytes, the sequence header, whose
+    length is its second byte, and the frame.
+    """
+    stream = _write_avif(np.zeros((*shape, 3), np.uint8), quality)
+    units = stream.index(b"mdat") + 4
+    return stream[: units + 4 + stream[units + 3]]
+
+
+def _with_av1_header(frame: bytes, shape: tuple[int, int], quality: int) -> bytes:
+    """Return the file, whose boxes iloc and mdat state the length of the units."""
+    header = bytearray(_av1_header(shape, quality))
+    units = header.index(b"mdat") + 4
+    length = len(header) - units + len(frame)
+    place = header.index(b"iloc") + _EXTENT_LENGTH
+    header[place : place + 4] = length.to_bytes(4, "big")
+    header[units - 8 : units - 4] = (length + 8).to_bytes(4, "big")
+    return bytes(header) + frame
 
 
 @lru_cache(maxsize=32)

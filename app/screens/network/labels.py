@@ -66,6 +66,7 @@ CODINGS: Mapping[str, str] = MappingProxyType(
         "rvl": "RVL depth, PNG colour",
         "tiles": "Tiles that stand alone",
         "layered": "Coarse base, then tiles",
+        "exact": "Coarse base, then tiles, AVIF colour",
     }
 )
 """Titles of ``pipeline.delivery.CODINGS``, whose libraries the server process does not load."""

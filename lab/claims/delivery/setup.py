@@ -13,9 +13,9 @@ from pipeline.delivery.sending import packet_bytes_of
 from pipeline.io.demos import CALIBRATED_SCENES
 
 RIGS = CALIBRATED_SCENES
-CODINGS = ("raw", "raw-rows", "raw-tiles", "png", "jpeg", "tiles", "layered")
-EXACT = ("raw", "raw-rows", "raw-tiles", "png")
-"""Lossless codings: without lost packets all of them are one trial."""
+CODINGS = ("raw", "raw-rows", "raw-tiles", "png", "jpeg", "tiles", "layered", "exact")
+LOSSLESS = ("raw", "raw-rows", "raw-tiles", "png")
+"""Lossless codings: without lost packets they give equal images, so one trial stands for all."""
 HEADLINE = ("raw", "tiles", "layered")
 """Codings whose exchange rates are compared."""
 SHARES = (0.005, 0.01, 0.02, 0.05, 0.1, 0.25, 0.5)
@@ -24,8 +24,8 @@ RATE_SHARE = 0.1
 LARGE, SMALL = (packet_bytes_of(PRESETS[name]) for name in ("office", "thesis-link"))
 """Image bytes in a packet of 802.11b and of 802.15.4."""
 SEEDS = 5
-"""Seeds of all codings at a tenth lost in bursts, of the headline codings at every share of their exchange
-rate, and of all trials that ``full`` adds; other default trials have one seed."""
+"""Number of seeds of all codings at a tenth lost in bursts, of the headline codings at every share of their
+exchange rate, and of all trials that ``full`` adds except deadlines. All other trials have one seed."""
 UNCORRECTED: AlignmentMode = "affine_depth"
 """The best alignment without the local correction (SPEC 3.5)."""
 UNCORRECTED_SHARE = 0.25
@@ -33,14 +33,14 @@ UNCORRECTED_SHARE = 0.25
 
 def lossless(rig: str, coding: str) -> LossTask:
     """Return the trial without losses with which others of a rig and coding are compared."""
-    return LossTask(rig, "raw" if coding in EXACT else coding, LARGE, "random", 0.0, 0)
+    return LossTask(rig, "raw" if coding in LOSSLESS else coding, LARGE, "random", 0.0, 0)
 
 
 def loss_tasks(full: bool = False, rigs: Sequence[str] = RIGS) -> list[LossTask]:
-    """Return every trial once, the lossless ones first.
+    """Return the task of every trial once, the lossless ones of the default chain first.
 
     Args:
-        full: every coding with every share of every kind and five seeds, and small packets; takes hours.
+        full: add every coding with every share of every kind of loss, and small packets; takes hours.
         rigs: demo scenes.
     """
     tasks = [lossless(rig, coding) for rig in rigs for coding in CODINGS]
@@ -52,7 +52,7 @@ def loss_tasks(full: bool = False, rigs: Sequence[str] = RIGS) -> list[LossTask]
 
 
 def send_tasks(rig: str = RIGS[0]) -> list[SendTask]:
-    """Return every coding on each network."""
+    """Return a task for every coding of one rig on each network."""
     return [SendTask(rig, coding, network) for network in NETWORKS for coding in CODINGS]
 
 
@@ -72,7 +72,7 @@ def _few(rig: str) -> Iterator[LossTask]:
 
 
 def _uncorrected(rig: str) -> Iterator[LossTask]:
-    """Yield the chain without the local correction, without and with losses."""
+    """Yield the trials of the chain without the local correction: one lossless, one with losses."""
     yield replace(lossless(rig, "raw"), alignment=UNCORRECTED)
     yield LossTask(rig, "raw", LARGE, "burst", UNCORRECTED_SHARE, 0, UNCORRECTED)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lab.claims.delivery import trials
-from lab.claims.delivery.setup import CODINGS, EXACT, LARGE, SMALL, loss_tasks, lossless
+from lab.claims.delivery.setup import CODINGS, LARGE, LOSSLESS, SMALL, loss_tasks, lossless
 from lab.claims.delivery.trials import (
     COUNT_OF_PIECES,
     LossTask,
@@ -64,7 +64,7 @@ def test_every_node_loses_packets_of_its_own_and_seeds_repeat():
     assert not np.array_equal(one, packets_lost([500, 500], LossConfig(0.2), seed=2)[0])
 
 
-@pytest.mark.parametrize("coding", EXACT)
+@pytest.mark.parametrize("coding", LOSSLESS)
 @pytest.mark.parametrize("packet_bytes", [LARGE, SMALL])
 def test_a_lossless_coding_without_losses_gives_the_very_images(rig, coding, packet_bytes):
     frames, traffic = frames_left(rig, LossTask("small", coding, packet_bytes, "burst", 0.0, 0))
