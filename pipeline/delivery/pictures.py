@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 from functools import lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from packetmesh.errors import InputError
 from pipeline.types import ByteArray
@@ -67,26 +69,41 @@ def write_av1(rgb: ByteArray, quality: int = AV1_QUALITY) -> bytes:
     """Encode an image as AVIF and omit what is equal for all images of one size, some 290 bytes.
 
     Raises:
-        InputError: this OpenCV writes no AVIF, or not with the same header for all.
+        InputError: this Pillow does not write the same header for all.
     """
     stream = _write_avif(rgb, quality)
     frame = stream[len(_av1_header(rgb.shape[:2], quality)) :]
     if _with_av1_header(frame, rgb.shape[:2], quality) != stream:
-        raise InputError("This OpenCV's AVIF images differ in their headers; try the coding layered")
+        raise InputError(
+            "Pillow's AVIF images differ in their headers; install the locked version of Pillow, or try the "
+            "coding jpeg"
+        )
     return frame
 
 
 @lru_cache(maxsize=4096)
 def read_av1(frame: bytes, shape: tuple[int, int], quality: int = AV1_QUALITY) -> ByteArray:
-    """Decode an image of (H, W) pixels from ``write_av1``; read-only, and cached as in ``read_scan``."""
-    image = read_picture(_with_av1_header(frame, shape, quality))
+    """Decode an image of (H, W) pixels from ``write_av1``; read-only, and cached as in ``read_scan``.
+
+    Raises:
+        InputError: the bytes are no such image.
+    """
+    try:
+        with Image.open(io.BytesIO(_with_av1_header(frame, shape, quality))) as picture:
+            image: ByteArray = np.asarray(picture.convert("RGB"))
+    except (OSError, RuntimeError, SyntaxError, ValueError) as error:
+        raise InputError(f"The {len(frame)} bytes are no AVIF picture; try to receive them again") from error
     image.setflags(write=False)
     return image
 
 
 def _write_avif(rgb: ByteArray, quality: int) -> bytes:
-    options = [cv2.IMWRITE_AVIF_QUALITY, quality, cv2.IMWRITE_AVIF_SPEED, _AV1_SPEED]
-    return cv2.imencode(".avif", _swapped(rgb), options)[1].tobytes()
+    """Encode with Pillow, as OpenCV's wheel for Windows has no AVIF; with one thread, for equal bytes."""
+    stream = io.BytesIO()
+    Image.fromarray(np.ascontiguousarray(rgb)).save(
+        stream, "AVIF", quality=quality, speed=_AV1_SPEED, max_threads=1
+    )
+    return stream.getvalue()
 
 
 @lru_cache(maxsize=32)

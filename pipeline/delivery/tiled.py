@@ -99,16 +99,16 @@ class Tiled:
             if whole and not _is_sealed(stream, index):
                 continue
             tile = stream[:-_SEAL_BYTES] if whole else stream
-            if index < len(areas):
-                area = areas[index]
-                with suppress(InputError):  # damaged, and cut before its seal
+            with suppress(InputError):  # damaged, though its seal fits or is cut off
+                if index < len(areas):
+                    area = areas[index]
                     values = levels.decode_tile(tile, listed, received.depth[area].shape)
                     _fill_start(received.depth[area], values)
                     _fill_start(received.coarse[area], np.zeros_like(values))
-            elif whole:
-                area = color_areas[index - len(areas)]
-                received.rgb[area] = self.colors.read(tile.tobytes(), received.depth[area].shape)
-                received.rgb_known[area] = True
+                elif whole:
+                    area = color_areas[index - len(areas)]
+                    received.rgb[area] = self.colors.read(tile.tobytes(), received.depth[area].shape)
+                    received.rgb_known[area] = True
         return received
 
 

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from pipeline.delivery import CODINGS
+from packetmesh.errors import InputError
+from pipeline.delivery import CODINGS, levels, pictures
 from pipeline.delivery.coding import Images
+from pipeline.delivery.tiled import TILE, _sealed, areas_of
 from pipeline.io.demos import DEMO_SCENES, load_demo
 from tests.pipeline.delivery.losses import bursts
 from tests.pipeline.delivery.pictures import received, smooth_images
@@ -58,7 +60,7 @@ def test_a_transfer_that_stops_early_leaves_a_coarse_image_of_everything(room):
     assert np.abs(result.rgb.astype(int) - room.rgb).mean() < 12
 
 
-@pytest.mark.parametrize("name", ["tiles", "layered"])
+@pytest.mark.parametrize("name", ["tiles", "layered", "exact"])
 def test_a_lost_packet_leaves_all_but_the_tiles_in_it(name, room):
     """Beyond the directory and base any packet can go: two tiles at most, even if it lies across a border."""
     coding = CODINGS[name]
@@ -80,7 +82,7 @@ def test_tiles_that_follow_each_other_are_no_neighbours_in_the_image(room):
     assert apart[~np.eye(len(tiles), dtype=bool)].min() > 1
 
 
-@pytest.mark.parametrize("name", ["tiles", "layered"])
+@pytest.mark.parametrize("name", ["tiles", "layered", "exact"])
 def test_every_color_tile_is_the_one_sent_or_the_base(name, room):
     coding = CODINGS[name]
     data = coding.encode(room, 108)
@@ -103,3 +105,53 @@ def test_what_has_arrived_replaces_the_base_holes_included():
     np.testing.assert_array_equal(result.coarse[result.depth > 0], 0)
     whole = received(CODINGS["layered"], images, 108, lambda count: np.ones(count, bool))
     assert not whole.coarse.any()
+
+
+@pytest.mark.parametrize("name", ["tiles", "layered", "exact"])
+def test_damaged_bytes_cost_their_tiles_and_are_never_taken_for_values(name, room):
+    """Packets carry a check of their own; this is for what gets past it."""
+    coding = CODINGS[name]
+    data = np.frombuffer(coding.encode(room, 108), np.uint8)
+    everything = np.ones(data.size, bool)
+    whole = coding.decode(data, everything, room.depth.shape, 108)
+    for place in (108 * 200 + 50, 108 * 400 + 3, data.size - 108 * 200):
+        damaged = data.copy()
+        damaged[place : place + 4] ^= 0b01011010
+        result = coding.decode(damaged, everything, room.depth.shape, 108)
+        gone = (room.depth > 0) & (result.depth == 0)
+        assert len({(row // 32, column // 32) for row, column in np.argwhere(gone)}) <= 2
+        np.testing.assert_array_equal(result.depth[~gone], room.depth[~gone])
+        other = np.argwhere((result.rgb != whole.rgb).any(axis=2)) // coding.colors.side_px
+        assert len(np.unique(other, axis=0)) <= 2
+        assert gone.any() or len(other)
+
+
+def test_a_tile_in_another_s_place_is_lost(room):
+    """Two neighbours in the stream with the same number of bytes are exchanged."""
+    coding = CODINGS["tiles"]
+    plain = np.zeros_like(room.depth)
+    plain[:32, :64] = room.depth[200:232, 300:364]
+    plain[:32, 32:64] = plain[:32, :32][:, ::-1]
+    images = Images(room.rgb, plain)
+    data = coding.encode(images, 108)
+    tiles = levels.encode(plain, areas_of(plain.shape, TILE)).tiles
+    first, second = (_sealed(tiles[index], index) for index in (0, 1))
+    assert data.count(first) == data.count(second) == 1
+    moved = _sealed(tiles[1], 1)[: len(first)].ljust(len(first), b"\0")
+    swapped = np.frombuffer(data.replace(first, moved), np.uint8)
+    result = coding.decode(swapped, np.ones(swapped.size, bool), plain.shape, 108)
+    assert not result.depth[:32, :32].any()
+    np.testing.assert_array_equal(result.depth[:32, 32:64], plain[:32, 32:64])
+
+
+def test_pieces_of_avif_are_the_image_without_what_all_share():
+    """The header is the same for all images of one size, and a file with it is what Pillow writes."""
+    for seed, shape in enumerate([(1, 1), (5, 3), (31, 64), (64, 64)]):
+        rgb = smooth_images(*shape, seed).rgb
+        frame = pictures.write_av1(rgb)
+        assert pictures._with_av1_header(frame, shape, pictures.AV1_QUALITY) == pictures._write_avif(
+            rgb, pictures.AV1_QUALITY
+        )
+        assert np.abs(pictures.read_av1(frame, shape).astype(int) - rgb).mean() < 4
+    with pytest.raises(InputError, match="no AVIF picture"):
+        pictures.read_av1(b"nothing of the kind", (64, 64))
