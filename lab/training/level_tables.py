@@ -13,11 +13,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lab.training.dataset import FIRST_SEED, viewed_room
 from lab.worlds.sensor import sense_depth
 from packetmesh.files import atomic_path
-from pipeline.delivery.arithmetic import BIT, MEMORY, ONE, WRITE, Counts, Words, compiled, writer
+from pipeline.delivery.arithmetic import BIT, BODY, COUNTS, MEMORY, ONE, WRITE, compiled, writer
 from pipeline.delivery.coding import DepthArray
 from pipeline.delivery.levels import SHIPPED_TABLES, TABLES, indices_of
 from pipeline.delivery.tile_model import MOST_WORDS_PER_PIXEL, SLOTS, Indices, code_tile
@@ -61,20 +62,20 @@ def sensed_views(seed: int, views: int = VIEWS) -> Iterator[SensedView]:
         yield SensedView(view.rgb, _millimetres(depth), _millimetres(registered))
 
 
-def count(depth: DepthArray, counts: Counts) -> None:
+def count(depth: DepthArray, counts: NDArray[np.int64]) -> None:
     """Add the bits of an image's tiles to the counts of their slots."""
     values, indices = indices_of(depth)
-    words = np.empty(MOST_WORDS_PER_PIXEL * TILE * TILE + 2, np.int64)
     for area in areas_of(depth.shape, TILE):
         if indices[area].any():
-            _count(words, counts, indices[area], len(values))
+            _count(counts, np.ascontiguousarray(indices[area]), len(values))
 
 
 @compiled
-def _count(words: Words, counts: Counts, tile: Indices, level_count: int) -> None:
-    coder = writer()
+def _count(counts: NDArray[np.int64], tile: Indices, level_count: int) -> None:
+    coder = writer(counts, MOST_WORDS_PER_PIXEL * tile.size)
     coder[MEMORY] = np.iinfo(np.int64).max
-    code_tile(WRITE, coder, words, counts, tile, level_count)
+    code_tile(WRITE, coder, tile, level_count)
+    counts[:] = coder[COUNTS : coder[BODY]]
 
 
 def _millimetres(depth: DepthMap) -> DepthArray:
@@ -84,12 +85,13 @@ def _millimetres(depth: DepthMap) -> DepthArray:
 def main() -> None:
     """Write the tables, and print the number of images behind them."""
     rooms = int(sys.argv[1]) if len(sys.argv) > 1 else ROOMS
-    counts = np.full((len(TABLES), SLOTS, 2), BIT // 2, np.int64)
+    counts = np.full((len(TABLES), 2 * SLOTS), BIT // 2, np.int64)
     for seed in range(FIRST_SEED["train"], FIRST_SEED["train"] + rooms):
         for view in sensed_views(seed):
             for depth, own in zip((view.depth, view.registered), counts, strict=True):
                 count(depth, own)
-    chances = np.rint(counts[..., 1] / counts.sum(axis=2) * ONE)
+    zeros, ones = counts[:, ::2], counts[:, 1::2]
+    chances = np.rint(ones / (zeros + ones) * ONE)
     with atomic_path(SHIPPED_TABLES) as temporary:
         np.save(temporary, np.clip(chances, 1, ONE - 1).astype(np.uint16))
     print(f"{SHIPPED_TABLES}: {SHIPPED_TABLES.stat().st_size / 1e3:.1f} kB of {rooms * VIEWS} images")

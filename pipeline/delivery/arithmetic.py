@@ -21,10 +21,12 @@ from numpy.typing import NDArray
 
 from pipeline.types import ByteArray
 
-LOW, LENGTH, LEAST, MOST, POSITION, STOPPED, MEMORY = range(7)
-"""Indices of a coder's (7,) int64 state: lower end and length of the interval, least and greatest distance
-from the lower end that a reader's bytes can give, words written or bytes read, whether a reader stopped for
-lack of bytes, and the sum of a slot's counts above which they are halved."""
+LOW, LENGTH, LEAST, MOST, POSITION, STOPPED, MEMORY, BODY = range(8)
+"""Places in a coder's state: lower end and length of the interval, least and greatest distance from the lower
+end that a reader's bytes can give, place of the next word or byte, whether a reader stopped for lack of
+bytes, the sum of a slot's counts above which they are halved, and the place of the first word or byte."""
+COUNTS = 8
+"""Place of the first slot's counts, which end where the body begins."""
 WRITE, READ = True, None
 """Modes. Numba compiles each function for each of them, without the branches of the other; it does so only
 for ``is None``, and a branch at run time would make a bit four times as slow."""
@@ -44,13 +46,10 @@ _MEMORY = 40 * BIT
 LONGEST = 17
 """Most binary digits of a number after its first."""
 
-Counts = NDArray[np.int64]
-"""(S, 2) weight of the zeros and the ones that each slot has seen; a slot's chance is the share of ones."""
 Coder = NDArray[np.int64]
-Words = NDArray[np.int64]
-"""(W,) words that a writer writes after the first, each of 16 bits but for its carry."""
-Stream = ByteArray | Words
-"""What a reader reads, or a writer writes."""
+"""(N,) one array with all of a coder's state, as numba counts the references to each array at each call: the
+places above, then for each slot the weights of the zeros and the ones that it has seen (its chance is the
+share of ones), then a writer's words, each of 16 bits but for its carry, or a reader's bytes."""
 
 
 def compiled(function: Any) -> Any:
@@ -65,107 +64,111 @@ def inlined(function: Any) -> Any:
     return numba.njit(inline="always", error_model="numpy")(function)
 
 
-def counts_of(chances: NDArray[np.integer], trust: int = TRUST) -> Counts:
-    """Return counts that start at these chances.
+def counts_of(chances: NDArray[np.integer], trust: int = TRUST) -> NDArray[np.int64]:
+    """Return (2 S,) counts that start at these chances.
 
     Args:
         chances: (S,) chances of a one, 0 to ``ONE``.
         trust: number of bits that they count as.
     """
     ones = np.clip(chances.astype(np.int64), 1, ONE - 1) * (trust * BIT) // ONE
-    return np.stack([trust * BIT - ones, ones], axis=1)
+    return np.stack([trust * BIT - ones, ones], axis=1).ravel()
 
 
 @compiled
-def writer() -> Coder:
-    """Return the state of a coder that writes a new stream."""
-    coder = np.zeros(7, np.int64)
+def writer(counts: NDArray[np.int64], most_words: int) -> Coder:
+    """Return a coder that writes a new stream of at most so many words."""
+    body = COUNTS + counts.size
+    coder = np.empty(body + most_words + 2, np.int64)
+    coder[:COUNTS] = 0
     coder[LENGTH] = _ALL_BITS + 1
     coder[MEMORY] = _MEMORY
+    coder[BODY] = coder[POSITION] = body
+    coder[COUNTS:body] = counts
     return coder
 
 
 @compiled
-def reader(stream: ByteArray) -> Coder:
-    """Return the state of a coder that reads the (B,) bytes of a stream, or the first of them."""
-    coder = writer()
-    for position in range(_BYTES):
-        known = position < stream.size
-        coder[LEAST] = coder[LEAST] << 8 | (stream[position] if known else 0)
-        coder[MOST] = coder[MOST] << 8 | (stream[position] if known else 255)
-    coder[POSITION] = _BYTES
+def reader(counts: NDArray[np.int64], stream: ByteArray) -> Coder:
+    """Return a coder that reads the (B,) bytes of a stream, or the first of them."""
+    body = COUNTS + counts.size
+    coder = np.empty(body + stream.size, np.int64)
+    coder[:body] = writer(counts, 0)[:body]
+    coder[body:] = stream
+    for position in range(body, body + _BYTES):
+        known = position < coder.size
+        coder[LEAST] = coder[LEAST] << 8 | (coder[position] if known else 0)
+        coder[MOST] = coder[MOST] << 8 | (coder[position] if known else 255)
+    coder[POSITION] = body + _BYTES
     return coder
 
 
 @compiled
-def code_bit(mode: Mode, coder: Coder, stream: Stream, counts: Counts, slot: int, bit: bool) -> bool:
+def code_bit(mode: Mode, coder: Coder, slot: int, bit: bool) -> bool:
     """Code a bit by the chance of a slot, and count it there."""
-    zeros, ones = counts[slot, 0], counts[slot, 1]
+    place = COUNTS + 2 * slot
+    zeros, ones = coder[place], coder[place + 1]
     chance = min(max(ones * ONE // (zeros + ones), _LEAST_CHANCE), ONE - _LEAST_CHANCE)
-    bit = _code(mode, coder, stream, chance, bit)
+    bit = _code(mode, coder, chance, bit)
     if zeros + ones > coder[MEMORY]:
         zeros, ones = (zeros + 1) // 2, (ones + 1) // 2
-    counts[slot, 0], counts[slot, 1] = (zeros, ones + BIT) if bit else (zeros + BIT, ones)
+    coder[place], coder[place + 1] = (zeros, ones + BIT) if bit else (zeros + BIT, ones)
     return bit
 
 
 @inlined
-def code_digits(mode: Mode, coder: Coder, stream: Stream, count: int, number: int) -> int:
+def code_digits(mode: Mode, coder: Coder, count: int, number: int) -> int:
     """Code the lowest ``count`` binary digits of a number, highest first, ones and zeros equally likely."""
     coded = 0
     for place in range(count - 1, -1, -1):
-        coded = coded << 1 | _code(mode, coder, stream, ONE // 2, (number >> place) & 1 == 1)
+        coded = coded << 1 | _code(mode, coder, ONE // 2, (number >> place) & 1 == 1)
     return coded
 
 
 @compiled
-def code_number(mode: Mode, coder: Coder, stream: Stream, counts: Counts, slot: int, number: int) -> int:
+def code_number(mode: Mode, coder: Coder, slot: int, number: int) -> int:
     """Code a number from 1 to 2 ** 18 - 1 as Elias' gamma code, in the ``2 * LONGEST`` slots from ``slot``.
 
     Slots of the first half tell whether the number has more digits, those of the second its second digit.
     """
     digits = 0
-    while digits < LONGEST and code_bit(
-        mode, coder, stream, counts, slot + digits, number >> (digits + 1) > 0
-    ):
+    while digits < LONGEST and code_bit(mode, coder, slot + digits, number >> (digits + 1) > 0):
         digits += 1
-    return code_lower_digits(mode, coder, stream, counts, slot + LONGEST, digits, number)
+    return code_lower_digits(mode, coder, slot + LONGEST, digits, number)
 
 
 @inlined
-def code_lower_digits(
-    mode: Mode, coder: Coder, stream: Stream, counts: Counts, slot: int, digits: int, number: int
-) -> int:
+def code_lower_digits(mode: Mode, coder: Coder, slot: int, digits: int, number: int) -> int:
     """Code the ``digits`` digits after a number's first, the highest in slot ``slot + digits - 1``."""
     coded = 1
     if digits > 0:
-        second = code_bit(mode, coder, stream, counts, slot + digits - 1, (number >> (digits - 1)) & 1 == 1)
-        coded = (2 | second) << (digits - 1) | code_digits(mode, coder, stream, digits - 1, number)
+        second = code_bit(mode, coder, slot + digits - 1, (number >> (digits - 1)) & 1 == 1)
+        coded = (2 | second) << (digits - 1) | code_digits(mode, coder, digits - 1, number)
     return coded
 
 
 @compiled
-def finish(coder: Coder, words: Words) -> ByteArray:
+def finish(coder: Coder) -> ByteArray:
     """Return the (B,) bytes of the words, and the fewest after them that determine all bits."""
     for count in range(_BYTES + 1):
         unknown = _ALL_BITS >> (8 * count)
         number = (coder[LOW] + unknown) & ~unknown
         if number + unknown < coder[LOW] + coder[LENGTH]:
             break
-    size = 2 * coder[POSITION] + count
-    stream = np.empty(size, np.uint8)
+    words = coder[POSITION] - coder[BODY]
+    stream = np.empty(2 * words + count, np.uint8)
     for place in range(count):
-        stream[size - count + place] = (number >> (40 - 8 * place)) & 255
+        stream[2 * words + place] = (number >> (40 - 8 * place)) & 255
     carry = number >> 48
-    for place in range(coder[POSITION], 0, -1):
-        word = words[place] + carry
-        stream[2 * place - 2], stream[2 * place - 1] = (word >> 8) & 255, word & 255
+    for place in range(words - 1, -1, -1):
+        word = coder[coder[BODY] + 1 + place] + carry
+        stream[2 * place], stream[2 * place + 1] = (word >> 8) & 255, word & 255
         carry = word >> 16
     return stream
 
 
 @compiled
-def _code(mode: Mode, coder: Coder, stream: Stream, chance: int, bit: bool) -> bool:
+def _code(mode: Mode, coder: Coder, chance: int, bit: bool) -> bool:
     """Code a bit whose chance of being a one is ``chance`` of ``ONE``."""
     length, position = coder[LENGTH], coder[POSITION]
     bound = (length >> 16) * chance
@@ -177,18 +180,18 @@ def _code(mode: Mode, coder: Coder, stream: Stream, chance: int, bit: bool) -> b
     short = length < _SHORT
     coder[LENGTH] = length << 16 if short else length
     if mode is None:
-        least, most = coder[LEAST] - skipped, coder[MOST] - skipped
+        least, most = coder[LEAST] - skipped, min(coder[MOST] - skipped, length - 1)
         if short:
             for _ in range(2):
-                known = position < stream.size
-                least = least << 8 | (stream[position] if known else 0)
-                most = most << 8 | (stream[position] if known else 255)
+                known = position < coder.size
+                least = least << 8 | (coder[position] if known else 0)
+                most = most << 8 | (coder[position] if known else 255)
                 position += 1
         coder[LEAST], coder[MOST] = least, most
     else:
         low = coder[LOW] + skipped
-        stream[position] += low >> 48
-        stream[position + 1] = (low & _ALL_BITS) >> 32
+        coder[position] += low >> 48
+        coder[position + 1] = (low & _ALL_BITS) >> 32
         coder[LOW] = (low << 16 if short else low) & _ALL_BITS
         position += short
     coder[POSITION] = position

@@ -20,7 +20,6 @@ from pipeline.delivery.arithmetic import (
     READ,
     WRITE,
     Coder,
-    Counts,
     Mode,
     code_number,
     compiled,
@@ -77,7 +76,7 @@ def encode(depth: DepthArray, areas: list[Area]) -> Coded:
         areas: rows and columns of the tiles.
     """
     values, indices = indices_of(depth)
-    tiles = [indices[area] for area in areas]
+    tiles = [np.ascontiguousarray(indices[area]) for area in areas]
     sizes = [
         sum(len(_write_tile(tile, table, len(values))) for tile in tiles[::_SAMPLE])
         for table in range(len(TABLES))
@@ -136,62 +135,62 @@ def decode_tile(stream: ByteArray, levels: Levels, shape: tuple[int, int]) -> De
         InputError: no tile starts with these bytes.
     """
     tile = np.zeros(shape, np.int32)
-    count = _read_tile(stream.copy(), _table(levels.table).copy(), tile, len(levels.values))
+    count = _read_tile(np.array(stream), _table(levels.table), tile, len(levels.values))
     if count == BROKEN:
         raise InputError(f"The {stream.size} bytes are no tile of depths; try to receive them again")
     return np.concatenate([np.zeros(1, np.uint16), levels.values])[tile.ravel()[:count]]
 
 
 @cache
-def _table(table: int) -> Counts:
+def _table(table: int) -> NDArray[np.int64]:
     return counts_of(np.load(SHIPPED_TABLES)[table])
 
 
 def _write_tile(tile: Indices, table: int, level_count: int) -> bytes:
     if not tile.any():
         return b""
-    return _code_whole(_table(table).copy(), tile, level_count).tobytes()
+    return _code_whole(_table(table), tile, level_count).tobytes()
 
 
 @compiled
-def _code_whole(counts: Counts, tile: Indices, level_count: int) -> ByteArray:
-    coder, words = writer(), np.empty(MOST_WORDS_PER_PIXEL * tile.size + 2, np.int64)
-    code_tile(WRITE, coder, words, counts, tile, level_count)
-    return finish(coder, words)
+def _code_whole(counts: NDArray[np.int64], tile: Indices, level_count: int) -> ByteArray:
+    coder = writer(counts, MOST_WORDS_PER_PIXEL * tile.size)
+    code_tile(WRITE, coder, tile, level_count)
+    return finish(coder)
 
 
 @compiled
-def _read_tile(stream: ByteArray, counts: Counts, tile: Indices, level_count: int) -> int:
-    return code_tile(READ, reader(stream), stream, counts, tile, level_count)
+def _read_tile(stream: ByteArray, counts: NDArray[np.int64], tile: Indices, level_count: int) -> int:
+    return code_tile(READ, reader(counts, stream), tile, level_count)
 
 
 def _write_levels(values: DepthArray) -> bytes:
-    coder, words = writer(), np.empty(MOST_WORDS_PER_PIXEL * values.size + 2, np.int64)
-    _code_gaps(WRITE, coder, words, _even(), np.diff(values.astype(np.int64), prepend=0))
-    return finish(coder, words).tobytes()
+    coder = writer(_even(), MOST_WORDS_PER_PIXEL * values.size)
+    _code_gaps(WRITE, coder, np.diff(values.astype(np.int64), prepend=0))
+    return finish(coder).tobytes()
 
 
 def _read_levels(stream: ByteArray, count: int) -> tuple[DepthArray, bool]:
     """Return the levels, and whether the stream has them all, each below 65,536."""
     gaps = np.zeros(count, np.int64)
-    coder = reader(stream)
-    _code_gaps(READ, coder, stream, _even(), gaps)
+    coder = reader(_even(), stream)
+    _code_gaps(READ, coder, gaps)
     values = np.cumsum(gaps)
     complete = not coder[arithmetic.STOPPED] and values.max(initial=0) < 65_536
     return values.astype(np.uint16), complete
 
 
-def _even() -> Counts:
+def _even() -> NDArray[np.int64]:
     return counts_of(np.full(_NUMBERS * 2 * arithmetic.LONGEST, arithmetic.ONE // 2), trust=2)
 
 
 @compiled
-def _code_gaps(mode: Mode, coder: Coder, stream: ByteArray, counts: Counts, gaps: NDArray[np.int64]) -> None:
+def _code_gaps(mode: Mode, coder: Coder, gaps: NDArray[np.int64]) -> None:
     """Code the steps from 0 to the first level and from each to the next, each by the size of the last."""
     digits = 0
     for place in range(gaps.size):
         slot = digits * 2 * arithmetic.LONGEST
-        gaps[place] = code_number(mode, coder, stream, counts, slot, gaps[place])
+        gaps[place] = code_number(mode, coder, slot, gaps[place])
         if coder[arithmetic.STOPPED]:
             return
         digits = 0

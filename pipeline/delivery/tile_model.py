@@ -17,9 +17,7 @@ from pipeline.delivery.arithmetic import (
     LONGEST,
     STOPPED,
     Coder,
-    Counts,
     Mode,
-    Stream,
     code_bit,
     code_digits,
     code_lower_digits,
@@ -47,16 +45,12 @@ BROKEN = -1
 
 
 @compiled
-def code_tile(
-    mode: Mode, coder: Coder, stream: Stream, counts: Counts, tile: Indices, level_count: int
-) -> int:
+def code_tile(mode: Mode, coder: Coder, tile: Indices, level_count: int) -> int:
     """Code a tile, into ``stream`` or from it.
 
     Args:
         mode: ``WRITE`` or ``READ``.
-        coder: writer or reader.
-        stream: a writer's words, ``MOST_WORDS_PER_PIXEL`` for each pixel, or a reader's bytes.
-        counts: (``SLOTS``, 2) at the tile's beginning; changed.
+        coder: writer, with ``MOST_WORDS_PER_PIXEL`` for each pixel, or reader; with ``SLOTS`` slots.
         tile: (h, w) indices of levels, from 1, 0 where nothing was measured; a reader writes them.
         level_count: number of the image's levels.
 
@@ -72,10 +66,10 @@ def code_tile(
     for row in range(height):
         for column in range(width):
             slot = _mask_slot(tile, row, column)
-            measured = code_bit(mode, coder, stream, counts, slot, tile[row, column] > 0)
+            measured = code_bit(mode, coder, slot, tile[row, column] > 0)
             index = 0
             if measured:
-                index = _code_index(mode, coder, stream, counts, tile, row, column, last, digits)
+                index = _code_index(mode, coder, tile, row, column, last, digits)
             if coder[STOPPED]:
                 tile[row, column] = 0
                 return row * width + column
@@ -91,8 +85,6 @@ def code_tile(
 def _code_index(
     mode: Mode,
     coder: Coder,
-    stream: Stream,
-    counts: Counts,
     tile: Indices,
     row: int,
     column: int,
@@ -108,22 +100,20 @@ def _code_index(
     """
     prediction, activity = _predict(tile, row, column, last)
     if prediction == 0:
-        index = code_digits(mode, coder, stream, digits, tile[row, column])
+        index = code_digits(mode, coder, digits, tile[row, column])
     else:
         context = _context(tile, row, column, prediction, activity)
         difference = tile[row, column] - prediction
         index = prediction
-        if code_bit(mode, coder, stream, counts, _DIFFERS + context, difference != 0):
-            rises = code_bit(mode, coder, stream, counts, _RISES + context, difference > 0)
-            size = _code_size(mode, coder, stream, counts, context, activity, abs(difference))
+        if code_bit(mode, coder, _DIFFERS + context, difference != 0):
+            rises = code_bit(mode, coder, _RISES + context, difference > 0)
+            size = _code_size(mode, coder, context, activity, abs(difference))
             index = prediction + size if rises else prediction - size
     return index
 
 
 @inlined
-def _code_size(
-    mode: Mode, coder: Coder, stream: Stream, counts: Counts, context: int, activity: int, size: int
-) -> int:
+def _code_size(mode: Mode, coder: Coder, context: int, activity: int, size: int) -> int:
     """Code a difference's size, at least 1, as its number of binary digits and all but the first of them."""
     digits = 0
     longer = True
@@ -131,9 +121,9 @@ def _code_size(
         slot = _LONGER + _FINE * context + digits
         if digits >= _FINE:
             slot = _MUCH_LONGER + LONGEST * activity + digits
-        longer = code_bit(mode, coder, stream, counts, slot, size >> (digits + 1) > 0)
+        longer = code_bit(mode, coder, slot, size >> (digits + 1) > 0)
         digits += longer
-    return code_lower_digits(mode, coder, stream, counts, _SECOND_DIGIT + LONGEST * activity, digits, size)
+    return code_lower_digits(mode, coder, _SECOND_DIGIT + LONGEST * activity, digits, size)
 
 
 @compiled
