@@ -35,11 +35,15 @@ LIBRARIES = (
     "open3d-cpu",
     "onnxruntime",
     "simpy",
+    "trimesh",
     "small-gicp",
     "kiss-matcher",
+    "kiss-icp",
     "pycolmap",
 )
 """Libraries whose version can change a result; those that are not installed are skipped."""
+PART_BYTES = 1 << 24
+"""Bytes of a data file that are read at once; a data set may be larger than the memory."""
 
 
 def iterate_trials(
@@ -127,7 +131,9 @@ def trial_digest(module: str, data: tuple[Path, ...] = (), root: Path = ROOT) ->
     for path in data:
         for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
             if file.is_file():
-                digest.update(file.read_bytes())
+                with file.open("rb") as contents:
+                    while part := contents.read(PART_BYTES):
+                        digest.update(part)
     return digest.hexdigest()[:12]
 
 

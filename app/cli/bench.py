@@ -61,7 +61,9 @@ def bench(
     case_names = [name for names in only for name in names.split(",")]
     for case, result in run_benchmarks(case_names, CASES | served):
         peers = ", ".join(f"{name} {seconds:.3f} s" for name, seconds in result.peers.items()) or "no peer"
-        say(f"{case}: {result.ours_s:.3f} s ({peers}), {result.peak_memory_bytes / 1e6:.0f} MB at most")
+        peak_bytes = result.peak_memory_bytes
+        memory = "" if peak_bytes is None else f", {peak_bytes / 1e6:.0f} MB at most"
+        say(f"{case}: {result.ours_s:.3f} s ({peers}){memory}")
         for note in result.notes:
             say(f"  {note}")
         results[case] = result.record()

@@ -71,14 +71,17 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str | float | int | Non
     return Markup("<table><thead><tr>{}</tr></thead><tbody>{}</tbody></table>").format(head, body)
 
 
-def _row(values: Sequence[str | float | int | None]) -> Markup:
-    cells = Markup("").join(map(Markup("<td>{}</td>").format, map(_text, values)))
-    return Markup("<tr>{}</tr>").format(cells)
-
-
-def _text(value: str | float | int | None) -> str:
+def text(value: str | float | int | None) -> str:
+    """Return a value as text: four significant digits, no power of ten for large ones; a dash for None."""
     if value is None:
         return "–"
     if isinstance(value, str):
         return value
-    return f"{value:,}" if isinstance(value, int) else f"{value:.4g}"
+    if isinstance(value, int) or abs(value) >= 9999.5:
+        return f"{value:,.0f}"
+    return f"{value:.4g}"
+
+
+def _row(values: Sequence[str | float | int | None]) -> Markup:
+    cells = Markup("").join(map(Markup("<td>{}</td>").format, map(text, values)))
+    return Markup("<tr>{}</tr>").format(cells)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from app.reports.exhibits import exhibit_html
-from app.reports.html import table, write_page
+from app.reports.html import table, text, write_page
 from app.web.markup import Markup
 from lab.claims.claim import VERDICTS, Verdict
 
@@ -29,9 +29,10 @@ def write_reproduction_report(verdicts: Sequence[Verdict], path: Path) -> None:
         "runs of the network.</p>{}"
     ).format(_verdict_counts(thesis), Markup("").join(map(_section, thesis)))
     if ours:
-        body += Markup('<h1>Our claims beyond the thesis</h1><p class="lead">{}</p>{}').format(
-            _verdict_counts(ours), Markup("").join(map(_section, ours))
-        )
+        body += Markup(
+            '<h1>Our claims beyond the thesis</h1><p class="lead">{}</p><p class="note">In D01, D04, D05, '
+            "D07 and D08 F-scores, shares of rays and their changes are in points of 100.</p>{}"
+        ).format(_verdict_counts(ours), Markup("").join(map(_section, ours)))
     write_page(path, "PacketMesh: the thesis, computed again", body)
 
 
@@ -48,7 +49,7 @@ def _section(verdict: Verdict) -> Markup:
     rows = []
     for name, value in verdict.ours.items():
         low, high = verdict.ci95.get(name, (None, None))
-        rows.append((name.replace("_", " "), value, "" if low is None else f"{low:.4g} to {high:.4g}"))
+        rows.append((name.replace("_", " "), value, "" if low is None else f"{text(low)} to {text(high)}"))
     return Markup(
         '<h2>{} <span class="{}">{}</span></h2><p>{}. {}: {}.</p><p><b>Ours:</b> {}.</p>{}{}'
     ).format(

@@ -21,8 +21,9 @@ class Benchmark:
     """Time of PacketMesh, seconds; the median if the case has rounds."""
     peers: dict[str, float]
     """Median seconds of the other programs on the same input, by name; empty without peers."""
-    peak_memory_bytes: int
-    """Peak memory of the measuring process (ours, if each program has its own), including its libraries."""
+    peak_memory_bytes: int | None
+    """Peak memory of the measuring process (ours, if each program has its own), including its libraries; None
+    if that process may only have read stored answers, or has run other programs, too."""
     peer_memory_bytes: dict[str, int] = field(default_factory=dict)
     """Peak memory of each peer, if each program has its own process."""
     errors_m: dict[str, float] = field(default_factory=dict)

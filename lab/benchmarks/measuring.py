@@ -8,12 +8,15 @@ from lab.benchmarks.benchmark import Benchmark
 from lab.measuring.judging import UNITS, RoomTask, Row, judged_room, summaries
 from lab.measuring.rooms import HELD_OUT
 from lab.trials import iterate_trials
-from packetmesh.memory import peak_memory_bytes
 from packetmesh.progress import drain
+from pipeline.depth.completion import SHIPPED_COMPLETION
+from pipeline.depth.inference import SHIPPED_MODEL
 
 ROOMS = 20
 FOLDER = Path("runs/measuring")
 """Folder of the stored rows of the rooms; a room that has them is not measured again."""
+DATA = (SHIPPED_MODEL, SHIPPED_COMPLETION)
+"""The networks, on whose files the rows depend."""
 BATCH = 4
 """Rooms in a batch; batches follow until enough rooms have two views with the required overlap."""
 
@@ -28,7 +31,7 @@ def benchmark(rooms: int = ROOMS) -> Benchmark:
     first = HELD_OUT
     while len(found) < rooms:
         tasks = [RoomTask(seed) for seed in range(first, first + BATCH)]
-        answers = drain(iterate_trials("measuring", judged_room, tasks, FOLDER, processes=1))
+        answers = drain(iterate_trials("measuring", judged_room, tasks, FOLDER, processes=1, data=DATA))
         found += [rows for rows in answers if rows is not None]
         first += BATCH
     groups = summaries([row for rows in found[:rooms] for row in rows])
@@ -36,7 +39,7 @@ def benchmark(rooms: int = ROOMS) -> Benchmark:
     return Benchmark(
         lengths["median_s"],
         {},
-        peak_memory_bytes(),
+        None,
         runs=tuple(groups),
         notes=tuple(_line(group) for group in groups),
     )

@@ -20,7 +20,6 @@ from lab.places.ours import OURS_GEOMETRY, place_clouds
 from lab.places.pairs import CACHE
 from lab.places.peers import PLACE_PEERS, available_place_peers, refined
 from lab.trials import iterate_trials
-from packetmesh.memory import peak_memory_bytes
 from packetmesh.progress import drain
 from pipeline.io.clouds import read_cloud
 from pipeline.types import FloatArray, PointCloud
@@ -62,7 +61,7 @@ def benchmark(folder: Path = LISTS) -> Benchmark:
         f"{group['list']}: {group['program']} solves {group['right']} of {group['pairs']}" for group in groups
     )
     ours_s = median_s.pop(OURS_GEOMETRY)
-    return Benchmark(ours_s, median_s, peak_memory_bytes(), runs=tuple(groups), notes=notes)
+    return Benchmark(ours_s, median_s, None, runs=tuple(groups), notes=notes)
 
 
 def solve(task: ListTask) -> Row:

@@ -13,7 +13,6 @@ from lab.places.ours import OURS, OURS_GEOMETRY, solve_own
 from lab.places.pairs import CACHE, HELD_OUT, bench_pairs, mixed_pairs
 from lab.places.peers import PLACE_PEERS, available_place_peers, solve_peer
 from lab.trials import iterate_trials
-from packetmesh.memory import peak_memory_bytes
 from packetmesh.progress import drain
 
 PER_OVERLAP = 75
@@ -44,14 +43,13 @@ def benchmark(per_overlap: int = PER_OVERLAP) -> Benchmark:
     if missing:
         notes.append(f"Not installed, so not compared: {', '.join(missing)}")
     ours_s = seconds.pop(OURS)
-    return Benchmark(ours_s, seconds, peak_memory_bytes(), runs=tuple(groups), notes=tuple(notes))
+    return Benchmark(ours_s, seconds, None, runs=tuple(groups), notes=tuple(notes))
 
 
 def verdicts(count: int = MIXED) -> Benchmark:
     """Place pairs of any overlap, or of different rooms, by ours, and compare its verdict with the truth.
 
-    All cores work, because these times are not compared with those of other programs. The memory is that of
-    this process, without the workers.
+    All cores work, because these times are not compared with those of other programs.
     """
     rows = _answers(OWN, solve_own, list(mixed_pairs(HELD_OUT, count))[LOOKED_AT:], processes=None)
     seconds = {name: _median_s(some) for name, some in grouped(rows, "program").items()}
@@ -62,7 +60,7 @@ def verdicts(count: int = MIXED) -> Benchmark:
         for group in groups
     )
     ours_s = seconds.pop(OURS)
-    return Benchmark(ours_s, seconds, peak_memory_bytes(), runs=tuple(groups), notes=notes)
+    return Benchmark(ours_s, seconds, None, runs=tuple(groups), notes=notes)
 
 
 def by_overlap(rows: Iterable[Row]) -> list[Row]:

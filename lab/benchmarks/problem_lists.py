@@ -2,7 +2,8 @@
 
 The rooms are box rooms that no claim uses, seen by two cameras. The LiDAR pair is from the source archive of
 small_gicp (``data/source.ply``, ``target.ply``, ``T_target_source.txt``), an independent recording. Each
-source is rotated by up to 45 degrees about its middle and shifted by up to a fifth of its size.
+source, aligned with its target, is rotated by up to 45 degrees and shifted by up to a fifth of its size. The
+rotation is about the place where its middle was before it was aligned, so that its middle moves farther.
 """
 
 from __future__ import annotations
@@ -29,7 +30,10 @@ TURN_DEG, SHIFT_OF_EXTENT = 45.0, 0.2
 
 
 def motions(cloud: PointCloud, count: int, seed: int) -> list[FloatArray]:
-    """Return (4, 4) motions about a cloud's middle, with angles and shifts uniform from 0 to the largest."""
+    """Return (4, 4) motions about a cloud's middle, with angles and shifts uniform from 0 to the largest.
+
+    ``main`` takes the cloud in its own frame, and the lists apply the motions in the target's frame.
+    """
     rng = np.random.default_rng(seed)
     center_m, extent_m = cloud.points_m.mean(axis=0), middle_extent_m(cloud.points_m)
     result = []

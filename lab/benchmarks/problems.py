@@ -55,6 +55,18 @@ class Problem:
         return np.vstack([np.reshape(self.motion, (3, 4)), [0.0, 0.0, 0.0, 1.0]])
 
 
+@dataclass(frozen=True, slots=True)
+class MethodAnswer:
+    """Pose of one method; None, like its time, if it has none."""
+
+    method: str
+    T_target_source: FloatArray | None
+    """(4, 4)."""
+    elapsed_s: float | None
+    reason: str
+    """Why it stopped, or why there is no pose."""
+
+
 def scaled_displacement(T_left: FloatArray, points_m: FloatArray) -> float:
     """Return the benchmark's error: the mean over points of displacement over distance to the centroid.
 
@@ -123,38 +135,57 @@ def solve(problem: Problem) -> list[dict[str, Any]]:
     """Solve one problem by our method and by the installed peers; return a row for each.
 
     All start at the identity; ours, like `packetmesh register`, also searches for other start poses and for
-    the gate. The peers get the gate that it found; the search counts in our time only. If ours cannot use the
-    clouds or finds no start, the only row is ours, with an error of None.
+    the gate. The peers get the gate that it found, the default one if it found none; the search counts in our
+    time only. Without an answer, error and seconds are None.
     """
     source, target = read_cloud(problem.source), read_cloud(problem.target)
     moved = source.transformed(problem.T_moved)
     known = {"list": problem.list_name, "id": problem.id, "overlap": problem.overlap}
     known["error_before"] = scaled_displacement(problem.T_moved, source.points_m)
-    started = time.perf_counter()
-    try:
-        pair = prepared_pair(moved, target, RegistrationConfig(seed=0), metres_per_unit=(1.0, 1.0))
-        place = find_place(pair, RegistrationConfig(seed=0), None)
-        ours = settled_answer(DEFAULT_METHOD, place)
-    except PacketMeshError as error:
-        return [known | {"method": OURS, "error": None, "elapsed_s": None, "reason": str(error)}]
-    elapsed_s, gate_m = time.perf_counter() - started, place.config.gate_m
-    answers = (
-        [] if ours.T_target_source is None else [(OURS, ours.T_target_source, elapsed_s, ours.stop_reason)]
-    )
-    for name in (name for name in PEERS if name in available_peers()):
-        peer = run_peer(name, pair.source, pair.target, gate_m, pair.T_init)
-        answers.append((name, peer.T_target_source, peer.elapsed_s, peer.stop_reason))
+    ours, pair, gate_m = _own_answer(moved, target)
+    peers = [_peer_answer(name, pair, gate_m) for name in PEERS if name in available_peers()]
     return [
         known
         | {
-            "method": name,
+            "method": one.method,
             "gate_m": gate_m,
-            "error": scaled_displacement(T @ problem.T_moved, source.points_m),
-            "elapsed_s": seconds,
-            "reason": reason,
+            "error": None
+            if one.T_target_source is None
+            else scaled_displacement(one.T_target_source @ problem.T_moved, source.points_m),
+            "elapsed_s": one.elapsed_s,
+            "reason": one.reason,
         }
-        for name, T, seconds, reason in answers
+        for one in (ours, *peers)
     ]
+
+
+def _own_answer(source: PointCloud, target: PointCloud) -> tuple[MethodAnswer, Pair, float]:
+    """Return our answer, the pair that the peers get, and their gate in metres.
+
+    The pair is prepared as for our method, or not at all if our method cannot use the clouds.
+    """
+    config = RegistrationConfig(seed=0)
+    pair, gate_m = Pair(source, target, np.eye(4)), config.gate_m
+    started = time.perf_counter()
+    try:
+        pair = prepared_pair(source, target, config, metres_per_unit=(1.0, 1.0))
+        place = find_place(pair, config, None)
+        gate_m = place.config.gate_m
+        found = settled_answer(DEFAULT_METHOD, place)
+    except PacketMeshError as error:
+        return MethodAnswer(OURS, None, None, str(error)), pair, gate_m
+    T = found.T_target_source
+    elapsed_s = None if T is None else time.perf_counter() - started
+    return MethodAnswer(OURS, T, elapsed_s, found.stop_reason), pair, gate_m
+
+
+def _peer_answer(name: str, pair: Pair, gate_m: float) -> MethodAnswer:
+    """Return the answer of a peer that starts at the identity."""
+    try:
+        found = run_peer(name, pair.source, pair.target, gate_m)
+    except PacketMeshError as error:
+        return MethodAnswer(name, None, None, str(error))
+    return MethodAnswer(name, found.T_target_source, found.elapsed_s, found.stop_reason)
 
 
 def summary(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:

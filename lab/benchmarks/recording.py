@@ -99,9 +99,16 @@ def _answers(
     every: int,
     folder: Path,
 ) -> list[Row]:
-    """Return every program's rows, computed one after the other so that times can be compared."""
-    tasks = [WalkTask(name, walk, every) for walk in walks for name in programs]
-    return drain(iterate_trials("recordings", measure, tasks, folder / "answers", processes=1))
+    """Return every program's rows, computed one after the other so that times can be compared.
+
+    The answers on a walk depend on its files, and not on other walks.
+    """
+    rows: list[Row] = []
+    for walk in walks:
+        tasks = [WalkTask(name, walk, every) for name in programs]
+        stored = folder / "answers"
+        rows += drain(iterate_trials("recordings", measure, tasks, stored, processes=1, data=(walk,)))
+    return rows
 
 
 def _by_program(rows: Iterable[Row]) -> list[tuple[str, list[Row]]]:

@@ -20,14 +20,15 @@ WIDTH_PX, HEIGHT_PX = 640, 480
 
 def _image_size() -> Outcome:
     frames = [frame for name in DEMO_SCENES for frame in load_demo(name).frames]
+    right = sum(frame.rgb.shape[:2] == frame.depth.z_m.shape == (HEIGHT_PX, WIDTH_PX) for frame in frames)
     size = ppm_bytes(WIDTH_PX, HEIGHT_PX)
     seconds = 8.0 * size / LINK_BPS
     return Outcome(
         {"frames": float(len(frames)), "seconds_an_image": seconds},
         {},
-        all(frame.rgb.shape[:2] == frame.depth.z_m.shape == (HEIGHT_PX, WIDTH_PX) for frame in frames),
-        f"all {len(frames)} images of the demo scenes have {WIDTH_PX} x {HEIGHT_PX} pixels; 30 of them a "
-        f"second cross no network of the thesis, whose link takes {seconds:.0f} s for one",
+        right == len(frames),
+        f"{right} of {len(frames)} images of the demo scenes have {WIDTH_PX} x {HEIGHT_PX} pixels; 30 of "
+        f"them a second cross no network of the thesis, whose link takes {seconds:.0f} s for one",
     )
 
 

@@ -83,7 +83,7 @@ def whole_holes(runs: Sequence[Row]) -> str:
         named = "the best of the others" if best == NETWORK else f"{than_best:+.0f} % to {best}, the best"
         own.append(f"{group.removesuffix(', own holes')} {less:+.0f} % ({named})")
     return (
-        "**Where it earns its place.** Error of completion against that of the colour network alone. Over "
+        "**Where completion helps.** Error of completion against that of the colour network alone. Over "
         f"all hidden pixels of shapes of real holes: {'; '.join(hidden)}. In the sensors' own holes, which "
         f"is where it is used and why it ships: {'; '.join(own)}."
     )
@@ -114,7 +114,7 @@ def trust(claim: Row) -> str:
     return (
         f"**Its confidence.** Of pixels said to be right with {low:.0f} to {high:.0f} %, so many are: "
         f"{measured}; of all of them together {right / sum(pixels):.1f} %. "
-        f"Too modest: {'; '.join(modest) or 'none'}. Too sure: {'; '.join(sure) or 'none'}. A "
+        f"Confidence too low in: {'; '.join(modest) or 'none'}; too high in: {'; '.join(sure) or 'none'}. A "
         "sensor's own holes are where it fails: dark, shiny and far things, unlike what surrounds them. "
         "Hidden shapes lie where it measured, on things that are easier to continue, so there its "
         "confidence follows other odds; both were fitted on validation rooms, hole pixels counting alike."

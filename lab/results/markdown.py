@@ -16,12 +16,12 @@ def table(header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
 
 
 def text(value: Cell) -> str:
-    """Return a value as text: three significant digits; integers and values from 1000 without decimals."""
+    """Return a value as text: three significant digits; integers and values from 999.5 without decimals."""
     if value is None:
         return "–"
     if isinstance(value, str):
         return value.replace("|", "\\|")
-    if isinstance(value, int) or abs(value) >= 1000.0:
+    if isinstance(value, int) or abs(value) >= 999.5:
         return f"{value:,.0f}"
     return f"{value:.3g}"
 

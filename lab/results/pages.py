@@ -63,7 +63,7 @@ INTRODUCTION = """# Results
 
 Written by `make results` from the records in [docs/results](results): edit neither this page nor its numbers.
 `make results-record ONLY=NAME` measures again. A record also holds the versions of the libraries. Shares of
-claims run from 0 to 1, intervals are 95 %."""
+claims run from 0 to 1 unless per cent or points of 100 are named, intervals are 95 %."""
 
 
 def write_pages() -> None:
@@ -161,9 +161,10 @@ def _registration(numbers: Row) -> str:
 
 def _walks(numbers: Row) -> str:
     run = next(run for run in numbers[recordings.EVERY]["runs"] if run["program"] == WALKER)
+    longer = run["frames_s"] < RATE_HZ
     return (
-        f"**A walk takes longer than it lasted.** One core follows and maps {run['frames_s']:.0f} frames of "
-        f"320 x 240 a second, and the camera takes {RATE_HZ:.0f} "
+        f"**A walk takes {'longer' if longer else 'no longer'} than it lasted.** One core follows and maps "
+        f"{run['frames_s']:.0f} frames of 320 x 240 a second, and the camera takes {RATE_HZ:.0f} "
         f"({_link('other programs', 'recordings-a-camera-that-walks')})."
     )
 
@@ -194,10 +195,11 @@ def _filling(runs: list[Row]) -> str:
     """Compare our completion with one depth everywhere, in the first group of images with hidden depth."""
     group = next(run["group"] for run in runs if run.get("group", "").endswith(", hidden"))
     errors = {run["program"]: run["abs_rel"] for run in runs if run.get("group") == group}
+    ratio = errors[OURS] / errors[FLAT]
     return (
-        "**Completion hardly beats a flat guess.** Its error in hidden holes of "
-        f"{group.removesuffix(', hidden')} is {errors[OURS] / errors[FLAT]:.2f} times that of one depth "
-        f"everywhere ({_link('all programs', 'filling-holes')})."
+        f"**Completion {'beats' if ratio < 1.0 else 'does not beat'} a flat guess.** Its error in hidden "
+        f"holes of {group.removesuffix(', hidden')} is {ratio:.2f} times that of one depth everywhere "
+        f"({_link('all programs', 'filling-holes')})."
     )
 
 
@@ -207,7 +209,7 @@ def _unreproduced(claims: Row) -> str:
     waiting = sorted(everyone - set(claims))
     sentence = (
         f"**Not every claim of the thesis reproduces.** {len(missing)} of {len(everyone)} do not "
-        f"({_link('which, and why', 'registration-the-thesiss-claims')})."
+        "([which, and why](docs/results.md))."
     )
     return sentence + (f" Not measured since the last change: {listed(waiting)}." if waiting else "")
 

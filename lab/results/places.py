@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from lab.benchmarks.places import DIFFERENT, NOTHING
+from lab.benchmarks.places import NOTHING
 from lab.places.judging import RIGHT_DEG, RIGHT_M, wilson
 from lab.places.ours import OURS
+from lab.places.views import TOLERANCE
 from lab.results.chart import Series, chart
 from lab.results.markdown import Cell, Row, percent, table
 
@@ -14,7 +15,6 @@ BY_OVERLAP, ANY_OVERLAP, LISTS = "places: by overlap", "places: any overlap", "p
 """Cases of the benchmark in its record."""
 RECALL, VERDICT = "places_recall.svg", "places_verdict.svg"
 """Files of the pictures, next to the page."""
-APART = (DIFFERENT, NOTHING)
 
 
 def places(numbers: Row) -> str:
@@ -64,7 +64,7 @@ def verdict_picture(runs: list[Row]) -> str:
     """Return a chart of our shares over the overlap: right, called sure, and called sure but wrong."""
     own = [run for run in runs if run["program"] == OURS and run["overlap"] != "all" and run["pairs"]]
     kinds = {"right": "right", "called sure": "sure", "called sure but wrong": "sure_wrong"}
-    names = [run["overlap"].replace(" to ", "–") for run in own]
+    names = [_overlap(run).replace(" to ", "–") for run in own]
     series = [_series(label, own, key) for label, key in kinds.items()]
     return chart("overlap", "share of the pairs", [name.removesuffix(" %") for name in names], series)
 
@@ -85,13 +85,19 @@ def _verdicts(runs: list[Row]) -> str:
     for run in runs:
         missed = run["right"] - ((run["sure"] or 0) - (run["sure_wrong"] or 0))
         share = percent(missed / run["right"]) if run["right"] else None
-        rows.append((run["program"], run["overlap"], *_counts(run), share))
+        rows.append((run["program"], _overlap(run), *_counts(run), share))
     return table(("program", "overlap", *_COUNTED, "right but not sure"), rows)
 
 
 def _lists(runs: list[Row]) -> str:
     rows = [(run["list"].removesuffix("_local"), run["program"], *_counts(run)) for run in runs]
     return table(("list", "program", *_COUNTED), rows)
+
+
+def _overlap(run: Row) -> str:
+    """Return the text of a group's overlap; views that should have none may share ``TOLERANCE``."""
+    overlap: str = run["overlap"]
+    return f"at most {percent(TOLERANCE, 0)}" if overlap == NOTHING else overlap
 
 
 _COUNTED = ("pairs", "right", "95 %", "called sure", "of these wrong", "seconds, median")

@@ -72,7 +72,9 @@ def camera(
 def judged(one: dict[str, Any]) -> dict[str, Any]:
     """Return mrcal's camera and the (G,) errors in metres by its uncertainty and by two halves of the views.
 
-    The halves are the even and the odd views; with fewer than six views their error is None.
+    The halves are the even and the odd views; with fewer than six views their error is None. mrcal finds the
+    transformation between their cameras on a grid of its own, and the errors are those at the (G, 2) pixels
+    ``grid_px``, as the uncertainty is.
     """
     points_px, rt, grid_px = (np.array(one[name], float) for name in ("points_px", "rt", "grid_px"))
     how = one["lens"], np.array(one["start"], float), one["size_px"], one["spacing_m"]
@@ -91,10 +93,13 @@ def judged(one: dict[str, Any]) -> dict[str, Any]:
     apart_m = None
     if len(points_px) >= 6:
         halves = [camera(points_px[first::2], rt[first::2], *how) for first in (0, 1)]
-        apart_px = mrcal.projection_diff(
+        Rt = mrcal.projection_diff(
             halves, gridn_width=one["columns"], gridn_height=one["rows"], distance=range_m
-        )[0]
-        apart_m = (apart_px.ravel() * pixel_m).tolist()
+        )[3]
+        even, odd = (half.intrinsics() for half in halves)
+        points_m = range_m * mrcal.unproject(grid_px, *even, normalize=True)
+        moved_px = mrcal.project(mrcal.transform_point_Rt(Rt, points_m), *odd)
+        apart_m = (np.linalg.norm(moved_px - grid_px, axis=1) * pixel_m).tolist()
     return {
         "camera": values.tolist(),
         "uncertainty_m": (2.4477 * sd_px * pixel_m).tolist(),

@@ -87,10 +87,11 @@ def test_processes_find_what_a_single_one_finds(tmp_path):
     assert {json.loads(line)["task"] for line in next(stored).open()} == {repr(task) for task in tasks}
 
 
-def test_other_data_are_other_trials(tmp_path):
+def test_other_data_are_other_trials(tmp_path, monkeypatch):
     (tmp_path / "data").mkdir()
     weights = tmp_path / "data" / "weights"
-    for contents, computed in (("a", 5), ("b", 5), ("a", 0)):
+    monkeypatch.setattr(trials, "PART_BYTES", 3)
+    for contents, computed in (("a", 5), ("aaaab", 5), ("aaaac", 5), ("a", 0)):
         weights.write_text(contents)
         trial_digest.cache_clear()
         assert len(run(tmp_path / "store", data=[tmp_path / "data"])[2]) == computed
@@ -150,7 +151,9 @@ def test_the_digest_keeps_through_changes_of_words(house):
     assert digest(house) == before
 
 
-@pytest.mark.parametrize("library", ["numpy", "numba", "open3d-cpu", "simpy", "small-gicp"])
+@pytest.mark.parametrize(
+    "library", ["numpy", "numba", "open3d-cpu", "simpy", "small-gicp", "kiss-icp", "trimesh"]
+)
 def test_the_digest_names_the_libraries(house, monkeypatch, library):
     versions = dict.fromkeys(trials.LIBRARIES, "1.0")
     monkeypatch.setattr(trials.metadata, "version", lambda name: versions[name])

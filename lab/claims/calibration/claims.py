@@ -89,7 +89,7 @@ def _c01(study: CalibrationStudy) -> Outcome:
     return Outcome(
         ours,
         {"mean_error_px": bootstrap_ci95(errors[np.isfinite(errors)])},
-        ours["found_share"] == 1.0 and ours["mean_error_px"] < 0.15,
+        ours["found_share"] == 1.0 and ours["largest_mean_error_px"] < 0.15,
         f"the 99 circles are found in {int(found.sum())} of {len(found)} rendered photographs tilted by up "
         f"to 50°, {int(upright.sum())} of them the right way up by the mark; centres are off by "
         f"{ours['mean_error_px']:.3f} px in the mean, {ours['largest_mean_error_px']:.3f} in the worst view",
@@ -242,7 +242,8 @@ CLAIMS = (
         "C01",
         "The 99 circles of the 9 x 11 board are found in its images (Fig. 3.5)",
         "a figure",
-        "all of 40 rendered photographs of 1380 x 1030 pixels up to 50° of tilt, centres within 0.15 px",
+        "all of 40 rendered photographs of 1380 x 1030 pixels up to 50° of tilt, in each a mean error of the "
+        "centres below 0.15 px",
         _c01,
     ),
     _claim(

@@ -128,7 +128,7 @@ def judge(found: Found) -> Outcome:
         (
             Table(
                 "F-score of some of the cameras",
-                ("cameras heard", *found, "mean"),
+                ("number of cameras, program", *found, "mean"),
                 tuple(rows),
                 "F-score at 5 cm of the fused surface, in per cent, against all that the rig's cameras could "
                 "see. Greedy takes the quality of SPEC 6.3, which gains by a second look; by sight, one look "

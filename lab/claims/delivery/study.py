@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -68,18 +68,28 @@ class Study:
 
     def rate_terms(self, coding: str, when: str) -> list[FloatArray]:
         """Return each rig's (S, 2) slope terms by seed: F-score points over % lost in bursts, up to 10 %."""
-        groups = []
-        for rig in self.rigs:
-            by_seed: dict[int, list[LossTask]] = {}
-            for task in self.tasks(coding, rigs=(rig,)):
-                if task.share <= RATE_SHARE:
-                    by_seed.setdefault(task.seed, []).append(task)
-            terms = [
-                slope_terms(map(self.lost_percent, tasks), (self.cost(task, when) for task in tasks))
-                for _, tasks in sorted(by_seed.items())
+        return [
+            self.terms_by_seed(
+                [task for task in self.tasks(coding, rigs=(rig,)) if task.share <= RATE_SHARE],
+                lambda task: self.cost(task, when),
+            )
+            for rig in self.rigs
+        ]
+
+    def terms_by_seed(self, tasks: Iterable[LossTask], effect: Callable[[LossTask], float]) -> FloatArray:
+        """Return (S, 2) slope terms of an effect over % lost, one row for all shares of a seed.
+
+        The shares of a seed have the same random numbers, so they are one repetition.
+        """
+        by_seed: dict[int, list[LossTask]] = {}
+        for task in tasks:
+            by_seed.setdefault(task.seed, []).append(task)
+        return np.stack(
+            [
+                slope_terms(map(self.lost_percent, some), map(effect, some))
+                for _, some in sorted(by_seed.items())
             ]
-            groups.append(np.stack(terms))
-        return groups
+        )
 
 
 def delivery_study(

@@ -122,7 +122,7 @@ def losses_table(study: Study) -> Table:
     return Table(
         "What is left after losses",
         (
-            *("coding", "bytes a packet", "losses", "asked", "trials", "lost, %", "kB delivered"),
+            *("coding", "bytes a packet", "losses", "configured loss", "trials", "lost, %", "kB delivered"),
             *(name for name, _, _ in MEASURES),
         ),
         tuple(rows),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -54,6 +55,7 @@ class LossTask:
     share: float
     """Expected share of lost packets; of ``deadline`` the exact share, up to rounding."""
     seed: int
+    """Seed of the losses, which differ between rigs: equal seeds of two rigs are independent."""
     alignment: AlignmentMode = "local"
     """Method that makes inferred depth metric."""
 
@@ -104,7 +106,7 @@ def frames_left(rig: Rig, task: LossTask) -> tuple[list[RgbdFrame], Values]:
         lost = [np.arange(count) >= round((1.0 - task.share) * count) for count in counts]
     else:
         losses = LossConfig(task.share, BURST_PACKETS if task.loss == "burst" else 1.0)
-        lost = packets_lost(counts, losses, task.seed)
+        lost = packets_lost(counts, losses, zlib.crc32(f"{task.rig} {task.seed}".encode()))
     frames, delivered = [], 0
     for frame, stream, gone in zip(rig.frames, streams, lost, strict=True):
         there = np.repeat(~gone, task.packet_bytes)[: stream.size]

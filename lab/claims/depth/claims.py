@@ -19,7 +19,7 @@ from lab.claims.depth.errors import (
     from_trial,
     site_trial,
 )
-from lab.claims.depth.scenes import HELD_OUT, VIEWS_PER_ROOM, real_folders, sites
+from lab.claims.depth.scenes import HELD_OUT, VIEWS_PER_ROOM, real_folders, set_paths, sites
 from lab.claims.exhibits import Chart, Curve, Picture, Table
 from lab.trials import iterate_trials
 from packetmesh.progress import Progress
@@ -43,7 +43,7 @@ NOTES = {
 
 def infer_all(folder: Path, scheduler: str | None) -> Generator[Progress, None, tuple[SceneErrors, ...]]:
     """Infer the depth of all images of all sites and compare it with their references."""
-    data = (SHIPPED_MODEL, SCENES, *real_folders())
+    data = (SHIPPED_MODEL, SCENES, *real_folders(), *set_paths())
     found = yield from iterate_trials("C12 and C14, depth", site_trial, sites(), folder, scheduler, data=data)
     return tuple(from_trial(site, result) for site, result in zip(sites(), found, strict=True))
 
@@ -65,7 +65,7 @@ def judge_errors(measured: Sequence[SceneErrors]) -> Outcome:
         {f"abs_rel_{JUDGED}_{scene.site.name}": _ci95_of_rooms(scene) for scene in held_out},
         max(abs_rel) <= TARGET_ABS_REL,
         f"median-scaled AbsRel on the three held-out scenes, {sum(len(s.frames) for s in held_out)} frames, "
-        f"is {', '.join(f'{value:.3f}' for value in abs_rel)}, where {TARGET_ABS_REL:g} is asked of each; "
+        f"is {', '.join(f'{value:.3f}' for value in abs_rel)}; the limit is {TARGET_ABS_REL:g} for each; "
         f"elsewhere {elsewhere or 'there was nothing to measure'}; the thesis's values are no baseline, "
         "because they are KITTI's, of streets up to 80 m deep",
         (*error_tables(measured), *distance_charts(measured), *pictures(measured)),
@@ -191,7 +191,7 @@ def judge_against_sensor(measured: Sequence[SceneErrors]) -> Outcome:
         len(worse) == len(sensor),
         f"even in its best alignment the network errs more than the sensor in {len(worse)} of {len(sensor)} "
         f"scenes, {min(times):.1f} to {max(times):.1f} times as much"
-        + (f"; how much the sensor errs on {', '.join(unknown)} nobody knows" if unknown else ""),
+        + (f"; the sensor's error on {', '.join(unknown)} is unknown" if unknown else ""),
         (table,),
     )
 

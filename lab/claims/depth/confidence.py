@@ -28,8 +28,8 @@ LARGEST_GAP = 0.1
 """Largest accepted difference between a bin's confidence and correct share, averaged over pixels."""
 NOTE = (
     "Pixels of hidden depth, and of the sensors' own holes where the truth is known, before any is left out "
-    "for little confidence. Said: mean confidence in the bin. True: share within 5 % of what judges, and its "
-    "95 % interval by resampling rooms, demo scenes, or hidden parts of the real frames."
+    "for little confidence. Confidence: its mean in the bin. Correct share: pixels within 5 % of the "
+    "reference, and the 95 % interval by resampling rooms, demo scenes, or hidden parts of the real frames."
 )
 
 
@@ -145,12 +145,12 @@ def judge_confidence(measured: Sequence[Reliability]) -> Outcome:
     ci95: dict[str, tuple[float, float]] = {}
     for one in measured:
         pixels, confidence, right = one.counts.sum(axis=(0, 2))
-        ours |= {f"said_{one.group}": confidence / pixels, f"true_{one.group}": right / pixels}
+        ours |= {f"confidence_{one.group}": confidence / pixels, f"correct_share_{one.group}": right / pixels}
         ours[f"gap_{one.group}"] = one.gap
         ci95[f"gap_{one.group}"] = one.gap_ci95
     sentences = (
-        f"{one.group} {ours[f'said_{one.group}']:.0%} said, {ours[f'true_{one.group}']:.0%} true, "
-        f"{100.0 * one.gap:.1f} points apart bin by bin"
+        f"{one.group}: confidence {ours[f'confidence_{one.group}']:.0%}, correct share "
+        f"{ours[f'correct_share_{one.group}']:.0%}, {100.0 * one.gap:.1f} points apart bin by bin"
         for one in measured
     )
     return Outcome(
@@ -171,10 +171,10 @@ def confidence_chart(measured: Sequence[Reliability]) -> Chart:
         confidence, true = (tuple(values[numbers].tolist()) for values in (one.confidence, one.true))
         curves.append(Curve(one.group, confidence, true, low, high))
     return Chart(
-        "Confidence, said against true",
-        "said: mean confidence",
-        "true: share within 5 %",
-        (plain_curve("said is true", (0.0, 1.0), (0.0, 1.0)), *curves),
+        "Correct share against confidence",
+        "mean confidence",
+        "share within 5 %",
+        (plain_curve("equal", (0.0, 1.0), (0.0, 1.0)), *curves),
         NOTE,
     )
 
@@ -188,7 +188,9 @@ def confidence_table(measured: Sequence[Reliability]) -> Table:
             span = f"{EDGES[number]:.0%} to {EDGES[number + 1]:.0%}"
             true = f"{one.true[number]:.1%} [{low:.1%}, {high:.1%}]"
             rows.append((one.group, span, int(one.pixels[number]), f"{one.confidence[number]:.1%}", true))
-    return Table("Confidence in bins", ("images", "bin", "pixels", "said", "true"), tuple(rows), NOTE)
+    return Table(
+        "Confidence in bins", ("images", "bin", "pixels", "confidence", "correct share"), tuple(rows), NOTE
+    )
 
 
 D10 = Claim(

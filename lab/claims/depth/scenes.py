@@ -112,6 +112,11 @@ def named_sets() -> list[str]:
     return [text for text in os.environ.get(SETS_VARIABLE, "").split(os.pathsep) if text]
 
 
+def set_paths() -> tuple[Path, ...]:
+    """Return the folder, or file, of each set that ``PACKETMESH_DEPTH_SETS`` names."""
+    return tuple(Path(text.partition("=")[2].strip()).expanduser() for text in named_sets())
+
+
 def pairs(text: str) -> Iterator[Example]:
     """Yield the images of one set, ``kind=path``, evaluated in its usual crop.
 

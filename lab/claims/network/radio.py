@@ -113,6 +113,7 @@ def _setup_rows() -> list[tuple[str, str | float, str | float]]:
     """Return rows of a parameter's name, the thesis's value and the preset's."""
     return [
         ("medium access", "ieee80211b", STREET.mac.kind),
+        ("data rate, Mbit/s", 11.0, STREET.mac.rate_bps / 1e6),
         ("RTS/CTS", "no", "yes" if STREET.mac.rts else "no"),
         ("nominal range, m", 100.0, STREET.radio.range_m),
         ("propagation", "two-ray", STREET.radio.model),

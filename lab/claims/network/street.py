@@ -76,8 +76,8 @@ def _c30(found: Found) -> Outcome:
         {},
         parameters and least <= scheme.image_bytes,
         f"the sizes are the preset's, as symbols: 1000 bytes are {bit_per_px:.3f} bit a pixel, and even a "
-        f"grey area of 800 x 600 pixels takes {least:,} bytes as JPEG; of the images of {LARGE_OBJECTS} "
-        f"vehicles these shares arrive with 1 and with 30 kB: {arrived}",
+        f"grey area of 800 x 600 pixels takes {least:,} bytes as a baseline colour JPEG; of the images of "
+        f"{LARGE_OBJECTS} vehicles these shares arrive with 1 and with 30 kB: {arrived}",
         (sizes_table(found, LARGE_OBJECTS, LARGE_HORIZON_S),),
     )
 

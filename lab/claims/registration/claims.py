@@ -11,7 +11,7 @@ import numpy as np
 from lab.claims.claim import Claim, Outcome, bootstrap_ci95
 from lab.claims.registration.capture import map_capture
 from lab.claims.registration.cases import CONDITIONS
-from lab.claims.registration.curves import capture_maps, captured_shares, convergence_charts
+from lab.claims.registration.curves import capture_maps, captured_rooms, convergence_charts
 from lab.claims.registration.entrants import PIXEL_PAIRS
 from lab.claims.registration.results import Results
 from lab.claims.registration.setup import FIXED_GATE, capture_tasks, case_tasks
@@ -27,6 +27,7 @@ from lab.claims.registration.tables import (
     tuning_table,
 )
 from lab.claims.registration.trials import run_case
+from lab.places.judging import wilson
 from lab.trials import iterate_trials
 from packetmesh.progress import Progress
 from pipeline.types import FloatArray
@@ -97,7 +98,7 @@ def _c16(results: Results) -> Outcome:
         {},
         len(beaten) == len(BEATEN),
         f"median ratio of the point errors of CEICP-A and its rivals over {judged[0].cases} trials: "
-        f"{ratios}; beyond the claim {reported}; target matched to source {_backward(back)}. "
+        f"{ratios}; not part of the claim: {reported}; target matched to source {_backward(back)}. "
         f"{_losses(results)}. By average Hausdorff distance on the overlap the ratio to ICP is "
         f"{ahd[0].ratio:.2f}",
         exhibits,
@@ -209,22 +210,25 @@ def _faster(results: Results, entrant: str, quantity: str) -> bool:
 
 
 def _c20(results: Results) -> Outcome:
-    maps = capture_maps(results)
     ours: dict[str, float] = {}
+    ci95: dict[str, tuple[float, float]] = {}
     why = []
     for entrant in dict.fromkeys(cell["entrant"] for cell in results.cells):
-        shares = captured_shares(results, entrant)
-        near, far = shares[min(shares)], shares[max(shares)]
-        ours |= {f"captured_nearest_{entrant}": near, f"captured_farthest_{entrant}": far}
-        mean = ours[f"captured_mean_{entrant}"] = float(np.mean(list(shares.values())))
-        why.append(f"{entrant} {near:.0%} and {far:.0%}, {mean:.0%} of all starts")
+        captured = captured_rooms(results, entrant)
+        ends = {"nearest": captured[min(captured)], "farthest": captured[max(captured)]}
+        for end, rooms in ends.items():
+            ours[f"captured_{end}_{entrant}"] = float(np.mean(rooms))
+            ci95[f"captured_{end}_{entrant}"] = wilson(sum(rooms), len(rooms))
+        mean = ours[f"captured_mean_{entrant}"] = float(np.mean(list(captured.values())))
+        near, far = (f"{sum(rooms)} of {len(rooms)}" for rooms in ends.values())
+        why.append(f"{entrant} {near} and {far}, {mean:.0%} from all starts")
     return Outcome(
         ours,
-        {},
+        ci95,
         ours[f"captured_farthest_{FIXED_GATE}"] <= 0.5 * ours[f"captured_nearest_{FIXED_GATE}"],
         "rooms that end within 1.5 degrees and 5 cm from the nearest and the farthest start: "
         + "; ".join(why),
-        maps,
+        capture_maps(results),
     )
 
 

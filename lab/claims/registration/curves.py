@@ -16,6 +16,10 @@ from pipeline.types import FloatArray
 
 LAST_ITERATION = 60
 SECONDS = np.linspace(0.0, 0.4, 21)
+GROWING_GATE = (
+    f"T_d is twice the translation, at least {CONDITIONS['easy'].gate_m:g} m (ICP and FICP have none)"
+)
+"""Gate of the capture maps whose gate depends on the start."""
 
 
 def convergence_charts(results: Results, condition: str) -> tuple[Chart, ...]:
@@ -72,10 +76,11 @@ def capture_maps(results: Results) -> tuple[HeatMap, ...]:
     """Return, for every entrant, the share of captured rooms by the start's rotation and translation."""
     maps = []
     for entrant in dict.fromkeys(cell["entrant"] for cell in results.cells):
-        captured = captured_shares(results, entrant)
+        captured = captured_rooms(results, entrant)
         rotations = tuple(sorted({rotation for rotation, _ in captured}))
         translations = tuple(sorted({translation for _, translation in captured}))
-        shares = tuple(tuple(captured[r, t] for t in translations) for r in rotations)
+        shares = tuple(tuple(float(np.mean(captured[r, t])) for t in translations) for r in rotations)
+        rooms = len(next(iter(captured.values())))
         maps.append(
             HeatMap(
                 f"capture range, {entrant}",
@@ -84,17 +89,17 @@ def capture_maps(results: Results) -> tuple[HeatMap, ...]:
                 "start turned by, degrees",
                 rotations,
                 shares,
-                "Share of the rooms that end within 1.5 degrees and 5 cm, on the clouds of “easy”"
-                + ("." if entrant == FIXED_GATE else "; the gate is twice the translation."),
+                f"Share of {rooms} rooms that end within 1.5 degrees and 5 cm, on the clouds of “easy”"
+                + ("." if entrant == FIXED_GATE else f"; {GROWING_GATE}."),
             )
         )
     return tuple(maps)
 
 
-def captured_shares(results: Results, entrant: str) -> dict[tuple[float, float], float]:
-    """Return the share of rooms captured from each start: (rotation in degrees, translation in metres)."""
+def captured_rooms(results: Results, entrant: str) -> dict[tuple[float, float], list[bool]]:
+    """Return by start, (rotation in degrees, translation in metres), whether each room is captured."""
     found: dict[tuple[float, float], list[bool]] = {}
     for cell in results.cells:
         if cell["entrant"] == entrant:
             found.setdefault((cell["rotation_deg"], cell["translation_m"]), []).append(cell["captured"])
-    return {start: float(np.mean(captured)) for start, captured in found.items()}
+    return found

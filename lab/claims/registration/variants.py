@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from pipeline.config import RegistrationConfig
-from pipeline.registration.ceicp import CeicpA, CeicpN
+from pipeline.registration.ceicp import FACING_SPREAD, CeicpA, CeicpN
 from pipeline.registration.ceicp_literal import CeicpLiteral
 from pipeline.registration.ficp import LAMBDA, Ficp, inlier_fraction
 from pipeline.registration.icp import Icp
@@ -15,7 +15,7 @@ from pipeline.registration.matching import Matching
 from pipeline.registration.methods import METHODS, MethodStart
 from pipeline.registration.ricp import Ricp
 from pipeline.registration.weighting import PairWeighting, PairWeights, closest_rows, evenly
-from pipeline.types import PointCloud
+from pipeline.types import FloatArray, PointCloud
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +36,14 @@ class GatedIcp(Icp):
 
 @dataclass(frozen=True, slots=True)
 class GaussianA(CeicpA):
-    """CEICP-A without the entropy factor: w = p. With the plane metric p lacks the normals' factor, too."""
+    """CEICP-A without the entropy factor: w = p, which with the plane metric has the normals' factor, too."""
 
     def weigh(self, matching: Matching) -> PairWeights:
-        """Return the pairs of CEICP-A, with plain Gaussian weights."""
-        return _gaussian(CeicpA.weigh(self, matching), matching)
+        """Return the pairs of CEICP-A, with their probabilities as weights."""
+        kept = CeicpA.weigh(self, matching)
+        if matching.cosines is None:
+            return _gaussian(kept, matching)
+        return _gaussian(kept, matching, (1.0 - matching.cosines[kept.rows]) / FACING_SPREAD**2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,10 +107,10 @@ class FicpWithExponent(Ficp):
         return evenly(closest_rows(matching.distances_m, fraction))
 
 
-def _gaussian(kept: PairWeights, matching: Matching) -> PairWeights:
-    """Return the same pairs with weights exp(-d^2 / 2 sigma^2)."""
+def _gaussian(kept: PairWeights, matching: Matching, more: FloatArray | float = 0.0) -> PairWeights:
+    """Return the same pairs with normalised weights exp(-d^2 / 2 sigma^2 - more); ``more`` is (M,) or 0."""
     variance_m2 = max(kept.sigma_m**2, np.finfo(float).tiny)
-    kernel = np.exp(-0.5 * matching.distances_m[kept.rows] ** 2 / variance_m2)
+    kernel = np.exp(-0.5 * matching.distances_m[kept.rows] ** 2 / variance_m2 - more)
     return PairWeights(kept.rows, kernel / kernel.sum() if len(kernel) else kernel, kept.sigma_m)
 
 

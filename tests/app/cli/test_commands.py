@@ -139,6 +139,12 @@ def test_bench_tells_the_notes_of_a_case_below_its_times(capsys, monkeypatch, tm
     assert json.loads(out)["network"]["notes"] == list(measured.notes)
 
 
+def test_bench_leaves_memory_out_where_it_was_not_measured(capsys, monkeypatch, tmp_path):
+    measured = Benchmark(1.5, {"peer": 2.0}, None)
+    monkeypatch.setattr(benchmarks, "run_benchmarks", lambda only, cases: [("places", measured)])
+    assert run(capsys, "bench", "--out", str(tmp_path))[2] == "places: 1.500 s (peer 2.000 s)\n"
+
+
 def test_a_folder_that_cannot_be_written_is_named(capsys, tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("")

@@ -46,6 +46,14 @@ def test_text_from_outside_cannot_become_markup():
     assert '"><' not in picture(np.zeros((2, 2, 3), np.uint8), '"><b>')[:60]
 
 
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.123456, "0.1235"), (9999.4, "9999"), (9999.7, "10,000"), (5.5e6, "5,500,000"), (12345, "12,345")],
+)
+def test_a_large_number_has_no_power_of_ten(value, text):
+    assert f"<td>{text}</td>" in table(("name", "value"), [("a", value)])
+
+
 def test_the_reproduction_report_counts_what_was_reproduced(tmp_path):
     verdicts = [
         Verdict(id_, "claim", "thesis", "tolerance", {"x": 0.5}, {"x": (0.4, 0.6)}, verdict, "why")
@@ -77,3 +85,4 @@ def test_claims_of_ours_stand_apart_from_the_thesis_s(tmp_path):
     assert places == sorted(places)
     assert "Claims: 1 reproduced." in text
     assert "Claims: 1 holds, 1 does not hold." in text
+    assert text.index("Our claims beyond") < text.index("are in points of 100") < text.index("claim D1")

@@ -9,7 +9,7 @@ from lab.benchmarks.places import DIFFERENT, NOTHING, by_overlap, by_verdict
 from lab.places.ours import OURS
 from lab.results.chart import BOTTOM, HEIGHT, TOP, Series, chart
 from lab.results.pages import PLACES, readme_results
-from lab.results.places import BY_OVERLAP, pictures, places
+from lab.results.places import ANY_OVERLAP, BY_OVERLAP, VERDICT, pictures, places
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -70,6 +70,15 @@ def test_the_table_says_what_was_counted():
     assert f"| {OURS} | 60 % | 4 | 75.0 % | 30 to 95 % | 4 | 1 (25.0 %) | 1.5 |" in text
     assert "| peer | 60 % | 2 | 50.0 % | 9 to 91 % | – | – | 1 |" in text
     assert text.startswith("6 pairs")
+
+
+def test_views_without_overlap_are_said_to_share_at_most_the_tolerance():
+    numbers = {
+        BY_OVERLAP: {"runs": by_overlap(ROWS)},
+        ANY_OVERLAP: {"runs": by_verdict([row(0.0, False, "none"), row(0.31, True)])},
+    }
+    assert "| at most 2 % | 1 | 0.0 % |" in places(numbers)
+    assert ">at most 2</text>" in pictures(numbers)[VERDICT]
 
 
 def test_the_readme_says_how_many_are_placed_at_the_least_and_the_largest_overlap():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from app.cli.bench import bench
+from lab.benchmarks import problems
 from lab.benchmarks.problem_lists import motions
 from lab.benchmarks.problems import (
     COLUMNS,
@@ -16,7 +17,7 @@ from lab.benchmarks.problems import (
     summary,
     write_problems,
 )
-from packetmesh.errors import InputError
+from packetmesh.errors import InputError, ReconstructionError
 from pipeline.kernels.geometry import apply, rigid, rotation_exp
 from pipeline.pairs.register import Pair
 from pipeline.types import PointCloud
@@ -51,10 +52,10 @@ def test_the_error_is_that_of_the_paper():
 
 
 def test_what_is_written_is_read_and_the_clouds_lie_on_each_other(folder):
-    problems = read_problems(folder)
-    assert [problem.id for problem in problems] == ["corner_00_000", "corner_00_001"]
+    found = read_problems(folder)
+    assert [problem.id for problem in found] == ["corner_00_000", "corner_00_001"]
     assert (folder / "corner_local.txt").read_text().startswith(" ".join(COLUMNS))
-    np.testing.assert_allclose(problems[1].T_moved[:3, 3], [30.0, 0.0, 0.0])
+    np.testing.assert_allclose(found[1].T_moved[:3, 3], [30.0, 0.0, 0.0])
 
 
 def test_a_small_motion_and_a_far_one_are_undone_and_every_problem_has_its_row(folder, tmp_path, capsys):
@@ -68,6 +69,32 @@ def test_a_small_motion_and_a_far_one_are_undone_and_every_problem_has_its_row(f
     ours = next(group for group in printed["summary"] if group["method"] == OURS)
     assert (ours["problems"], ours["solved_share"]) == (2, 1.0)
     assert len(printed["problems"]) == len(rows)
+
+
+@pytest.mark.parametrize("step", ["prepared_pair", "find_place", "settled_answer"])
+def test_peers_run_at_the_identity_where_ours_has_no_answer(folder, monkeypatch, step):
+    def fails(*arguments, **named):
+        raise ReconstructionError("no start leads anywhere")
+
+    small = read_problems(folder)[0]
+    monkeypatch.setattr(problems, step, fails)
+    monkeypatch.setattr(problems, "PEERS", ("open3d-plane",))
+    ours, peer = problems.solve(small)
+    assert (ours["method"], ours["error"], ours["elapsed_s"]) == (OURS, None, None)
+    assert ours["reason"] == "no start leads anywhere"
+    assert peer["method"] == "open3d-plane"
+    assert peer["error"] < 0.1 * peer["error_before"]
+
+
+def test_a_peer_without_an_answer_has_a_row_too(folder, monkeypatch):
+    def fails(*arguments, **named):
+        raise InputError("too few points")
+
+    monkeypatch.setattr(problems, "find_place", fails)
+    monkeypatch.setattr(problems, "run_peer", fails)
+    monkeypatch.setattr(problems, "PEERS", ("open3d-plane",))
+    rows = problems.solve(read_problems(folder)[0])
+    assert [(row["error"], row["reason"]) for row in rows] == [(None, "too few points")] * 2
 
 
 def test_a_problem_without_an_answer_is_not_solved():

@@ -7,7 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from lab.benchmarks import recording
 from lab.benchmarks.recording import compared, summary
+from lab.trials import trial_digest
 from lab.walks import peers
 from lab.walks.held_out import FIRST_ROOM, WalkTask, frames_in_memory, held_out_walks
 from lab.walks.judging import map_errors, rpe_m, to_truth, trajectory_errors
@@ -101,6 +103,26 @@ def test_a_recording_of_others_is_judged_by_its_poses_which_no_program_gets(walk
     assert rows[1]["ate_m"] == pytest.approx(rows[0]["ate_m"], rel=1e-3)
     assert rows[1]["path_m"] == pytest.approx(rows[0]["path_m"], rel=1e-3)
     assert rows[1]["map_median_m"] is None
+
+
+def test_answers_on_a_walk_are_computed_again_if_its_files_change_and_only_then(tmp_path, monkeypatch):
+    walks = [tmp_path / name for name in ("a", "b")]
+    for walk in walks:
+        walk.mkdir()
+        (walk / "0.png").write_text("first")
+    measured = []
+
+    def measure(task):
+        measured.append(task.folder.name)
+        return {"program": task.program}
+
+    for changed, names in ((None, ["a", "b"]), (None, []), (walks[1], ["b"])):
+        if changed is not None:
+            (changed / "0.png").write_text("second")
+        trial_digest.cache_clear()
+        measured.clear()
+        assert len(recording._answers(("ours",), measure, walks, 1, tmp_path)) == 2
+        assert measured == names
 
 
 def test_a_steady_drift_is_the_relative_error_over_a_second():

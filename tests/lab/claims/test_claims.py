@@ -1,12 +1,15 @@
 """Claims are judged by their own numbers, and the numbers can be had by other means."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from lab.benchmarks import run_benchmarks
+from lab.claims import settings
 from lab.claims.claim import Claim, Outcome, Verdict, bootstrap_ci95
 from lab.claims.outliers import brute_force_keep, with_gross_outliers
 from lab.claims.registry import CLAIMS, run_claims
@@ -16,7 +19,7 @@ from packetmesh.progress import Progress
 from pipeline.acquisition import filter_outliers
 from pipeline.config import AcquisitionConfig
 from pipeline.io.demos import load_demo
-from pipeline.types import PointCloud
+from pipeline.types import DepthMap, PointCloud
 
 SPEC = Path(__file__).parents[3] / "docs" / "SPEC.md"
 
@@ -53,6 +56,16 @@ def test_settings_are_true_by_definition_and_others_work_cannot_be_tested():
     assert verdicts["C09"].verdict == "true by definition"
     assert verdicts["C09"].ours["seconds_an_image"] == pytest.approx(921_615 * 8 / 250_000)
     assert {verdicts[name].verdict for name in ("C11", "C37")} == {"cannot be tested"}
+
+
+def test_c09_counts_the_images_that_have_the_size(monkeypatch):
+    frame = load_demo("office").frames[0]
+    small = replace(frame, rgb=frame.rgb[:240, :320], depth=DepthMap(frame.depth.z_m[:240, :320]))
+    monkeypatch.setattr(settings, "DEMO_SCENES", ("office",))
+    monkeypatch.setattr(settings, "load_demo", lambda name: SimpleNamespace(frames=(frame, frame, small)))
+    verdict = CLAIMS["C09"].judge()
+    assert verdict.verdict == "not reproduced"
+    assert verdict.why.startswith("2 of 3 images of the demo scenes have 640 x 480 pixels")
 
 
 def test_all_trials_are_run_only_where_they_are_asked_for(monkeypatch, tmp_path):

@@ -1,4 +1,4 @@
-"""D10: said and true are compared bin by bin, and the verdict follows them."""
+"""D10: confidence and correct share are compared bin by bin, and the verdict follows them."""
 
 import json
 
@@ -63,7 +63,7 @@ def test_one_group_beyond_the_limit_is_enough_to_fail():
     assert D10.judge(reliabilities([near])).verdict == "holds"
     verdict = D10.judge(reliabilities([near, far]))
     assert verdict.verdict == "does not hold"
-    assert "h 75% said, 64% true, 11.0 points apart bin by bin" in verdict.why
+    assert "h: confidence 75%, correct share 64%, 11.0 points apart bin by bin" in verdict.why
 
 
 def test_the_exhibits_show_every_filled_bin_and_the_report_draws_them(tmp_path):
@@ -83,7 +83,7 @@ def test_the_exhibits_show_every_filled_bin_and_the_report_draws_them(tmp_path):
     ]
     verdict: Verdict = D10.judge(reliabilities([image(0.75, 0.5)]))
     write_reproduction_report([verdict], tmp_path / "r.html")
-    assert "Confidence, said against true" in (tmp_path / "r.html").read_text()
+    assert "Correct share against confidence" in (tmp_path / "r.html").read_text()
     json.dumps(finite(verdict.record()), allow_nan=False)
 
 

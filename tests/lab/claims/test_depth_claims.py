@@ -3,6 +3,7 @@
 import json
 import os
 from functools import partial
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -39,6 +40,7 @@ from lab.claims.depth.scenes import (
 from lab.training.dataset import FIRST_SEED
 from lab.training.evaluate import Example
 from packetmesh.files import finite
+from packetmesh.progress import Progress, drain
 from pipeline.depth import DepthNetwork
 from pipeline.types import DepthMap
 
@@ -248,7 +250,7 @@ def test_c14_leaves_out_what_nobody_knows_and_says_so():
     real = measured(slope_m(), truth=False, name="kinect", group="real frames")
     outcome = claims.judge_against_sensor((*three_scenes((1.3, 1.4, 1.5)), real))
     assert not any("kinect" in name for name in outcome.ours)
-    assert "kinect nobody knows" in outcome.why
+    assert "the sensor's error on kinect is unknown" in outcome.why
 
 
 def test_the_report_and_the_record_hold_everything(tmp_path):
@@ -336,6 +338,21 @@ def test_a_user_s_sets_are_named_by_a_variable(monkeypatch):
     assert (nyu.group, nyu.cap_m) == ("set nyu", 10.0)
     assert isinstance(nyu.examples, partial)
     assert nyu.examples.args == ("nyu=/b",)
+
+
+def test_the_trials_depend_on_the_files_of_the_user_s_sets(tmp_path, monkeypatch):
+    given = []
+
+    def trials(stage, function, tasks, folder, scheduler, data):
+        given.extend(data)
+        yield Progress(stage, 1.0)
+        return []
+
+    monkeypatch.setattr(claims, "iterate_trials", trials)
+    monkeypatch.setattr(claims, "sites", tuple)
+    monkeypatch.setenv("PACKETMESH_DEPTH_SETS", os.pathsep.join(("folder= ~/a", f"nyu={tmp_path}/b.mat")))
+    assert drain(claims.infer_all(tmp_path, None)) == ()
+    assert given[-2:] == [Path.home() / "a", tmp_path / "b.mat"]
 
 
 def test_a_folder_of_pairs_is_measured_like_any_other_site(tmp_path, monkeypatch):

@@ -103,6 +103,16 @@ def test_one_saturated_station_gets_what_bianchi_says():
     assert throughput_bps == pytest.approx(8000 / (1275.818182e-6 + 310e-6), rel=0.01)
 
 
+def test_c32_states_the_data_rate_and_fails_with_another(monkeypatch):
+    bps = (1e6,) * len(radio.STATIONS)
+    runs = radio.Throughputs(tuple((value,) * radio.RUNS for value in bps), bps)
+    (claim,) = radio.CLAIMS
+    assert claim.experiment((runs, runs)).reproduced
+    assert ("data rate, Mbit/s", 11.0, 11.0) in claim.experiment((runs, runs)).exhibits[0].rows
+    monkeypatch.setattr(radio, "STREET", with_settings(radio.STREET, ["mac.rate_bps=2e6"]))
+    assert not claim.experiment((runs, runs)).reproduced
+
+
 def test_an_interrupted_claim_resumes_and_gives_the_same_verdict(tmp_path, monkeypatch):
     monkeypatch.setattr(link, "LINK", with_settings(link.LINK, ["nodes.image_bytes=2000"]))
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
@@ -171,6 +181,7 @@ def test_no_jpeg_of_800_by_600_is_as_small_as_the_thesis_says():
     assert not outcome.reproduced
     assert outcome.ours["least_jpeg_bytes"] > 1000.0
     assert outcome.ours["bit_per_px"] == pytest.approx(8000 / 480_000)
+    assert "as a baseline colour JPEG" in outcome.why
 
 
 def test_a_camera_behind_a_sphere_sees_nothing_of_what_is_behind():

@@ -1,5 +1,7 @@
 """The section about filling says what its record says, programs and sizes side by side."""
 
+import pytest
+
 from lab.results.completion import target, trust, whole_holes
 from lab.results.pages import readme_results
 from lab.results.record import Record
@@ -61,10 +63,14 @@ def test_sizes_stand_side_by_side():
     assert "| packetmesh | 0.0200 [0.0100, 0.0400] | 0.2000 [0.1000, 0.4000] |" in PAGE
 
 
-def test_the_readme_compares_ours_with_the_flat_guess():
-    record = Record("bench_depth", "c", "abc", "2026-01-01", {}, "a machine", NUMBERS)
+@pytest.mark.parametrize(("factor", "heading"), [(2.0, "does not beat"), (0.5, "beats")])
+def test_the_readme_compares_ours_with_the_flat_guess(factor, heading):
+    runs = [run("packetmesh", "rooms, hidden", 0.02 * factor), run("flat guess", "rooms, hidden", 0.02)]
+    numbers = {"depth": {"runs": runs}}
+    record = Record("bench_depth", "c", "abc", "2026-01-01", {}, "a machine", numbers)
     (line,) = readme_results({"bench_depth": record})
-    assert "hidden holes of rooms is 2.00 times that of one depth everywhere" in line
+    assert line.startswith(f"**Completion {heading} a flat guess.**")
+    assert f"hidden holes of rooms is {factor:.2f} times that of one depth everywhere" in line
 
 
 def test_what_completion_is_worth_is_said_of_the_target_the_hidden_and_the_own_holes():
@@ -86,13 +92,13 @@ def test_what_completion_is_worth_is_said_of_the_target_the_hidden_and_the_own_h
     assert "own holes, which is where it is used and why it ships: rooms -9 %" in said
 
 
-def test_confidence_is_too_modest_above_what_it_says_and_too_sure_below():
+def test_confidence_is_too_low_where_more_are_right_and_too_high_where_fewer_are():
     found = (("a", 9, 93), ("b", 27, 71))
     rows = [[group, "80% to 90%", pixels, "85.0%", f"{true}% [1%, 2%]"] for group, pixels, true in found]
     said = trust(
         {"tables": [{"title": "Confidence in bins", "rows": [*rows, ["a", "0% to 10%", 1, "", ""]]}]}
     )
     assert (
-        "a: 93% [1%, 2%]; b: 71% [1%, 2%]; of all of them together 76.5 %. Too modest: a. Too sure: b."
-        in said
+        "a: 93% [1%, 2%]; b: 71% [1%, 2%]; of all of them together 76.5 %. Confidence too low in: a; too "
+        "high in: b." in said
     )

@@ -9,6 +9,7 @@ from lab.results.markdown import change, listed, pivot, table, text
 from lab.results.pages import (
     DEPTH_README,
     README,
+    RECORDINGS,
     RESULTS,
     WORTH,
     marked,
@@ -18,7 +19,9 @@ from lab.results.pages import (
     worth,
 )
 from lab.results.record import read_records
+from lab.results.recordings import EVERY
 from lab.results.tables import losses
+from lab.walks.ours import OURS as WALKER
 
 RECORDS = read_records()
 DECIMAL = re.compile(r"\d+\.\d+")
@@ -66,6 +69,20 @@ def test_no_result_is_typed_into_the_readme_s_lines():
     assert [one for one, other_one in zip(ours, theirs, strict=True) if one == other_one] == []
 
 
+def test_the_claims_that_do_not_reproduce_are_linked_to_the_whole_page():
+    """They are in several sections."""
+    (line,) = (line for line in readme_results(RECORDS) if line.startswith("**Not every claim"))
+    assert "([which, and why](docs/results.md))" in line
+
+
+@pytest.mark.parametrize(("frames_s", "heading"), [(20.0, "longer"), (40.0, "no longer")])
+def test_a_walk_takes_longer_only_below_the_camera_s_rate(frames_s, heading):
+    runs = [{"program": WALKER, "frames_s": frames_s}]
+    records = {RECORDINGS: replace(RECORDS[RECORDINGS], numbers={EVERY: {"runs": runs}})}
+    (line,) = readme_results(records)
+    assert line.startswith(f"**A walk takes {heading} than it lasted.**")
+
+
 def test_a_table_has_a_cell_for_every_column():
     lines = table(("a", "b"), [("x|y", 1.0), (None, 1234567)]).splitlines()
     assert lines == ["| a | b |", "| --- | --- |", "| x\\|y | 1 |", "| – | 1,234,567 |"]
@@ -73,7 +90,17 @@ def test_a_table_has_a_cell_for_every_column():
 
 @pytest.mark.parametrize(
     ("value", "written"),
-    [(0.012345, "0.0123"), (12345.6, "12,346"), (7, "7"), (-1.0, "-1"), (None, "–"), (1e-6, "1e-06")],
+    [
+        (0.012345, "0.0123"),
+        (12345.6, "12,346"),
+        (7, "7"),
+        (-1.0, "-1"),
+        (None, "–"),
+        (1e-6, "1e-06"),
+        (999.4, "999"),
+        (999.7, "1,000"),
+        (-999.7, "-1,000"),
+    ],
 )
 def test_numbers_keep_three_digits(value, written):
     assert text(value) == written

@@ -1,8 +1,10 @@
 """Sessions are what they claim to be, the truth about a camera is the true camera's, and counts are right."""
 
+import importlib
 import json
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -72,6 +74,52 @@ def test_a_session_is_judged_by_each_rule():
         assert rule["word"] in {"pass", "fail", "not decided"}
         assert rule["good"] == told["good"]
     json.dumps(told)
+
+
+@pytest.fixture
+def script(monkeypatch):
+    """``mrcal_script`` with pinhole cameras in place of mrcal, which only another Python has."""
+
+    def project(points_m, kind, values):
+        return values[0] * points_m[..., :2] / points_m[..., 2:] + values[1:]
+
+    def unproject(points_px, kind, values, normalize):
+        rays = np.insert((points_px - values[1:]) / values[0], 2, 1.0, axis=-1)
+        return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+
+    def projection_diff(models, gridn_width, gridn_height, distance):
+        own = np.zeros((gridn_height, gridn_width))
+        return own, own, own, np.vstack([np.eye(3), np.zeros(3)])
+
+    fake = SimpleNamespace(
+        project=project,
+        unproject=unproject,
+        projection_diff=projection_diff,
+        projection_uncertainty=lambda points_m, model, what: np.full(len(points_m), 1.0 / 2.4477),
+        transform_point_Rt=lambda Rt, points_m: points_m @ Rt[:3].T + Rt[3],
+    )
+    monkeypatch.setitem(sys.modules, "mrcal", fake)
+    monkeypatch.delitem(sys.modules, "lab.verdicts.mrcal_script", raising=False)
+    yield importlib.import_module("lab.verdicts.mrcal_script")
+    del sys.modules["lab.verdicts.mrcal_script"]
+
+
+def test_the_halves_of_mrcal_are_compared_at_the_given_pixels(script, monkeypatch):
+    """The odd views' focal length is 1 % longer: a pixel r from the centre moves by 1 % of r."""
+
+    def camera(points_px, rt, *how):
+        longer = 1.01 if points_px[0, 0, 0, 0] else 1.0
+        return SimpleNamespace(intrinsics=lambda: ("pinhole", np.array([500.0 * longer, 320.0, 240.0])))
+
+    monkeypatch.setattr(script, "camera", camera)
+    grid_px = np.array([[320.0, 240.0], [420.0, 240.0], [20.0, 640.0]])
+    views_px = np.tile(np.arange(6.0)[:, None, None, None] % 2.0, (1, 2, 2, 2))
+    given = {"points_px": views_px, "rt": np.zeros((6, 6)), "grid_px": grid_px, "columns": 3, "rows": 1}
+    given |= {"lens": "thesis", "start": [], "size_px": [640, 480], "spacing_m": 0.1, "range_m": 2.0}
+    told = script.judged(given)
+    pixel_m = np.array(told["uncertainty_m"])  # the uncertainty is one pixel
+    assert pixel_m[0] == pytest.approx(2.0 / 500.0, rel=1e-3)
+    assert told["apart_m"] == pytest.approx(0.01 * np.array([0.0, 100.0, 500.0]) * pixel_m, abs=1e-9)
 
 
 def answer(word, good, probability=0.5):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lab.claims.calibration import box_views
-from lab.claims.calibration.box_claim import STATES, TABLE_4_5_CM, BoxStudy, judge
+from lab.claims.calibration.box_claim import STATES, BoxStudy, judge
 from lab.claims.calibration.box_size import box_size_m
 from lab.claims.calibration.box_views import SIZES_M, bought, box_depth, calibrated, measured_m
 from lab.claims.registry import CLAIMS
@@ -70,8 +70,10 @@ def study(error_m):
 def test_the_verdict_follows_the_numbers(raw_m, calibrated_m, verdict):
     outcome = judge(study(dict(zip(STATES, (raw_m, raw_m, calibrated_m, 0.003), strict=True))))
     assert outcome.reproduced is verdict
-    rows = outcome.exhibits[0].rows
-    assert [row[2:] for row in rows if row[1] == "thesis"] == list(TABLE_4_5_CM)
+    table = outcome.exhibits[0]
+    thesis = [dict(zip(table.header, row, strict=True)) for row in table.rows if row[1] == "thesis"]
+    means_cm = {name: np.mean([row[name] for row in thesis]) for name in ("width", "length", "height")}
+    assert means_cm == pytest.approx({"width": 0.67, "length": 0.66, "height": 0.697}, abs=0.0005)  # SPEC 7
 
 
 def test_it_is_a_claim():

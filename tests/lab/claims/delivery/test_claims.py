@@ -1,6 +1,7 @@
 """D01 to D08 follow their numbers: made-up trials whose answers are known."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from lab.claims.claim import Verdict
 from lab.claims.delivery import cameras, pieces
 from lab.claims.delivery.claims import CLAIMS
-from lab.claims.delivery.setup import loss_tasks, send_tasks
+from lab.claims.delivery.setup import SEEDS, loss_tasks, send_tasks
 from lab.claims.delivery.study import Study
 from lab.results.pages import results_page
 from lab.results.record import Record, rounded
@@ -100,6 +101,27 @@ def test_the_hypotheses_follow_their_trials():
     assert verdicts["D05"].ours["gain_local_0.25"] == pytest.approx(1.0)
     shrinking = judged(made_up(fusion_gain=lambda lost: 0.1 - 0.005 * lost))
     assert shrinking["D03"].verdict == shrinking["D04"].verdict == "does not hold"
+
+
+def test_all_shares_of_a_seed_are_one_repetition():
+    study = made_up()
+    tasks = study.tasks("tiles", rigs=("office",))
+    assert len(tasks) > len({task.seed for task in tasks}) == SEEDS
+    terms = study.terms_by_seed(tasks, lambda task: 3.0 * study.lost_percent(task))
+    assert terms.shape == (SEEDS, 2)
+    assert terms[:, 0] == pytest.approx(3.0 * terms[:, 1])
+    shares = np.array([task.share for task in tasks if task.seed == 1])
+    assert terms[1, 1] == pytest.approx(np.sum((100.0 * shares) ** 2))
+
+
+def test_with_one_seed_and_equal_rigs_d04_has_an_interval_of_no_width():
+    """Although its shares, one repetition, lie on no line."""
+    study = made_up(fusion_gain=lambda lost: 0.1 + 1e-4 * lost**2)
+    first = {task: values for task, values in study.losses.items() if task.seed == 0}
+    verdict = judged(replace(study, losses=first))["D04"]
+    for coding in RATES:
+        name = f"gain_per_percent_{coding}"
+        assert verdict.ci95[name] == pytest.approx((verdict.ours[name],) * 2)
 
 
 def test_what_fusion_makes_of_no_colour_is_seen():

@@ -64,6 +64,15 @@ def test_every_node_loses_packets_of_its_own_and_seeds_repeat():
     assert not np.array_equal(one, packets_lost([500, 500], LossConfig(0.2), seed=2)[0])
 
 
+def test_rigs_with_equal_seeds_lose_different_packets(rig):
+    one, other, again = (
+        frames_left(rig, LossTask(name, "raw", SMALL, "burst", 0.3, 0))[0][0].rgb_known
+        for name in ("one", "other", "one")
+    )
+    np.testing.assert_array_equal(one, again)
+    assert not np.array_equal(one, other)
+
+
 @pytest.mark.parametrize("coding", LOSSLESS)
 @pytest.mark.parametrize("packet_bytes", [LARGE, SMALL])
 def test_a_lossless_coding_without_losses_gives_the_very_images(rig, coding, packet_bytes):

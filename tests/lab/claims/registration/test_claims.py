@@ -108,6 +108,20 @@ def test_c20_needs_a_farthest_start_that_fails():
     assert _verdict("C20", far_captured=True) == "not reproduced"
 
 
+def test_c20_counts_its_rooms_with_their_interval():
+    """Of 12 rooms and no failure, Wilson's interval begins at 1 / (1 + 1.96^2 / 12)."""
+    verdict = registry.CLAIMS["C20"].judge(_results())
+    assert "icp 12 of 12 and 0 of 12, 75% from all starts" in verdict.why
+    assert verdict.ours["captured_farthest_icp"] == 0.0
+    assert verdict.ci95["captured_nearest_icp"] == pytest.approx(
+        (1.0 / (1.0 + 1.96**2 / 12.0), 1.0), abs=1e-4
+    )
+    notes = {exhibit.title: exhibit.note for exhibit in verdict.exhibits}
+    assert notes["capture range, ceicp-n, T_d 0.3 m"].endswith("of “easy”.")
+    assert notes["capture range, ceicp-n"].startswith("Share of 12 rooms")
+    assert "T_d is twice the translation, at least 0.3 m" in notes["capture range, ceicp-n"]
+
+
 def test_equal_errors_are_reported_as_ties():
     why = registry.CLAIMS["C16"].judge(_results(error_cm={"icp": 2.0})).why
     assert "ficp 1.00 (tie)" in why

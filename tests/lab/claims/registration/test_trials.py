@@ -15,9 +15,12 @@ from lab.claims.registration.setup import ablations, capture_tasks, case_tasks, 
 from lab.claims.registration.trials import AHD_VOXEL_M, CaseTask, Ruler, k90, run_case, run_entrant
 from lab.claims.registration.tuned import TUNED
 from lab.claims.registration.tuning import CANDIDATES, tuning_lineup, write_tuned
+from lab.claims.registration.variants import GaussianA, GaussianN
 from packetmesh.errors import ReconstructionError
 from pipeline.kernels.geometry import apply, rigid, rotation_exp
 from pipeline.registration import point_error_m
+from pipeline.registration.ceicp import CeicpA, CeicpN
+from pipeline.registration.matching import Matching
 from pipeline.registration.methods import METHODS
 from pipeline.surface.voxel import voxel_average
 from pipeline.types import PointCloud
@@ -125,6 +128,25 @@ def test_taking_the_entropy_factor_out_changes_the_way_but_hardly_the_goal(case)
     whole, plain = (_pose(Entrant(name), thinned) for name in ("ceicp-a", "ceicp-a-gaussian"))
     assert not np.array_equal(whole, plain)
     assert point_error_m(whole, plain, thinned.source.points_m) < 0.003
+
+
+@pytest.mark.parametrize(
+    ("whole", "plain", "cosines"),
+    [
+        (CeicpA(0.1, 0.1, 0.01, 0.9), GaussianA(0.1, 0.1, 0.01, 0.9), False),
+        (CeicpA(0.1, 0.1, 0.01, 0.9), GaussianA(0.1, 0.1, 0.01, 0.9), True),
+        (CeicpN(0.3), GaussianN(0.3), False),
+    ],
+)
+def test_without_the_entropy_factor_the_weights_are_the_probabilities_themselves(whole, plain, cosines):
+    """So the whole method's are -p log p of them, normalised: with the plane metric, the normals included."""
+    rng = np.random.default_rng(4)
+    distances_m, nothing = rng.uniform(0.0, 0.4, 300), np.zeros((300, 3))
+    turned = rng.uniform(0.3, 1.0, 300) if cosines else None
+    pairs = Matching(np.arange(300), np.arange(300), nothing, nothing, distances_m, cosines=turned)
+    kept, p = whole.weigh(pairs), plain.weigh(pairs).weights
+    assert 100 < len(p) < 300
+    np.testing.assert_allclose(kept.weights, -p * np.log(p) / -(p @ np.log(p)), rtol=1e-9)
 
 
 @pytest.mark.parametrize(
