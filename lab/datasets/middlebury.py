@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import zipfile
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -22,12 +23,33 @@ from pipeline.types import CameraIntrinsics, FloatArray
 _NUMBER = r"(-?[\d.]+(?:e[-+]?\d+)?)"
 
 
+@dataclass(frozen=True, slots=True)
+class Stereo:
+    """The left camera of a rectified stereo pair, and what turns its disparities into depth."""
+
+    focal_px: float
+    center_px: tuple[float, float]
+    """Principal point (x, y)."""
+    baseline_m: float
+    doffs_px: float
+    """The right minus the left principal point, along x."""
+
+    def pair(self, picture: Path, disparity_px: FloatArray) -> Pair:
+        """Return the left image with the depth of its disparities and its camera.
+
+        Args:
+            picture: file of the left image.
+            disparity_px: (H, W), not finite where unknown.
+        """
+        z_m = depth_m(disparity_px, self.focal_px, self.baseline_m, self.doffs_px)
+        height, width = z_m.shape
+        camera = CameraIntrinsics.pinhole(self.focal_px, self.focal_px, *self.center_px, width, height)
+        return Pair(picture, read_color(picture), z_m, camera=camera)
+
+
 ARCHIVE, ARCHIVE_PICTURE = "motorcycle_disp.npz", "motorcycle_left.png"
-MOTORCYCLE = (994.978, 0.193001, 31.086)
-"""Focal length (pixels), baseline (metres) and offset (pixels) of the quarter-size images in scikit-image
-(data.stereo_motorcycle)."""
-MOTORCYCLE_CENTER_PX = (311.193, 254.877)
-"""The left camera's principal point (x, y), from the same source."""
+MOTORCYCLE = Stereo(994.978, (311.193, 254.877), 0.193001, 31.086)
+"""Calibration of the quarter-size images in scikit-image (data.stereo_motorcycle)."""
 
 
 def find(root: Path) -> list[Load]:
@@ -46,8 +68,7 @@ def _there(folder: Path, *names: str) -> bool:
 
 def _load_scene(folder: Path) -> Pair:
     stereo = read_calibration(folder / "calib.txt")
-    picture = folder / "im0.png"
-    return Pair(picture, read_color(picture), depth_m(read_netpbm(folder / "disp0.pfm"), *stereo))
+    return stereo.pair(folder / "im0.png", read_netpbm(folder / "disp0.pfm"))
 
 
 def _load_motorcycle(file: Path) -> Pair:
@@ -56,34 +77,31 @@ def _load_motorcycle(file: Path) -> Pair:
             disparity_px = arrays["arr_0"]
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         raise InputError(f"The disparities {file} are damaged; try scikit-image's file again") from None
-    picture = file.with_name(ARCHIVE_PICTURE)
-    rgb, z_m = read_color(picture), depth_m(disparity_px, *MOTORCYCLE)
-    focal_px, height, width = MOTORCYCLE[0], *z_m.shape
-    camera = CameraIntrinsics.pinhole(focal_px, focal_px, *MOTORCYCLE_CENTER_PX, width, height)
-    return Pair(picture, rgb, z_m, camera=camera)
+    return MOTORCYCLE.pair(file.with_name(ARCHIVE_PICTURE), disparity_px)
 
 
 def depth_m(disparity_px: FloatArray, focal_px: float, baseline_m: float, doffs_px: float) -> FloatArray:
     """Return (H, W) float32 metres; NaN where the disparity is not finite or gives no positive depth.
 
-    Z = focal baseline / (disparity + doffs); doffs is the right minus the left principal point, along x.
+    Z = focal baseline / (disparity + doffs).
     """
     shifted = np.asarray(disparity_px, np.float64) + doffs_px
     known = np.isfinite(disparity_px) & (shifted > 0)
     return (focal_px * baseline_m / np.where(known, shifted, np.nan)).astype(np.float32)
 
 
-def read_calibration(file: Path) -> tuple[float, float, float]:
-    """Return focal length in pixels, baseline in metres and offset in pixels of a ``calib.txt``.
+def read_calibration(file: Path) -> Stereo:
+    """Return the calibration in a ``calib.txt``; cam0 is ``[f 0 cx; 0 f cy; 0 0 1]``, in pixels.
 
     Raises:
         InputError: the file is missing, or lacks cam0, baseline or doffs.
     """
     text = read_text(file, "Middlebury calibration")
-    patterns = (r"cam0\s*=\s*\[", r"baseline\s*=\s*", r"doffs\s*=\s*")
-    focal, baseline, doffs = (re.search(rf"^{start}{_NUMBER}", text, re.M) for start in patterns)
-    if not (focal and baseline and doffs):
+    left = re.search(rf"^cam0\s*=\s*\[{_NUMBER} +0 +{_NUMBER}; *0 +{_NUMBER} +{_NUMBER};", text, re.M)
+    baseline, doffs = (re.search(rf"^{key}\s*=\s*{_NUMBER}", text, re.M) for key in ("baseline", "doffs"))
+    if not (left and baseline and doffs):
         raise InputError(
             f"The calibration {file} has no cam0, baseline and doffs; try the calib.txt of Middlebury 2014"
         )
-    return float(focal[1]), float(baseline[1]) / 1000.0, float(doffs[1])
+    focal_px, cx_px, _, cy_px = map(float, left.groups())
+    return Stereo(focal_px, (cx_px, cy_px), float(baseline[1]) / 1000.0, float(doffs[1]))

@@ -32,8 +32,7 @@ def find(root: Path) -> list[Load]:
 
 
 def _load(picture: Path, depth: Path) -> Pair:
-    """Return a pair; depth beyond ``FARTHEST_M`` is set to it, and not evaluated."""
-    millimetres = unrotated(read_depth_units(depth))
-    z_m = np.where(millimetres > 0, millimetres / np.float32(1000.0), np.float32(np.nan))
-    capped_m = np.minimum(z_m, np.float32(FARTHEST_M))
-    return Pair(picture, read_color(picture), capped_m, judged=~(z_m > FARTHEST_M))
+    """Return a pair; depth beyond ``FARTHEST_M`` is unknown."""
+    z_m = unrotated(read_depth_units(depth)) / np.float32(1000.0)
+    known = (z_m > 0.0) & (z_m <= FARTHEST_M)
+    return Pair(picture, read_color(picture), np.where(known, z_m, np.float32(np.nan)))

@@ -1,4 +1,9 @@
-"""Rendered rooms that two cameras with imperfect calibrations see, reconstructed and ready to be measured."""
+"""Rendered rooms that two cameras with imperfect calibrations see, reconstructed and ready to be measured.
+
+The constants of the record in docs/results were fitted on the rooms of the seeds 7,900,000 to 7,900,067,
+whose furniture is drawn from the same stock as that of the judged rooms (``pieces.from_stock``). Rooms from
+``TUNING`` up have a stock of their own.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +28,9 @@ from pipeline.spec import Spec
 from pipeline.stages import run
 from pipeline.types import CameraIntrinsics, FloatArray, RgbdFrame, Rig
 
-TUNING, HELD_OUT = 7_900_000, 7_000_000
-"""First seed of the rooms whose errors chose constants, and of the rooms that only judge them."""
+TUNING, HELD_OUT = 8_000_000, 7_000_000
+"""First seed of the rooms whose errors choose constants, and of the rooms that only judge them; in different
+millions, so that they share no piece of furniture."""
 OVERLAP = 0.5
 """Overlap of the two views (see ``OverlapMeter.share``)."""
 FOCAL_SD = 0.003
@@ -65,14 +71,14 @@ class Room:
 def measured_room(seed: int) -> Room | None:
     """Render and reconstruct the room of a seed.
 
-    Returns None if no two views have the overlap, or if the chain fails or does not place a camera. The
-    believed focal lengths are wrong by ``FOCAL_SD`` (every camera by its own error), and the second pose by 3
-    degrees and 6 cm before registration.
+    Returns None if the room is too full for a camera or no two views have the overlap, or if the chain fails
+    or does not place a camera. The believed focal lengths are wrong by ``FOCAL_SD`` (every camera by its own
+    error), and the second pose by 3 degrees and 6 cm before registration.
     """
     rng = np.random.default_rng([seed, 23])
-    scene = random_room(seed)
-    renderer = Renderer(scene, threads=1)
     try:
+        scene = random_room(seed)
+        renderer = Renderer(scene, threads=1)
         poses = two_poses(scene, scene.intrinsics, OVERLAP, rng, renderer)
     except InputError:
         return None

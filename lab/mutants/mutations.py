@@ -55,11 +55,18 @@ class Mutation:
     occurrence: int
     """Index among the places in the module that the operator can change."""
     line: int
+    source: str
+    """Text of the line, without its indentation."""
 
     @property
     def name(self) -> str:
         """Path, operator and occurrence; they denote the same fault as long as the module is unchanged."""
         return f"{self.path} {self.operator.partition('/')[2]} {self.occurrence}"
+
+    @property
+    def place(self) -> str:
+        """Name and source line: after a change of the module, the same name can denote another fault."""
+        return f"{self.name}: {self.source}"
 
     def applied(self, code: str) -> str:
         """Return the module's code with the fault."""
@@ -78,7 +85,7 @@ def mutations(root: Path, group: str) -> Iterator[Mutation]:
     for pattern in GROUPS[group][0]:
         for path in sorted(root.glob(pattern)):
             code = path.read_text(encoding="utf-8")
-            untested = _annotation_lines(code)
+            lines, untested = code.splitlines(), _annotation_lines(code)
             nodes = list(ast_nodes(get_ast(code)))
             for name in operator_names():
                 operator = get_operator(name)
@@ -87,7 +94,8 @@ def mutations(root: Path, group: str) -> Iterator[Mutation]:
                 places = (place for node in nodes for place in operator().mutation_positions(node))
                 for occurrence, (start, _) in enumerate(places):
                     if start[0] not in untested:
-                        yield Mutation(group, str(path.relative_to(root)), name, occurrence, start[0])
+                        module, source = str(path.relative_to(root)), lines[start[0] - 1].strip()
+                        yield Mutation(group, module, name, occurrence, start[0], source)
 
 
 def _annotation_lines(code: str) -> set[int]:

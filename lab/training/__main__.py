@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Rooms:
-    """Which rooms, and what furnishes them."""
+    """Rooms to render, and their furniture."""
 
     data: Path
     """Folder of the shards."""
@@ -31,7 +31,7 @@ class Rooms:
     furniture: Path | None = None
     """Sweet Home 3D's furniture: a folder or a .deb file."""
     cache: Path | None = None
-    """Folder for furniture made ready; kept between runs."""
+    """Folder for prepared furniture, kept between runs."""
 
     def catalogue(self) -> Catalogue | None:
         """Return the catalogue that furnishes the rooms of the split; None for procedural pieces."""
@@ -43,7 +43,7 @@ class Rooms:
 
 
 def render(rooms: Rooms) -> None:
-    """Render rooms into shards, and name each as it is done."""
+    """Render rooms into shards, and print the file of each finished shard."""
     from lab.training.dataset import render_shards
 
     for file in render_shards(rooms.data, rooms.split, rooms.first, rooms.last, rooms.catalogue()):
@@ -51,12 +51,12 @@ def render(rooms: Rooms) -> None:
 
 
 def trace(rooms: Rooms, blender: Path, samples: int = 16, threads: int = 1) -> None:
-    """Path-trace rooms into shards, and name each as it is done.
+    """Path-trace rooms into shards, and print the file of each finished shard.
 
     Args:
-        rooms: which.
-        blender: a Python that has bpy.
-        samples: light paths a pixel, before denoising.
+        rooms: rooms to render, and their furniture.
+        blender: Python interpreter that has bpy.
+        samples: light paths per pixel, before denoising.
         threads: threads that render.
     """
     from lab.training.blend import render_traced
@@ -74,7 +74,7 @@ def train(config: TrainingConfig) -> None:
 
 
 def export(checkpoint: Path, data: Path, out: Path) -> None:
-    """Write the ONNX file of a checkpoint, and say what 8 bits lose against floating point.
+    """Write the ONNX file of a checkpoint, and print the errors of the 8-bit and the floating-point file.
 
     Args:
         checkpoint: best.pt or last.pt of a training run.
@@ -87,14 +87,14 @@ def export(checkpoint: Path, data: Path, out: Path) -> None:
 
 
 def train_completion(config: CompletionConfig) -> None:
-    """Train a network that completes a sensor's depth, for so many minutes."""
+    """Train a network that completes a sensor's depth, until the time budget is spent."""
     from lab.training.completion.train import train_completion
 
     train_completion(config)
 
 
 def export_completion(checkpoint: Path, out: Path) -> None:
-    """Write the ONNX file of a completion network, and say its size.
+    """Write the ONNX file of a completion network, and print its size.
 
     Args:
         checkpoint: last.pt of a training run.
@@ -106,7 +106,7 @@ def export_completion(checkpoint: Path, out: Path) -> None:
 
 
 def fit_confidence(rooms: int = 120) -> None:
-    """Fit how sure completed depth is, on validation rooms, and print how well that holds.
+    """Fit the confidence of aligned and completed depth on validation rooms, and print its calibration.
 
     Args:
         rooms: how many; half of them fit, half of them judge.

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import io
+import lzma
 import os
 import re
 import tarfile
 import zipfile
+import zlib
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
@@ -43,33 +45,38 @@ def _unpacked(package: Path, folder: Path) -> list[Path]:
     done = folder / "unpacked"
     if not done.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        with _data_of(package) as archive:
-            for member in archive:
-                name = PurePosixPath(member.name).name
-                content = archive.extractfile(member) if name.endswith(ZIP_SUFFIXES) else None
-                if content is not None:
-                    temporary = folder / f"{name}.{os.getpid()}.tmp"
-                    temporary.write_bytes(content.read())
-                    temporary.rename(folder / name)
+        archive_name, data = _data_of(package)
+        try:
+            with tarfile.open(fileobj=io.BytesIO(data)) as archive:
+                for member in archive:
+                    name = PurePosixPath(member.name).name
+                    content = archive.extractfile(member) if name.endswith(ZIP_SUFFIXES) else None
+                    if content is not None:
+                        temporary = folder / f"{name}.{os.getpid()}.tmp"
+                        temporary.write_bytes(content.read())
+                        temporary.rename(folder / name)
+        except (tarfile.TarError, EOFError, lzma.LZMAError, zlib.error):
+            raise InputError(
+                f"'{package}' is damaged or its {archive_name} unreadable; download it again, or unpack it "
+                "with dpkg -x."
+            ) from None
         done.touch()
     return [file for file in folder.iterdir() if file.suffix in ZIP_SUFFIXES]
 
 
-def _data_of(package: Path) -> tarfile.TarFile:
-    """Return the archive of files inside a Debian package, an ``ar`` archive of three members."""
+def _data_of(package: Path) -> tuple[str, bytes]:
+    """Return name and content of the tar archive in a Debian package, an ``ar`` archive of three members.
+
+    Raises:
+        InputError: there is none.
+    """
     with package.open("rb") as stream:
         if stream.read(len(_AR_MAGIC)) != _AR_MAGIC:
             raise InputError(f"'{package}' is no Debian package; download it again.")
-        while len(header := stream.read(_AR_HEADER_BYTES)) == _AR_HEADER_BYTES:
+        while (header := stream.read(_AR_HEADER_BYTES))[48:58].strip().isdigit():
             name, size = header[:16].decode("ascii", "replace").strip(" /"), int(header[48:58])
             if name.startswith("data.tar"):
-                content = io.BytesIO(stream.read(size))
-                try:
-                    return tarfile.open(fileobj=content)
-                except tarfile.TarError:
-                    raise InputError(
-                        f"'{package}' is damaged or its {name} unreadable; unpack it with dpkg -x."
-                    ) from None
+                return name, stream.read(size)
             stream.seek(size + size % 2, io.SEEK_CUR)
     raise InputError(f"'{package}' holds no files; download it again.")
 

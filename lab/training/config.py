@@ -41,4 +41,4 @@ class TrainingConfig:
     device: Literal["auto", "cpu", "cuda"] = "auto"
     """``auto`` takes a GPU when there is one."""
     processes: int = 2
-    """They share each batch, one core each; on a GPU one process trains."""
+    """Processes that share each batch, one core each: 1, 2, 4 or 8. On a GPU one process trains."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
+from packetmesh.errors import InputError
 from packetmesh.files import atomic_path
 from pipeline.kernels.geometry import scaled
 from pipeline.types import ByteArray, CameraIntrinsics, FloatArray
@@ -164,6 +165,18 @@ class Shards:
             yield self[item]
 
 
+def rendered(folder: Path, split: str) -> Shards:
+    """Return the shards of one split.
+
+    Raises:
+        InputError: there are none.
+    """
+    shards = Shards(folder, split)
+    if not shards.index:
+        raise InputError(f"There are no {split} shards in {folder}: render them first.")
+    return shards
+
+
 def augment(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> tuple[ByteArray, FloatArray]:
     """Return another plausible photograph of the same place, with its depth."""
     if rng.random() < 0.5:
@@ -192,7 +205,10 @@ def zoom(
 
 
 def recolor(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
-    """Change brightness, contrast, gamma and white balance at random, and sometimes saturation."""
+    """Change brightness, contrast, gamma and white balance at random, and sometimes saturation.
+
+    The white balance multiplies the brightness twice and the contrast once; networks were trained with that.
+    """
     level = np.linspace(0.0, 1.0, 256)
     gamma, contrast, brightness = np.exp(rng.normal(0.0, (0.25, 0.2, 0.15)))
     balance = np.exp(rng.normal(0.0, 0.08, 3))

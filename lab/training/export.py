@@ -21,7 +21,7 @@ from onnxruntime.quantization import (
 from onnxruntime.quantization.shape_inference import quant_pre_process
 from torch import Tensor, nn
 
-from lab.training.dataset import Shards
+from lab.training.dataset import Shards, rendered
 from lab.training.initial import LICENCES
 from lab.training.network import DepthNet, depth_from_logit
 from packetmesh.errors import InputError
@@ -117,20 +117,19 @@ def export(checkpoint: Path, data: Path, out: Path) -> dict[str, float]:
         out: the ONNX file to write.
 
     Raises:
-        InputError: there is no such checkpoint.
+        InputError: there is no such checkpoint, or there are no shards.
     """
     if not checkpoint.is_file():
         raise InputError(
             f"There is no checkpoint at {checkpoint}: name the best.pt or last.pt of a training run."
         )
+    training, validation = rendered(data, "train"), rendered(data, "validation")
     saved = torch.load(checkpoint, weights_only=True, map_location="cpu")
     network = DepthNet(saved["config"]["width"]).eval()
     network.load_state_dict(saved["model"])
     float_file = out.with_suffix(".float.onnx")
     write_float(network, float_file)
-    training = Shards(data, "train")
     quantise(float_file, out, training)
-    validation = Shards(data, "validation")
     errors = mean_errors(out, validation)
     errors["float_abs_rel"] = mean_errors(float_file, validation)["abs_rel"]
     facts = saved["config"] | saved["state"]

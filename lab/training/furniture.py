@@ -67,7 +67,9 @@ class Entry:
     @property
     def key(self) -> str:
         """Name of the model in the cache."""
-        text = f"{_FORMAT} {self.file.name} {self.model} {self.size_m.tolist()}"
+        light_m = None if self.light_m is None else self.light_m.tolist()
+        shape = f"{self.size_m.tolist()} {self.rotation.tolist()} {light_m}"
+        text = f"{_FORMAT} {self.file.name} {self.model} {shape}"
         return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 

@@ -8,11 +8,14 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from multiprocessing.connection import wait
 from typing import Any
 
 import torch
 import torch.multiprocessing as mp
 from torch import Tensor, nn
+
+from packetmesh.errors import PacketMeshError
 
 
 @dataclass(slots=True)
@@ -49,13 +52,17 @@ class Team:
 def run_team(size: int, parameters: int, work: Callable[..., None], *arguments: object) -> None:
     """Run ``work(team, *arguments)`` in ``size`` processes of one thread each, until all have stopped.
 
-    An exception in one process stops the others at their next step; it is printed, but not raised here.
+    A process that fails or is killed stops the others at their next step; the traceback of an exception is
+    printed.
 
     Args:
         size: number of processes.
         parameters: number of parameters of the trained network, all of which get gradients.
         work: called in each process.
         arguments: further arguments of ``work``.
+
+    Raises:
+        PacketMeshError: a process failed or was killed.
     """
     context = mp.get_context("spawn")
     gradients = torch.zeros(2, size, parameters).share_memory_()
@@ -65,14 +72,22 @@ def run_team(size: int, parameters: int, work: Callable[..., None], *arguments: 
     processes = [context.Process(target=_member, args=(team, work, arguments)) for team in teams]
     for process in processes:
         process.start()
-    for process in processes:
-        process.join()
+    running = {process.sentinel: process for process in processes}
+    failed: list[int] = []
+    while running:
+        for sentinel in wait(list(running)):
+            process = running.pop(sentinel)
+            process.join()
+            if process.exitcode:
+                failed.append(process.exitcode)
+                barrier.abort()
+    if failed:
+        raise PacketMeshError(
+            f"The training stopped because a process failed (exit code {failed[0]}); its messages are above"
+        )
 
 
 def _member(team: Team, work: Callable[..., None], arguments: tuple[object, ...]) -> None:
     os.setsid()  # a scheduling group of its own, if the kernel divides time by session
     torch.set_num_threads(1)
-    try:
-        work(team, *arguments)
-    finally:
-        team.barrier.abort()
+    work(team, *arguments)

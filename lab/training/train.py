@@ -20,7 +20,7 @@ from torch import Tensor
 from torch.utils.data import DataLoader, IterableDataset, get_worker_info
 
 from lab.training.config import Precision, TrainingConfig
-from lab.training.dataset import Shards, augment
+from lab.training.dataset import Shards, augment, rendered
 from lab.training.initial import initial_network
 from lab.training.losses import supervised_loss
 from lab.training.network import DEPTH_MAX_M, DEPTH_MIN_M, DepthNet
@@ -77,22 +77,24 @@ def train(config: TrainingConfig) -> None:
     The network with the least validation error at the final input size is in ``out/best.pt``.
 
     Raises:
-        InputError: there are no shards, no GPU although one is configured, or another network in ``out``.
+        InputError: there are no shards, no GPU although one is configured, another network in ``out``, or
+            processes that cannot share the batches.
+        PacketMeshError: one of several processes failed.
     """
     for split in ("train", "validation"):
-        if not Shards(config.data, split).index:
-            raise InputError(f"There are no {split} shards in {config.data}: render them first.")
+        rendered(config.data, split)
+    processes = 1 if device_of(config).type == "cuda" else config.processes
+    check_shares(processes)
     config.out.mkdir(parents=True, exist_ok=True)
     with stop_on_signals() as stop:
         if not (config.out / "last.pt").exists():
             start(config)
-        if device_of(config).type == "cuda" or config.processes == 1:
+        if processes == 1:
             train_member(ALONE, config, stop)
         else:
-            parameters = sum(p.numel() for p in DepthNet(config.width).parameters())
-            run_team(config.processes, parameters, train_member, config, stop)
+            run_team(processes, resumable_parameters(config), train_member, config, stop)
         if stop:
-            print(f"Stopped as asked; the same command goes on from {config.out / 'last.pt'}.", flush=True)
+            print(f"Stopped; the same command continues from {config.out / 'last.pt'}.", flush=True)
 
 
 @contextmanager
@@ -125,6 +127,18 @@ def device_of(config: TrainingConfig) -> torch.device:
     return torch.device("cuda" if config.device != "cpu" and torch.cuda.is_available() else "cpu")
 
 
+def check_shares(processes: int) -> None:
+    """Check that the processes of a training on CPUs can share each batch evenly.
+
+    Raises:
+        InputError: they cannot.
+    """
+    most = math.gcd(*(stage.batch for stage in STAGES["cpu"]))
+    if processes < 1 or most % processes:
+        fitting = ", ".join(str(count) for count in range(1, most + 1) if most % count == 0)
+        raise InputError(f"{processes} processes cannot share the batches evenly: use one of {fitting}.")
+
+
 def start(config: TrainingConfig) -> None:
     """Write ``out/last.pt`` with an untrained network.
 
@@ -132,7 +146,7 @@ def start(config: TrainingConfig) -> None:
         InputError: ``out`` holds the best network of another training, or the initial weights cannot be used.
     """
     if (config.out / "best.pt").exists():
-        raise InputError(f"{config.out} holds a best.pt but no last.pt to go on from: use another folder.")
+        raise InputError(f"{config.out} holds a best.pt but no last.pt to continue from: use another folder.")
     torch.manual_seed(config.seed)
     stage = STAGES["cpu"][-1]
     samples = endless_samples(config.data, np.random.default_rng(config.seed))
@@ -311,6 +325,17 @@ def keep_best(
         best = torch.load(file, weights_only=True, map_location="cpu")["validation"]["val_abs_rel"]
     if errors["val_abs_rel"] < best:
         write(config, "best", model, state, validation=errors)
+
+
+def resumable_parameters(config: TrainingConfig) -> int:
+    """Return the number of parameters of the network in ``out/last.pt``.
+
+    Raises:
+        InputError: ``resume`` refuses it.
+    """
+    model = DepthNet(config.width)
+    resume(config, model, optimizer_of(model, config))
+    return sum(p.numel() for p in model.parameters())
 
 
 def write(config: TrainingConfig, name: str, model: DepthNet, state: TrainingState, **more: object) -> None:

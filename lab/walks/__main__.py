@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from lab.walks.walk import kinect, render_walk
 from lab.worlds.demos import DEMOS, build_demo
 from lab.worlds.rooms import random_room
+from packetmesh.errors import InputError
 
 
 def main() -> None:
@@ -21,8 +23,11 @@ def main() -> None:
     parser.add_argument("--width", type=int, default=320, help="width of the images in pixels, 4:3")
     parser.add_argument("--seed", type=int, default=0, help="seed of path, light, film and sensor")
     options = parser.parse_args()
-    scene = random_room(options.room) if options.scene is None else build_demo(options.scene)
-    render_walk(scene, options.frames, kinect(options.width), options.out, options.seed)
+    try:
+        scene = random_room(options.room) if options.scene is None else build_demo(options.scene)
+        render_walk(scene, options.frames, kinect(options.width), options.out, options.seed)
+    except InputError as error:
+        sys.exit(str(error))
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ import numpy as np
 from lab.walks.walk import kinect, render_walk
 from lab.worlds.rooms import random_room
 from packetmesh.errors import InputError
+from packetmesh.files import writable_folder
 from pipeline.importing.recorded import DepthView, open_recording
 from pipeline.types import FloatArray, RgbdFrame
 
@@ -63,7 +64,13 @@ def held_out_walks(walks: int, frames: int, width_px: int, folder: Path = CACHE)
     """Return the folders of the first ``walks`` walks from ``FIRST_ROOM`` up; missing ones are rendered.
 
     Rooms that have no walk of ``frames`` frames are left out.
+
+    Raises:
+        InputError: ``frames`` is not positive, or the folder cannot be written.
     """
+    if frames < 1:
+        raise InputError(f"A walk of {frames} frames is not possible; it has at least 1")
+    writable_folder(folder)
     found: list[Path] = []
     for seed in count(FIRST_ROOM):
         if len(found) >= walks:
@@ -74,7 +81,7 @@ def held_out_walks(walks: int, frames: int, width_px: int, folder: Path = CACHE)
             shutil.rmtree(unfinished, ignore_errors=True)
             try:
                 render_walk(random_room(seed), frames, kinect(width_px), unfinished)
-            except InputError:
+            except InputError:  # the room is too full for a camera or a walk
                 shutil.rmtree(unfinished, ignore_errors=True)
                 continue
             unfinished.rename(path)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,9 @@ import numpy as np
 from lab.worlds.board_views import BoardCamera, BoardImage, BoardViews
 from lab.worlds.depth_bias import DepthBias
 from packetmesh.errors import InputError
-from packetmesh.files import atomic_path, read_text, write_json
+from packetmesh.files import atomic_path, read_json, writable_folder, write_json
 from pipeline.calibration.board import Board
+from pipeline.calibration.shots import read_board
 from pipeline.io.images import read_color, read_depth, write_depth_mm
 from pipeline.types import CameraIntrinsics, DepthMap
 
@@ -24,12 +24,12 @@ JPEG_QUALITY = 92
 def save_board_views(folder: Path, views: BoardViews) -> None:
     """Write the images, the board's description and the truth; a depth image only if it has a known pixel.
 
-    Older images in the folder stay. A lens is written without ``fisheye``, a board without its dictionary and
-    tag spacing.
+    Images of an earlier rendering are deleted first.
 
     Raises:
         InputError: the folder cannot be written.
     """
+    _delete_images(writable_folder(folder))
     for moment, images in enumerate(views.images):
         for node, image in enumerate(images):
             place = folder / f"node_{node:02d}"
@@ -39,9 +39,7 @@ def save_board_views(folder: Path, views: BoardViews) -> None:
                 sibling.write_bytes(coded.tobytes())
             if image.depth.valid.any():
                 write_depth_mm(place / f"depth_{moment:02d}.png", image.depth)
-    board = views.board
-    size = {"pattern": board.pattern, "columns": board.columns, "rows": board.rows}
-    write_json(folder / BOARD_NAME, size | {"spacing_mm": round(1000.0 * board.spacing_m, 6)})
+    write_json(folder / BOARD_NAME, _described(views.board))
     cameras = {f"node_{node:02d}": _camera(camera) for node, camera in enumerate(views.cameras)}
     poses = [T.tolist() for T in views.T_world_board]
     write_json(folder / TRUTH_NAME, {"cameras": cameras, "T_world_board": poses})
@@ -53,13 +51,12 @@ def load_board_views(folder: Path) -> BoardViews:
     Raises:
         InputError: a file is missing or cannot be used.
     """
+    board = read_board(folder / BOARD_NAME)
+    truth = read_json(folder / TRUTH_NAME, "truth")
     try:
-        size = json.loads(read_text(folder / BOARD_NAME, "board"))
-        truth = json.loads(read_text(folder / TRUTH_NAME, "truth"))
-        board = Board(size["pattern"], size["columns"], size["rows"], size["spacing_mm"] / 1000.0)
         cameras = tuple(_camera_in(values) for values in truth["cameras"].values())
-        poses = tuple(np.array(T, float) for T in truth["T_world_board"])
-    except (ValueError, KeyError, TypeError) as error:
+        poses = tuple(np.array(T, float).reshape(4, 4) for T in truth["T_world_board"])
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(
             f"{folder} does not hold rendered board views ({error}); render them again"
         ) from None
@@ -78,6 +75,30 @@ def _image(folder: Path, moment: int) -> BoardImage:
     return BoardImage(rgb, DepthMap(np.full(rgb.shape[:2], np.nan, np.float32)))
 
 
+def _delete_images(folder: Path) -> None:
+    """Delete the images of a rendering, and the nodes' folders that are empty without them."""
+    for node in folder.glob("node_*"):
+        for image in (*node.glob("color_*.jpg"), *node.glob("depth_*.png")):
+            image.unlink()
+        if not any(node.iterdir()):
+            node.rmdir()
+
+
+def _described(board: Board) -> dict[str, Any]:
+    """Return the values of ``board.json``: a dictionary only if one is chosen, the gap only between tags."""
+    values: dict[str, Any] = {
+        "pattern": board.pattern,
+        "columns": board.columns,
+        "rows": board.rows,
+        "spacing_mm": round(1000.0 * board.spacing_m, 6),
+    }
+    if board.dictionary:
+        values["dictionary"] = board.dictionary
+    if board.pattern == "aprilgrid":
+        values["tag_spacing"] = board.tag_spacing
+    return values
+
+
 def _camera(camera: BoardCamera) -> dict[str, Any]:
     lens, bias = camera.intrinsics, camera.bias
     return {
@@ -88,6 +109,7 @@ def _camera(camera: BoardCamera) -> dict[str, Any]:
         "cx": lens.cx_px,
         "cy": lens.cy_px,
         "distortion": lens.distortion.tolist(),
+        **({"fisheye": True} if lens.fisheye else {}),
         "T_world_camera": camera.T_world_camera.tolist(),
         "depth_bias": {
             "a_m": bias.a_m,
@@ -101,7 +123,8 @@ def _camera(camera: BoardCamera) -> dict[str, Any]:
 def _camera_in(values: dict[str, Any]) -> BoardCamera:
     fx, fy, cx, cy = (float(values[key]) for key in ("fx", "fy", "cx", "cy"))
     matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
-    lens = CameraIntrinsics(matrix, np.array(values["distortion"], float), values["width"], values["height"])
+    distortion, fisheye = np.array(values["distortion"], float), bool(values.get("fisheye", False))
+    lens = CameraIntrinsics(matrix, distortion, int(values["width"]), int(values["height"]), fisheye)
     bias = values["depth_bias"]
     found = DepthBias(bias["a_m"], bias["b"], bias["c_per_m"], np.array(bias["waves"], float))
-    return BoardCamera(lens, np.array(values["T_world_camera"], float), found)
+    return BoardCamera(lens, np.array(values["T_world_camera"], float).reshape(4, 4), found)

@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from lab.worlds.board_views import BoardCamera
+from lab.worlds.board_views import BoardCamera, is_partly_behind
 from packetmesh.errors import InputError
 from pipeline.calibration.board import Board
 from pipeline.kernels.geometry import apply, inverse, project, rigid, rotation_exp
@@ -43,7 +43,8 @@ def propose_poses(
 
     Args:
         board: the board.
-        cameras: the cameras; at least one of them sees the whole board in every returned pose.
+        cameras: the cameras; in every returned pose at least one of them sees the whole board, and the board
+            is partly behind none, so that it can be rendered.
         count: number of moments.
         seed: seed of the random poses.
         free_m: (H, W) depth of the scene from each camera, which must not hide the board; None: an empty
@@ -51,7 +52,7 @@ def propose_poses(
         distances_m: least and greatest depth of the board's centre in the camera for which a pose is drawn.
 
     Raises:
-        InputError: fewer than ``count`` of the random poses show a camera the whole board.
+        InputError: fewer than ``count`` of the random poses are such.
     """
     rng = np.random.default_rng(seed)
     pool: list[tuple[FloatArray, dict[Hashable, float]]] = []
@@ -62,12 +63,13 @@ def propose_poses(
             for node, camera in enumerate(cameras)
             if sees(board, camera, T, None if free_m is None else free_m[node])
         ]
-        if seen:
+        straddles = any(is_partly_behind(board, inverse(one.T_world_camera) @ T) for one in cameras)
+        if seen and not straddles:
             pool.append((T, dict(_shown(board, cameras, seen, T, distances_m))))
     if len(pool) < count:
         raise InputError(
-            f"Only {len(pool)} places were found where a camera sees the whole board; take a smaller board, "
-            "or let it be farther away"
+            f"Only {len(pool)} of {count} board poses were found in which a camera sees the whole board "
+            "large enough; change the board's size or its distance"
         )
     counts: Counter[Hashable] = Counter()
     chosen = []

@@ -34,6 +34,8 @@ LIGHT_STEP_PX = 4
 """Distance between the pixels, in both directions, at which the light on the sheet is traced."""
 LIGHT_BLUR = 2.0
 """Standard deviation, in steps of ``LIGHT_STEP_PX``, of the blur that reduces the light's noise."""
+NEAREST_M = 0.05
+"""A camera sees no place of the sheet with a smaller depth."""
 AROUND_M = 0.6
 """Least distance of a plain room's walls from all cameras and boards."""
 
@@ -179,6 +181,7 @@ def _with_board(
 
     places_m = apply(camera.T_world_camera, rays[window] * z_m[..., None])
     world_normal = camera.T_world_camera[:3, :3] @ normal
+    places_m[~np.isfinite(places_m).all(axis=2)] = T_world_board[:3, 3]  # these pixels do not see the sheet
     light = _light(renderer, places_m, world_normal, rng)
     radiance, depth_m = room.radiance.copy(), room.z_m.copy()
     normals, infrared, gloss = room.normals.copy(), room.infrared.copy(), room.gloss.copy()
@@ -192,6 +195,12 @@ def _with_board(
     return replace(room, radiance=radiance, z_m=depth_m, normals=normals, infrared=infrared, gloss=gloss)
 
 
+def is_partly_behind(board: Board, T_camera_board: FloatArray) -> bool:
+    """Return whether a part of the sheet, but not all of it, has a depth of more than ``NEAREST_M``."""
+    before = apply(T_camera_board, sheet_corners_m(board))[:, 2] > NEAREST_M
+    return bool(before.any() and not before.all())
+
+
 Window = tuple[slice, slice]
 
 
@@ -201,10 +210,10 @@ def _window(board: Board, T_camera_board: FloatArray, intrinsics: CameraIntrinsi
     Raises:
         InputError: the sheet is partly behind the camera.
     """
+    if is_partly_behind(board, T_camera_board):
+        raise InputError("A board stands beside a camera, partly behind it; move it before the camera")
     corners_m = apply(T_camera_board, sheet_corners_m(board))
-    if (corners_m[:, 2] <= 0.05).any():
-        if (corners_m[:, 2] > 0.05).any():
-            raise InputError("A board stands beside a camera, partly behind it; move it before the camera")
+    if (corners_m[:, 2] <= NEAREST_M).any():
         return None
     # The lens bends the sheet's edges, so points along them, not the corners alone, bound the sheet.
     around = np.linspace(0.0, 1.0, 16, endpoint=False)[:, None]

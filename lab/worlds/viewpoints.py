@@ -105,7 +105,10 @@ def _found(scene: Scene, count: int, tries: int, candidate: Callable[[], _View |
             found += 1
             yield view
     if found < count:
-        raise InputError(f"Scene '{scene.name}' leaves no room for {count} cameras; take another seed.")
+        raise InputError(
+            f"Scene '{scene.name}' has too little free space for the requested cameras ({count}); "
+            "take another seed."
+        )
 
 
 def _inside(scene: Scene, face: Callable[[FloatArray], float]) -> tuple[FloatArray, FloatArray]:

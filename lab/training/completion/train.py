@@ -17,9 +17,8 @@ from lab.training.completion.config import CompletionConfig
 from lab.training.completion.holes import lesson
 from lab.training.completion.losses import negative_log_likelihood
 from lab.training.completion.network import CompletionNet
-from lab.training.dataset import Shards
+from lab.training.dataset import Shards, rendered
 from lab.training.train import GRADIENT_CLIP, TrainingState, log, scheduled_rate
-from packetmesh.errors import InputError
 from packetmesh.files import atomic_path
 from pipeline.depth.slopes import network_input
 from pipeline.types import ByteArray, FloatArray
@@ -37,8 +36,7 @@ def train_completion(config: CompletionConfig) -> None:
         InputError: there are no shards.
     """
     for split in ("train", "validation"):
-        if not Shards(config.data, split).index:
-            raise InputError(f"There are no {split} shards in {config.data}: render them first.")
+        rendered(config.data, split)
     config.out.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(config.seed)
     torch.set_num_threads(config.threads)

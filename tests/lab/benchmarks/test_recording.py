@@ -46,6 +46,14 @@ def test_a_walk_is_rendered_once_and_read_completely(walk):
     assert frames.view(1).depth is frames.frame(1).depth
 
 
+def test_walks_that_no_room_can_have_are_refused(tmp_path):
+    with pytest.raises(InputError, match="at least 1"):
+        held_out_walks(1, 0, WIDTH_PX, tmp_path)
+    (tmp_path / "file").touch()
+    with pytest.raises(InputError, match="cannot be written"):
+        held_out_walks(1, FRAMES, WIDTH_PX, tmp_path / "file")
+
+
 @pytest.mark.parametrize("program", [*OWN, *PEERS])
 def test_every_program_follows_a_short_walk(walk, program):
     row = (solve_own if program in OWN else solve_peer)(WalkTask(program, walk, 1))

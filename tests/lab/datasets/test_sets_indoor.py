@@ -22,14 +22,14 @@ def _sun(folder, kind="depth_bfx", millimetres=MILLIMETRES):
     write_units(folder / kind / "0001.png", _rotated(millimetres))
 
 
-def test_sun_depth_is_rotated_back_and_capped(tmp_path):
+def test_sun_depth_is_rotated_back_and_unknown_beyond_8_m(tmp_path):
     _sun(tmp_path / "kv2/kinect2data/000002")
     (pair,) = open_set(f"sunrgbd={tmp_path}")
     assert pair.picture == tmp_path / "kv2/kinect2data/000002/image/0001.png"
     np.testing.assert_array_equal(pair.rgb, picture(5, 3))
-    expected_m = np.where(MILLIMETRES > 0, np.minimum(MILLIMETRES / 1000.0, 8.0), np.nan)
-    np.testing.assert_allclose(pair.truth_m, expected_m, rtol=1e-6)
-    np.testing.assert_array_equal(pair.judged, MILLIMETRES <= 8000)
+    known = (MILLIMETRES > 0) & (MILLIMETRES <= 8000)
+    np.testing.assert_allclose(pair.truth_m, np.where(known, MILLIMETRES / 1000.0, np.nan), rtol=1e-6)
+    assert pair.judged is None
 
 
 def test_sun_prefers_the_merged_depth(tmp_path):

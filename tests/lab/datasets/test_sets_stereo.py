@@ -46,6 +46,10 @@ def test_middlebury_depth_follows_from_focal_length_baseline_and_offset(tmp_path
         pair.truth_m.ravel()[1:], (3997.684 * 0.193001 / (DISPARITY + 131.111)).ravel()[1:], 1e-6
     )
     assert np.isnan(pair.truth_m[0, 0])
+    np.testing.assert_array_equal(
+        pair.camera.matrix, [[3997.684, 0.0, 1176.728], [0.0, 3997.684, 1011.728], [0.0, 0.0, 1.0]]
+    )
+    assert (pair.camera.width_px, pair.camera.height_px) == (8, 6)
 
 
 @pytest.mark.parametrize("unknown", [np.nan, np.inf])
@@ -69,9 +73,10 @@ def test_bad_middlebury_files_are_named(tmp_path):
     (tmp_path / "disp0.pfm").write_bytes(b"PF\n8 6\n-1.0\n")
     with pytest.raises(InputError, match=r"disp0\.pfm is no PGM of 8 bits and no PFM"):
         next(open_set(f"middlebury={tmp_path}"))
-    (tmp_path / "calib.txt").write_text(CALIBRATION.replace("doffs", "offset"))
-    with pytest.raises(InputError, match=r"calib\.txt has no cam0, baseline and doffs"):
-        next(open_set(f"middlebury={tmp_path}"))
+    for key, other in (("doffs", "offset"), ("1176.728; 0 3997.684 1011.728;", ";")):
+        (tmp_path / "calib.txt").write_text(CALIBRATION.replace(key, other))
+        with pytest.raises(InputError, match=r"calib\.txt has no cam0, baseline and doffs"):
+            next(open_set(f"middlebury={tmp_path}"))
 
 
 COLOR = CameraIntrinsics.pinhole(92.0, 92.0, 47.0, 36.0, 96, 72)

@@ -9,12 +9,19 @@ import pytest
 from lab.benchmarks import measuring
 from lab.measuring.clicks import away_from_edges, clicks, flat_normal
 from lab.measuring.judging import RoomTask, judged_room, summaries
-from lab.measuring.rooms import FOCAL_SD, TUNING, Room, TrueView, measured_room
+from lab.measuring.rooms import FOCAL_SD, HELD_OUT, TUNING, Room, TrueView, measured_room
 from lab.measuring.things import true_boxes, true_holes
+from lab.places.pairs import FIRST_ROOM
 from lab.results.measuring import measuring as measuring_table
+from lab.training.dataset import FIRST_SEED
+from lab.walks.held_out import FIRST_ROOM as FIRST_WALK
 from lab.worlds.furniture.placing import board
+from lab.worlds.pieces.stock import SEEDS_OF_A_SPLIT
 from lab.worlds.raycast import world_mesh
 from lab.worlds.scene import Material, Scene
+from packetmesh.errors import InputError
+from pipeline.depth.completion import SHIPPED_COMPLETION
+from pipeline.depth.inference import SHIPPED_MODEL
 from pipeline.kernels import geometry
 from pipeline.kernels.geometry import look_at
 from pipeline.kernels.rays import hit_depth
@@ -27,7 +34,7 @@ FINE = CameraIntrinsics.pinhole(520.0, 520.0, 319.5, 239.5, 640, 480)
 
 @pytest.fixture(scope="module")
 def room():
-    return measured_room(TUNING + 40)
+    return measured_room(TUNING + 41)
 
 
 def test_clicks_hit_what_the_same_pixel_truly_shows(room):
@@ -140,6 +147,19 @@ def test_a_summary_counts_what_holds_and_resamples_rooms():
     assert guessed["error_over_raw"] is None
 
 
+def test_a_room_too_full_for_a_camera_is_left_out(monkeypatch):
+    def full(seed):
+        raise InputError("too full")
+
+    monkeypatch.setattr("lab.measuring.rooms.random_room", full)
+    assert measured_room(1) is None
+
+
+def test_rooms_that_choose_constants_share_no_furniture_with_rooms_that_judge():
+    firsts = (*FIRST_SEED.values(), *FIRST_ROOM.values(), FIRST_WALK, HELD_OUT)
+    assert TUNING // SEEDS_OF_A_SPLIT not in {first // SEEDS_OF_A_SPLIT for first in firsts}
+
+
 def test_a_room_without_two_views_gives_no_row(monkeypatch):
     monkeypatch.setattr("lab.measuring.judging.measured_room", lambda seed: None)
     assert judged_room(RoomTask(1)) is None
@@ -150,12 +170,18 @@ def test_the_benchmark_goes_on_until_it_has_its_rooms(monkeypatch, tmp_path):
         return None if task.seed % 2 else [row(task.seed, True)]
 
     monkeypatch.setattr(measuring, "FOLDER", tmp_path)
-    monkeypatch.setattr(
-        measuring, "iterate_trials", lambda name, work, tasks, *_, **__: iter_done(work, tasks)
-    )
+    given = set()
+
+    def trials(name, work, tasks, folder, processes, data):
+        given.update(data)
+        return iter_done(work, tasks)
+
+    monkeypatch.setattr(measuring, "iterate_trials", trials)
     monkeypatch.setattr(measuring, "judged_room", room_of)
     record = measuring.benchmark(rooms=5).record()
+    assert given == {SHIPPED_MODEL, SHIPPED_COMPLETION}  # a room is reconstructed by both networks
     assert record["runs"][0]["rooms"] == 5
+    assert record["peak_memory_bytes"] is None
     assert record["ours_s"] == 0.01
     text = measuring_table({"measuring": record})
     assert "| length | measured | 5 | 100.0 % [100.0 %, 100.0 %] | 10.00 mm | 0.5 | 100.00 mm | 10 |" in text

@@ -120,7 +120,7 @@ def test_a_signal_ends_a_training_after_its_step_and_the_next_run_goes_on(config
     stopped = _load(config.out / "last.pt")["state"]
     assert stopped["step"] >= json.loads(log.read_text().splitlines()[-1])["step"] > 0
     assert 0 < stopped["elapsed_s"] < 60.0
-    assert capsys.readouterr().out.endswith(f"goes on from {config.out / 'last.pt'}.\n")
+    assert capsys.readouterr().out.endswith(f"continues from {config.out / 'last.pt'}.\n")
     train(replace(config, minutes=stopped["elapsed_s"] / 60.0 + 0.01))
     assert _load(config.out / "last.pt")["state"]["step"] > stopped["step"]
 
@@ -138,7 +138,7 @@ def test_two_processes_stop_after_the_same_step(config, capfd):
     train(replace(config, minutes=60.0, processes=2))
     out, err = capfd.readouterr()
     assert _load(config.out / "last.pt")["state"]["step"] == 1
-    assert out.endswith(f"goes on from {config.out / 'last.pt'}.\n")
+    assert out.endswith(f"continues from {config.out / 'last.pt'}.\n")
     assert "Traceback" not in err
 
 

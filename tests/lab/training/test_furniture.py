@@ -2,6 +2,7 @@ import io
 import lzma
 import tarfile
 import zipfile
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -228,6 +229,23 @@ def test_a_package_is_unpacked_once(tmp_path):
     assert [entry.name for entry in Catalogue.open(package, tmp_path / "cache").entries] == names
     assert len(names) == 7
     assert unpacked.stat().st_mtime_ns == written
+
+
+def test_models_that_differ_in_rotation_or_light_only_are_cached_apart(catalogue):
+    _, lamp, *_ = catalogue.entries
+    turned = replace(lamp, rotation=np.diag([-1.0, 1.0, -1.0]))
+    entries = lamp, turned, replace(lamp, light_m=None), replace(lamp, light_m=2.0 * lamp.light_m)
+    assert len({entry.key for entry in entries}) == 4
+    assert replace(lamp, name="Another name").key == lamp.key
+
+
+@pytest.mark.parametrize("share", [0.9, 0.5, 0.05])
+def test_a_package_that_was_cut_off_is_refused_in_one_sentence(tmp_path, share):
+    content = write_catalogue(tmp_path / "Tiny.sh3f").read_bytes()
+    package = write_package(tmp_path / "tiny.deb", content)
+    package.write_bytes(package.read_bytes()[: int(share * package.stat().st_size)])
+    with pytest.raises(InputError, match=r"tiny\.deb' .*download it again"):
+        Catalogue.open(package, tmp_path / "cache")
 
 
 @pytest.mark.parametrize(

@@ -205,6 +205,15 @@ def test_a_run_of_another_width_is_not_continued(rooms):
     training.start(config)
     with pytest.raises(InputError, match="width half, not full"):
         train(_config(rooms, width="full"))
+    with pytest.raises(InputError, match="width half, not full"):
+        train(_config(rooms, width="full", processes=2))
+
+
+def test_processes_that_cannot_share_the_batches_evenly_are_refused(rooms):
+    for processes in (0, 3, 4):
+        with pytest.raises(InputError, match=f"^{processes} processes .*: use one of 1, 2\\.$"):
+            train(_config(rooms, processes=processes))
+    assert not (rooms.parent / "run").exists()
 
 
 def test_a_gpu_that_is_not_there_and_a_folder_without_rooms_are_refused(rooms, monkeypatch):
@@ -214,6 +223,17 @@ def test_a_gpu_that_is_not_there_and_a_folder_without_rooms_are_refused(rooms, m
     (rooms / "validation_0000_rgb.npy").unlink()
     with pytest.raises(InputError, match="no validation shards"):
         train(_config(rooms))
+
+
+def test_an_export_without_rooms_is_refused_before_a_file_is_written(rooms):
+    export = pytest.importorskip("lab.training.export")
+    config = _config(rooms)
+    config.out.mkdir()
+    training.start(config)
+    (rooms / "validation_0000_rgb.npy").unlink()
+    with pytest.raises(InputError, match="no validation shards"):
+        export.export(config.out / "last.pt", rooms, config.out / "network.onnx")
+    assert [file.name for file in config.out.iterdir()] == ["last.pt"]
 
 
 def test_an_exported_network_takes_bytes_says_what_it_is_and_gives_the_checkpoints_depth(rooms, monkeypatch):

@@ -1,10 +1,13 @@
 """Walks: a smooth closed path in free space, and a recording without poses that agrees with its truth."""
 
+import sys
+
 import numpy as np
 import pytest
 
 from lab.places.overlap import OverlapMeter
 from lab.places.views import is_usable
+from lab.walks import __main__ as command
 from lab.walks.path import CLEARANCE_M, HEIGHTS_M, RATE_HZ, walk_poses
 from lab.walks.walk import TRUE_POSES, kinect, read_truth, render_walk
 from lab.worlds.living_room import living_room
@@ -146,6 +149,13 @@ def test_the_same_seed_gives_the_same_files(folder, tmp_path):
     assert len(names) == 2 * FRAMES + 6  # with two folders, three lists and the camera
     for name in names:
         assert (folder / name).is_dir() or (folder / name).read_bytes() == (tmp_path / name).read_bytes()
+
+
+def test_the_command_refuses_a_walk_without_frames_in_one_sentence(tmp_path, monkeypatch):
+    words = ["--scene", "living-room", "--frames", "0", "--out", str(tmp_path / "walk")]
+    monkeypatch.setattr(sys, "argv", ["walks", *words])
+    with pytest.raises(SystemExit, match="at least 1"):
+        command.main()
 
 
 def test_a_folder_without_truth_is_refused(tmp_path):

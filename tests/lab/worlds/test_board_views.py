@@ -1,13 +1,23 @@
 """Rendered board views: the board is where the truth says, in colour and, but for the bias, in depth."""
 
+import json
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
+from lab.worlds import __main__ as command
 from lab.worlds.board_files import load_board_views, save_board_views
 from lab.worlds.board_poses import propose_poses, sees
-from lab.worlds.board_views import BoardCamera, BoardViews, _window, render_board_views
+from lab.worlds.board_views import (
+    BoardCamera,
+    BoardImage,
+    BoardViews,
+    _window,
+    is_partly_behind,
+    render_board_views,
+)
 from lab.worlds.depth_bias import DepthBias
 from lab.worlds.staging import arc
 from packetmesh.errors import InputError
@@ -150,6 +160,79 @@ def test_the_same_seed_gives_the_same_views(tmp_path) -> None:
     assert np.abs(read.images[1][0].rgb.astype(int) - first.images[1][0].rgb).mean() < 3.0
 
 
+def _blank(board: Board, lens: CameraIntrinsics, nodes: int, moments: int) -> BoardViews:
+    """Views of nothing, with depth everywhere."""
+    shape = lens.height_px, lens.width_px
+    image = BoardImage(np.zeros((*shape, 3), np.uint8), DepthMap(np.ones(shape, np.float32)))
+    camera = BoardCamera(lens, np.eye(4))
+    return BoardViews(board, (camera,) * nodes, (np.eye(4),) * moments, ((image,) * nodes,) * moments)
+
+
+@pytest.mark.parametrize(
+    "board",
+    [Board("charuco", 8, 5, 0.05, "5X5_100"), Board("aprilgrid", 4, 3, 0.08, tag_spacing=0.25), BOARD],
+)
+def test_files_keep_the_markers_of_a_board_and_the_model_of_a_lens(tmp_path, board: Board) -> None:
+    small = scaled(LENS, 0.05)
+    for lens in (small, replace(small, distortion=np.array([0.1, 0.01, 0.0, 0.0]), fisheye=True)):
+        save_board_views(tmp_path, _blank(board, lens, 1, 1))
+        read = load_board_views(tmp_path)
+        assert read.board == board
+        assert read.cameras[0].intrinsics.fisheye == lens.fisheye
+        np.testing.assert_array_equal(read.cameras[0].intrinsics.distortion, lens.distortion)
+
+
+def test_images_of_an_earlier_rendering_are_deleted(tmp_path) -> None:
+    lens = scaled(LENS, 0.05)
+    for nodes, moments in ((2, 3), (1, 2)):
+        save_board_views(tmp_path, _blank(BOARD, lens, nodes, moments))
+    names = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.glob("node_*/*"))
+    assert names == [
+        f"node_00/{kind}" for kind in ("color_00.jpg", "color_01.jpg", "depth_00.png", "depth_01.png")
+    ]
+    assert not (tmp_path / "node_01").exists()
+
+
+def test_a_truth_whose_cameras_have_no_names_is_refused(tmp_path) -> None:
+    save_board_views(tmp_path, _blank(BOARD, scaled(LENS, 0.05), 1, 1))
+    truth = json.loads((tmp_path / "truth.json").read_text())
+    (tmp_path / "truth.json").write_text(json.dumps(truth | {"cameras": list(truth["cameras"].values())}))
+    with pytest.raises(InputError, match="render them again"):
+        load_board_views(tmp_path)
+
+
+def test_an_unknown_demo_is_refused_in_one_sentence() -> None:
+    with pytest.raises(SystemExit, match="no demo scene 'kitchen'; try one of living-room"):
+        command.main(["kitchen"])
+
+
+def test_a_lens_without_rays_at_the_corners_photographs_the_board() -> None:
+    lens = replace(scaled(LENS, 0.25), distortion=np.array([-0.55, 0.1, 0.0, 0.0, 0.0]))
+    camera = BoardCamera(lens, look_at((0.0, -1.0, 1.0), (0.0, 0.0, 1.0)))
+    T = camera.T_world_camera @ rigid(np.eye(3), np.array([0.0, 0.0, 0.4]))
+    ((image,),) = render_board_views(Board("circles", 5, 4, 0.08), [camera], [T], seed=0).images
+    unseen = np.isnan(pixel_rays(lens)).any(axis=2)
+    assert 0.1 < unseen.mean() < 0.3
+    near = cv2.dilate(unseen.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
+    assert image.rgb[~near].min() > 20
+    assert image.rgb[40:80, 60:100].std() > 40.0
+    assert not image.depth.valid[unseen].any()
+
+
+def test_no_proposed_board_is_partly_behind_a_camera() -> None:
+    front = BoardCamera(LENS, look_at((0.0, -1.0, 1.0), (0.0, 0.0, 1.0)))
+    aside = BoardCamera(LENS, look_at((0.0, 0.0, 1.0), (1.0, 0.0, 1.0)))
+    straddling = [
+        [
+            is_partly_behind(BOARD, inverse(aside.T_world_camera) @ T)
+            for T in propose_poses(BOARD, cameras, 3, 0)
+        ]
+        for cameras in ([front], [front, aside])
+    ]
+    assert any(straddling[0])
+    assert not any(straddling[1])
+
+
 def test_proposals_are_seen_together_and_from_several_sides() -> None:
     cameras = [BoardCamera(LENS, T) for T in arc((0.0, 0.0, 0.9), 2.0, 1.4, (-115.0, -90.0, -65.0))]
     poses = propose_poses(BOARD, cameras, 12, seed=1)
@@ -164,7 +247,7 @@ def test_proposals_are_seen_together_and_from_several_sides() -> None:
 
 def test_no_place_for_a_board_is_said() -> None:
     camera = BoardCamera(scaled(LENS, 0.1), np.eye(4))
-    with pytest.raises(InputError, match="take a smaller board"):
+    with pytest.raises(InputError, match="Only 0 of 4 board poses"):
         propose_poses(BOARD, [camera], 4, seed=0)
 
 

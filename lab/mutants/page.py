@@ -1,0 +1,83 @@
+"""The page docs/mutants.md: shares of the faults that tests see, and the reasons why some are not seen."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from lab.mutants.mutations import GROUPS, Mutation
+
+WHYS = Path(__file__).with_name("whys.json")
+"""File with a sentence per mutant that is not seen, by ``Mutation.place``: ``equivalent`` ones change no
+result, and the sentence says why; of the others it says why no test sees them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """Which of the drawn mutants were seen."""
+
+    drawn: Sequence[Mutation]
+    seen: Sequence[bool]
+    """In the order of ``drawn``."""
+    equivalent: dict[str, str]
+    """Reasons of ``WHYS``."""
+    other: dict[str, str]
+
+    @property
+    def survivors(self) -> list[Mutation]:
+        """The mutants that were not seen."""
+        return [one for one, seen in zip(self.drawn, self.seen, strict=True) if not seen]
+
+    @property
+    def equivalents(self) -> list[Mutation]:
+        """The survivors that change no result (equivalent mutants)."""
+        return [one for one in self.survivors if one.place in self.equivalent]
+
+    @property
+    def share(self) -> float:
+        """Share of the mutants that change a result, as far as is known, that were seen."""
+        return sum(self.seen) / (len(self.drawn) - len(self.equivalents))
+
+
+def scored(drawn: Sequence[Mutation], seen: Sequence[bool]) -> Score:
+    """Return the score of drawn mutants, with the reasons of ``WHYS``."""
+    whys = json.loads(WHYS.read_text(encoding="utf-8"))
+    return Score(drawn, seen, whys["equivalent"], whys["other"])
+
+
+def page(score: Score, seed: int) -> str:
+    """Return the page: the score, also of each group, and each survivor with its reason."""
+    drawn, seen, equivalents = len(score.drawn), sum(score.seen), len(score.equivalents)
+    rows = []
+    for group in GROUPS:
+        planted = [seen for one, seen in zip(score.drawn, score.seen, strict=True) if one.group == group]
+        same = sum(one.group == group for one in score.equivalents)
+        rows.append(f"| {group} | {len(planted)} | {sum(planted)} | {same} |")
+    return "\n".join(
+        [
+            "# Mutants",
+            "",
+            f'`make mutants ARGS="--count {drawn} --seed {seed}"` plants {drawn} faults, drawn with '
+            f"seed {seed} from the modules that hold formulae, one at a time, and runs the tests of their "
+            "group. A fault is seen if a test fails. A fault that changes no result (an equivalent mutant) "
+            "cannot be seen; the table says which ones were judged so by reading the code.",
+            "",
+            f"Seen: {seen} of {drawn} ({seen / drawn:.1%}). Without the equivalent mutants ({equivalents}): "
+            f"{seen} of {drawn - equivalents} ({score.share:.1%}).",
+            "",
+            *("| group | planted | seen | equivalent |", "| --- | --- | --- | --- |", *rows),
+            "",
+            *("| not seen | equivalent | why |", "| --- | --- | --- |"),
+            *(_row(one, score) for one in score.survivors),
+            "",
+        ]
+    )
+
+
+def _row(one: Mutation, score: Score) -> str:
+    source = one.source.replace("|", r"\|")
+    why = score.equivalent.get(one.place) or score.other.get(one.place, "")
+    kind = "yes" if one.place in score.equivalent else "no"
+    return f"| line {one.line}, `{source}`: `{one.name}` | {kind} | {why} |"

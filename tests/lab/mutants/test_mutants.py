@@ -1,0 +1,115 @@
+"""Mutants: when a stored answer and a reason count, what counts as seen, and the numbers of the page."""
+
+import json
+import re
+import subprocess
+from dataclasses import replace
+
+import pytest
+
+pytest.importorskip("cosmic_ray", reason="cosmic-ray is installed for make mutants only")
+
+from lab.mutants import mutations, testing
+from lab.mutants.__main__ import answered
+from lab.mutants.mutations import Mutation, draw
+from lab.mutants.page import WHYS, Score, page
+from packetmesh.errors import InputError
+
+HALF = "LIMIT = 3\n\n\ndef half(x):\n    return x / 2\n"
+
+
+@pytest.fixture
+def copy(tmp_path, monkeypatch):
+    """A repository with one module, its own tests, and the tests of its group."""
+    monkeypatch.setattr(mutations, "GROUPS", {"mac": (("shop/*.py",), ("tests/shop",))})
+    monkeypatch.setattr(testing, "GROUPS", mutations.GROUPS)
+    monkeypatch.setattr("lab.mutants.__main__.GROUPS", mutations.GROUPS)
+    for path, text in {"shop/half.py": HALF, "tests/shop/test_all.py": "", "tests/test_half.py": ""}.items():
+        (tmp_path / "copy" / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "copy" / path).write_text(text)
+    return tmp_path / "copy"
+
+
+def _doubles(copy) -> Mutation:
+    """The fault that multiplies by 2 in place of halving."""
+    (found,) = (one for one in draw(copy, 100, 1) if "Div_Mul" in one.operator)
+    return found
+
+
+def _exits(monkeypatch, *codes):
+    """Let pytest end with these exit codes (None exceeds the time); return the paths' last names."""
+    ran, left = [], list(codes)
+
+    def run(command, timeout, **_):
+        ran.append([path.rpartition("/")[2] for path in command[7:]])
+        code = left.pop(0)
+        if code is None:
+            raise subprocess.TimeoutExpired(command, timeout)
+        return subprocess.CompletedProcess(command, code, stdout="1 failed in 0.1s\n")
+
+    monkeypatch.setattr(testing.subprocess, "run", run)
+    return ran
+
+
+def test_a_mutant_knows_its_line(copy):
+    one = _doubles(copy)
+    assert (one.line, one.source) == (5, "return x / 2")
+    assert one.applied(HALF) == HALF.replace("x / 2", "x * 2")
+
+
+@pytest.mark.parametrize(
+    ("codes", "seen"),
+    [((1,), True), ((0, 1), True), ((0, 0), False), ((None,), True), ((-11, 0), False), ((2, 4), False)],
+)
+def test_only_a_failed_test_or_an_exceeded_time_sees_a_fault(copy, monkeypatch, codes, seen):
+    ran = _exits(monkeypatch, *codes)
+    (copy / ".numba").mkdir()
+    assert testing.sees(copy, _doubles(copy), 1.0) == seen
+    assert ran == [["test_half.py"], ["shop"]][: len(codes)]
+    assert (copy / "shop/half.py").read_text() == HALF
+    assert not (copy / ".numba").exists()
+
+
+def test_no_fault_is_planted_if_a_test_fails_without_one(copy, monkeypatch, tmp_path):
+    ran = _exits(monkeypatch, 1)
+    with pytest.raises(InputError, match=r"group mac fail without a fault \(1 failed in 0\.1s\)"):
+        answered([copy], [_doubles(copy)], tmp_path / "answers.jsonl")
+    assert ran == [["test_half.py", "shop"]]
+    assert not (tmp_path / "answers.jsonl").exists()
+
+
+@pytest.mark.parametrize("changed", ["shop/half.py", "tests/shop/test_all.py", "tests/test_half.py"])
+def test_an_answer_counts_until_the_module_or_a_test_changes(copy, monkeypatch, tmp_path, changed):
+    answers = tmp_path / "answers.jsonl"
+    ran = _exits(monkeypatch, 0, 1, 0, 0, 0)
+    one = _doubles(copy)
+    assert answered([copy], [one], answers) == [True]
+    assert answered([copy], [one], answers) == [True]
+    assert len(ran) == 2
+    with (copy / changed).open("a") as file:
+        file.write("\n# longer\n")
+    assert answered([copy], [one], answers) == [False]
+    assert len(answers.read_text().splitlines()) == 2
+
+
+def test_reasons_belong_to_a_source_line_and_equivalent_mutants_are_counted_apart():
+    same = Mutation("mac", "shop/half.py", "core/NumberReplacer", 0, 1, "LIMIT = 3 | 4")
+    others = [replace(same, occurrence=k, line=k) for k in range(2, 6)]
+    moved = replace(same, source="LIMIT = 5", line=9)
+    seen = [False, True, True, True, False, False]
+    score = Score([same, *others, moved], seen, {same.place: "The same."}, {others[-1].place: "Rare."})
+    assert score.share == 3 / 5
+    text = page(score, 7)
+    assert '`make mutants ARGS="--count 6 --seed 7"` plants 6 faults' in text
+    assert "Seen: 3 of 6 (50.0%). Without the equivalent mutants (1): 3 of 5 (60.0%)." in text
+    assert "| mac | 6 | 3 | 1 |" in text
+    assert r"| line 1, `LIMIT = 3 \| 4`: `shop/half.py NumberReplacer 0` | yes | The same. |" in text
+    assert "`shop/half.py NumberReplacer 5` | no | Rare. |" in text
+    assert "| line 9, `LIMIT = 5`: `shop/half.py NumberReplacer 0` | no |  |" in text
+
+
+def test_the_stored_reasons_have_the_form_of_places():
+    whys = json.loads(WHYS.read_text())
+    assert whys.keys() == {"equivalent", "other"}
+    for place in whys["equivalent"] | whys["other"]:
+        assert re.match(r"\w+(/\w+)+\.py \w+ \d+: \S", place)
