@@ -33,7 +33,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
         *("packetmesh", "reproduce", "--only"),
         "C26,C27,C28,C29,C30,C31,C32,C33,C34,C35,C36",
     ),
-    "delivery_claims": ("packetmesh", "reproduce", "--only", "D01,D02,D03,D04,D05,D06,D07,D08"),
+    "delivery_claims": ("packetmesh", "reproduce", "--only", "D01,D02,D03,D04,D05,D06,D07,D08,D11"),
     "bench_chain": ("packetmesh", "bench", "--only", "chain"),
     "bench_surface": ("packetmesh", "bench", "--only", "surface"),
     "bench_registration": ("packetmesh", "bench", "--only", "registration"),

@@ -1,4 +1,4 @@
-"""The trials of D01 to D06, and the values computed from them."""
+"""The trials of D01 to D06 and D11, and the values computed from them."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class Study:
 def delivery_study(
     folder: Path, scheduler: str | None, full: bool = False
 ) -> Generator[Progress, None, Study]:
-    """Run the trials of D01 to D06: the default subset, or all."""
+    """Run the trials of D01 to D06 and D11: the default subset, or all."""
     run = partial(iterate_trials, folder=folder, scheduler=scheduler, data=DATA)
     tasks, sending = loss_tasks(full), send_tasks()
     losses = yield from run("D01 to D06, lost packets", loss_trial, tasks)
@@ -109,5 +109,5 @@ def delivery_study(
 
 
 def full_delivery_study(folder: Path, scheduler: str | None) -> Generator[Progress, None, Study]:
-    """Run all trials of D01 to D06."""
+    """Run all trials of D01 to D06 and D11."""
     return (yield from delivery_study(folder, scheduler, full=True))

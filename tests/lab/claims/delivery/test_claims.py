@@ -1,4 +1,4 @@
-"""D01 to D08 follow their numbers: made-up trials whose answers are known."""
+"""D01 to D08 and D11 follow their numbers: made-up trials whose answers are known."""
 
 import json
 from dataclasses import replace
@@ -9,15 +9,15 @@ import pytest
 from lab.claims.claim import Verdict
 from lab.claims.delivery import cameras, pieces
 from lab.claims.delivery.claims import CLAIMS
-from lab.claims.delivery.setup import SEEDS, loss_tasks, send_tasks
+from lab.claims.delivery.setup import HEADLINE, SEEDS, loss_tasks, send_tasks
 from lab.claims.delivery.study import Study
 from lab.results.pages import results_page
 from lab.results.record import Record, rounded
 from packetmesh.files import finite
 
-RATES = {"raw": 0.3, "tiles": 0.2, "layered": 0.1}
+RATES = {"raw": 0.3, "tiles": 0.2, "layered": 0.1, "exact": 0.05}
 """Points of fused F-score for each per cent lost."""
-BYTES = {"layered": 1_100_000.0, "jpeg": 1_000_000.0}
+BYTES = {"layered": 1_100_000.0, "exact": 400_000.0, "jpeg": 1_000_000.0}
 RIG_LEVELS = {"living-room": 0.95, "box-on-table": 0.9, "office": 0.93, "workshop": 0.85}
 
 
@@ -61,7 +61,8 @@ def judged(study):
 
 def test_the_exchange_rates_are_those_of_the_trials():
     verdict = judged(made_up())["D01"]
-    for coding, rate in RATES.items():
+    for coding in HEADLINE:
+        rate = RATES[coding]
         name = f"points_per_percent_{coding}_fused"
         assert verdict.ours[name] == pytest.approx(rate)
         assert verdict.ci95[name] == pytest.approx((rate, rate))
@@ -94,6 +95,16 @@ def test_the_aim_is_judged_by_what_is_kept_and_by_its_bytes():
         assert "not reached" in judged(other)["D02"].why
 
 
+def test_the_aim_of_exact_is_judged_in_the_same_way():
+    verdict = judged(made_up())["D11"]
+    kept = np.mean([1.0 - 0.005 / level for level in RIG_LEVELS.values()])
+    assert verdict.ours["kept_exact"] == pytest.approx(kept)
+    assert verdict.ours["bytes_over_jpeg"] == pytest.approx(0.4)
+    assert verdict.verdict == "holds"
+    lossy, large = made_up(RATES | {"exact": 0.15}), made_up(bytes_sent=BYTES | {"exact": 460_000.0})
+    assert {judged(other)["D11"].verdict for other in (lossy, large)} == {"does not hold"}
+
+
 def test_the_hypotheses_follow_their_trials():
     verdicts = judged(made_up())
     assert {verdicts[name].verdict for name in ("D03", "D04", "D05", "D06")} == {"holds"}
@@ -119,7 +130,7 @@ def test_with_one_seed_and_equal_rigs_d04_has_an_interval_of_no_width():
     study = made_up(fusion_gain=lambda lost: 0.1 + 1e-4 * lost**2)
     first = {task: values for task, values in study.losses.items() if task.seed == 0}
     verdict = judged(replace(study, losses=first))["D04"]
-    for coding in RATES:
+    for coding in HEADLINE:
         name = f"gain_per_percent_{coding}"
         assert verdict.ci95[name] == pytest.approx((verdict.ours[name],) * 2)
 
