@@ -290,10 +290,10 @@ def _rvl(stream: Packed, shape: tuple[int, int]) -> DepthArray:
 
 COLOR_CODERS = (
     ColorCoder("JPEG", 0, write_jpeg, lambda stream, _, __: read_picture(stream)),
-    ColorCoder("JPEG", 32, write_scan, read_scan),
-    *(ColorCoder("AVIF", side_px, write_av1, read_av1) for side_px in (0, 128, 64, 32)),
+    ColorCoder("JPEG", 32, write_scan, read_scan.__wrapped__),
+    *(ColorCoder("AVIF", side_px, write_av1, read_av1.__wrapped__) for side_px in (0, 128, 64, 32)),
 )
-"""Pieces are without headers."""
+"""Pieces are without headers; readers are those without a cache."""
 
 
 def _line(row: Row) -> str:

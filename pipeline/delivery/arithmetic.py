@@ -180,7 +180,7 @@ def _code(mode: Mode, coder: Coder, chance: int, bit: bool) -> bool:
     short = length < _SHORT
     coder[LENGTH] = length << 16 if short else length
     if mode is None:
-        least, most = coder[LEAST] - skipped, min(coder[MOST] - skipped, length - 1)
+        least, most = coder[LEAST] - skipped, coder[MOST] - skipped
         if short:
             for _ in range(2):
                 known = position < coder.size

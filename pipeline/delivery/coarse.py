@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pipeline.delivery import levels
 from pipeline.delivery.coding import DepthArray
 from pipeline.delivery.pictures import read_av1, write_av1
+from pipeline.delivery.tiled import areas_of
 from pipeline.types import ByteArray
 
 DEPTH_BLOCK = 8
@@ -35,7 +36,7 @@ def write_depth(depth: DepthArray) -> bytes:
     medians = np.take_along_axis(blocks, middle[..., None], axis=2)[..., 0]
     inside = np.outer(_inside(height, shape[0]), _inside(width, shape[2]))
     grid = np.where(2 * known >= inside, medians, 0).astype(np.uint16)
-    coded = levels.encode(grid, [_whole(grid.shape)])
+    coded = levels.encode(grid, areas_of(grid.shape, max(grid.shape)))
     return len(coded.header).to_bytes(_LENGTH_BYTES, "big") + coded.header + coded.tiles[0]
 
 
@@ -69,10 +70,6 @@ def read_color(frame: bytes, shape: tuple[int, int]) -> ByteArray:
     rgb = cv2.resize(small, (shape[1], shape[0]), interpolation=cv2.INTER_CUBIC)
     rgb.setflags(write=False)
     return rgb
-
-
-def _whole(shape: tuple[int, ...]) -> tuple[slice, slice]:
-    return slice(0, shape[0]), slice(0, shape[1])
 
 
 def _inside(size: int, blocks: int) -> NDArray[np.integer]:

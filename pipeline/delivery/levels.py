@@ -38,8 +38,8 @@ TABLES = ("few", "dense")
 """Names of the tables of chances: for levels of a disparity's steps, and for nearly all whole millimetres."""
 VERSION = 1
 """Of tables and model; a header names it."""
-_SAMPLE = 16
-"""Every so many tiles are coded with each table, to choose one."""
+_SAMPLE = 17
+"""Every so many of the tiles with depth are coded with each table, to choose one."""
 _COUNT_BYTES = 2
 _NUMBERS = 18
 """Kinds of gaps between levels, by the binary digits of the gap before."""
@@ -77,9 +77,9 @@ def encode(depth: DepthArray, areas: list[Area]) -> Coded:
     """
     values, indices = indices_of(depth)
     tiles = [np.ascontiguousarray(indices[area]) for area in areas]
+    sample = [tile for tile in tiles if tile.any()][::_SAMPLE]
     sizes = [
-        sum(len(_write_tile(tile, table, len(values))) for tile in tiles[::_SAMPLE])
-        for table in range(len(TABLES))
+        sum(len(_write_tile(tile, table, len(values))) for tile in sample) for table in range(len(TABLES))
     ]
     table = int(np.argmin(sizes))
     header = bytes([VERSION, table]) + len(values).to_bytes(_COUNT_BYTES, "big") + _write_levels(values)
@@ -104,13 +104,13 @@ def read_header(header: bytes) -> Levels:
     Raises:
         InputError: it has another version, or is none.
     """
-    if len(header) < 2 + _COUNT_BYTES or header[1] >= len(TABLES):
-        raise InputError(f"{len(header)} bytes are no list of depth levels; try to receive them again")
-    if header[0] != VERSION:
+    if header and header[0] != VERSION:
         raise InputError(
             f"The depth image is coded by version {header[0]} of its tables, and this program has version "
             f"{VERSION}; install the sender's version of PacketMesh"
         )
+    if len(header) < 2 + _COUNT_BYTES or header[1] >= len(TABLES):
+        raise InputError(f"{len(header)} bytes are no list of depth levels; try to receive them again")
     count = int.from_bytes(header[2 : 2 + _COUNT_BYTES], "big")
     values, complete = _read_levels(np.frombuffer(header[2 + _COUNT_BYTES :], np.uint8).copy(), count)
     if not complete:

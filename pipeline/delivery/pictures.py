@@ -8,7 +8,7 @@ from functools import lru_cache
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, features
 
 from packetmesh.errors import InputError
 from pipeline.types import ByteArray
@@ -69,7 +69,7 @@ def write_av1(rgb: ByteArray, quality: int = AV1_QUALITY) -> bytes:
     """Encode an image as AVIF and omit what is equal for all images of one size, some 290 bytes.
 
     Raises:
-        InputError: this Pillow does not write the same header for all.
+        InputError: this Pillow writes no AVIF, or not with the same header for all.
     """
     stream = _write_avif(rgb, quality)
     frame = stream[len(_av1_header(rgb.shape[:2], quality)) :]
@@ -99,6 +99,8 @@ def read_av1(frame: bytes, shape: tuple[int, int], quality: int = AV1_QUALITY) -
 
 def _write_avif(rgb: ByteArray, quality: int) -> bytes:
     """Encode with Pillow, as OpenCV's wheel for Windows has no AVIF; with one thread, for equal bytes."""
+    if not features.check("avif"):
+        raise InputError("This Pillow has no AVIF; install its wheel from PyPI, or try the coding tiles")
     stream = io.BytesIO()
     Image.fromarray(np.ascontiguousarray(rgb)).save(
         stream, "AVIF", quality=quality, speed=_AV1_SPEED, max_threads=1

@@ -9,7 +9,6 @@ mean, an edge by the detector), and whether the row rises or falls.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,7 +45,7 @@ BROKEN = -1
 
 @compiled
 def code_tile(mode: Mode, coder: Coder, tile: Indices, level_count: int) -> int:
-    """Code a tile, into ``stream`` or from it.
+    """Code a tile: write it, or read it into ``tile``.
 
     Args:
         mode: ``WRITE`` or ``READ``.
@@ -179,12 +178,12 @@ def _context(tile: Indices, row: int, column: int, prediction: int, activity: in
     left, above = left or prediction, above or prediction
     offset = left + (far_left or left) + above + (right or above) - 4 * prediction
     size = abs(offset)
-    step = (size >= 1) + (size >= 3) + (size >= 6)
+    step = int(size >= 1) + int(size >= 3) + int(size >= 6)
     signed = step if offset >= 0 else _OFFSETS - step
     return (activity * _OFFSETS + signed) * _TRENDS + trend
 
 
-@numba.njit(cache=True, inline="always")
+@inlined
 def _at(tile: Indices, row: int, column: int) -> int:
     """Return the index at a pixel that is already coded; 0 outside the tile."""
     if row < 0 or column < 0 or column >= tile.shape[1]:

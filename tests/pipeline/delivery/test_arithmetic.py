@@ -13,6 +13,7 @@ from pipeline.delivery.arithmetic import (
     LENGTH,
     LOW,
     ONE,
+    POSITION,
     READ,
     STOPPED,
     WRITE,
@@ -79,17 +80,22 @@ def test_bits_take_as_many_bytes_as_their_information(chance):
     assert information < written(write).size < 1.15 * information + 4
 
 
-def test_a_carry_passes_through_all_words_that_are_full():
-    """Zeros of a chance near one push the lower end up; ones then keep it there, below a round number."""
-    bits = [False] * 3 + [True] * 300 + [False] * 40
+def test_carries_pass_through_full_words():
+    """1234 ffff 1|0005: the third word's carry fills the second, whose carry goes on to the first."""
+    coder = writer(EVEN, 8)
+    first = coder[BODY] + 1
+    coder[first : first + 3] = 0x1234, 0xFFFF, 0x10005
+    coder[POSITION] = coder[BODY] + 3
+    assert bytes(finish(coder)).hex() == "123500000005"
 
-    def coded(mode, coder):
-        return [code_bit(mode, coder, 0, bit and mode is WRITE) for bit in bits]
 
-    for chance in (1, 40, ONE // 3, ONE - 1):
-        counts = counts_of(np.array([chance]))
-        stream = written(lambda coder: coded(WRITE, coder), counts)
-        assert coded(READ, reader(counts, stream)) == bits
+def test_the_last_bytes_may_carry_as_well():
+    """From ffff ffff 0001, of length 2 ** 36: all numbers that begin with the carry and two zeros lie within."""
+    coder = writer(EVEN, 8)
+    coder[coder[BODY] + 1] = 0x00FF
+    coder[POSITION] = coder[BODY] + 1
+    coder[LOW], coder[LENGTH] = 0xFFFFFFFF0001, 1 << 36
+    assert bytes(finish(coder)).hex() == "01000000"
 
 
 def test_a_slot_learns_the_share_of_ones_and_forgets_slowly():

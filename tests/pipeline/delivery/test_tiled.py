@@ -108,7 +108,7 @@ def test_what_has_arrived_replaces_the_base_holes_included():
 
 
 @pytest.mark.parametrize("name", ["tiles", "layered", "exact"])
-def test_damaged_bytes_cost_their_tiles_and_are_never_taken_for_values(name, room):
+def test_damaged_bytes_of_whole_tiles_cost_these_tiles(name, room):
     """Packets carry a check of their own; this is for what gets past it."""
     coding = CODINGS[name]
     data = np.frombuffer(coding.encode(room, 108), np.uint8)
@@ -127,21 +127,33 @@ def test_damaged_bytes_cost_their_tiles_and_are_never_taken_for_values(name, roo
 
 
 def test_a_tile_in_another_s_place_is_lost(room):
-    """Two neighbours in the stream with the same number of bytes are exchanged."""
+    """Two equal tiles differ in their seals only."""
     coding = CODINGS["tiles"]
     plain = np.zeros_like(room.depth)
-    plain[:32, :64] = room.depth[200:232, 300:364]
-    plain[:32, 32:64] = plain[:32, :32][:, ::-1]
-    images = Images(room.rgb, plain)
-    data = coding.encode(images, 108)
+    plain[:32, :32] = plain[:32, 32:64] = room.depth[200:232, 300:332]
+    data = coding.encode(Images(room.rgb, plain), 108)
     tiles = levels.encode(plain, areas_of(plain.shape, TILE)).tiles
     first, second = (_sealed(tiles[index], index) for index in (0, 1))
+    assert first[:-1] == second[:-1]
+    assert first != second
     assert data.count(first) == data.count(second) == 1
-    moved = _sealed(tiles[1], 1)[: len(first)].ljust(len(first), b"\0")
-    swapped = np.frombuffer(data.replace(first, moved), np.uint8)
+    swapped = np.frombuffer(data.replace(first, second), np.uint8)
     result = coding.decode(swapped, np.ones(swapped.size, bool), plain.shape, 108)
     assert not result.depth[:32, :32].any()
     np.testing.assert_array_equal(result.depth[:32, 32:64], plain[:32, 32:64])
+
+
+@pytest.mark.parametrize("name", ["tiles", "exact"])
+def test_a_damaged_protected_part_gives_nothing(name, room):
+    coding = CODINGS[name]
+    data = np.frombuffer(coding.encode(room, 108), np.uint8)
+    everything = np.ones(data.size, bool)
+    for packet in range(8):
+        damaged = data.copy()
+        damaged[108 * packet + 60] ^= 4
+        result = coding.decode(damaged, everything, room.depth.shape, 108)
+        for image in (result.depth, result.coarse, result.rgb, result.rgb_known):
+            assert not image.any()
 
 
 def test_pieces_of_avif_are_the_image_without_what_all_share():
