@@ -69,9 +69,14 @@ $(VENV)/.uv: requirements-uv.lock
 	$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements-uv.lock
 	@touch $@
 
-$(VENV)/.core: $(VENV)/.uv requirements.lock pyproject.toml
+$(VENV)/.installed: $(VENV)/.uv requirements.lock pyproject.toml
 	$(BIN)/uv pip install -q --python $(BIN)/python --require-hashes -r requirements.lock
 	$(BIN)/uv pip install -q --python $(BIN)/python --no-deps --no-build-isolation -e .
+	@touch $@
+
+# Numba notices when the file of a function changes, but not when a file does whose functions it calls.
+$(VENV)/.core: $(VENV)/.installed $(shell grep -rlE 'njit|compiled' --include='*.py' pipeline lab)
+	find pipeline lab -name '*.nb[ic]' -delete
 	$(BIN)/python -m app.compute.warm  # compiles; not at the first use
 	$(BIN)/python -m app.compute.prepared  # what a new server shows first
 	@touch $@

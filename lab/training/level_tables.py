@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from lab.training.dataset import FIRST_SEED, viewed_room
 from lab.worlds.sensor import sense_depth
 from packetmesh.files import atomic_path
-from pipeline.delivery.arithmetic import BIT, BODY, COUNTS, MEMORY, ONE, WRITE, compiled, writer
+from pipeline.delivery.arithmetic import BIT, BODY, COUNTS, MEMORY, ONE, WRITE, compiled_with_arrays, writer
 from pipeline.delivery.coding import DepthArray
 from pipeline.delivery.levels import SHIPPED_TABLES, TABLES, indices_of
 from pipeline.delivery.tile_model import MOST_WORDS_PER_PIXEL, SLOTS, Indices, code_tile
@@ -70,7 +70,7 @@ def count(depth: DepthArray, counts: NDArray[np.int64]) -> None:
             _count(counts, np.ascontiguousarray(indices[area]), len(values))
 
 
-@compiled
+@compiled_with_arrays
 def _count(counts: NDArray[np.int64], tile: Indices, level_count: int) -> None:
     coder = writer(counts, MOST_WORDS_PER_PIXEL * tile.size)
     coder[MEMORY] = np.iinfo(np.int64).max

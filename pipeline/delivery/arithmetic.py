@@ -13,8 +13,6 @@ reader passes anything and gets the bits of the stream.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numba
 import numpy as np
 from numpy.typing import NDArray
@@ -47,21 +45,18 @@ LONGEST = 17
 """Most binary digits of a number after its first."""
 
 Coder = NDArray[np.int64]
-"""(N,) one array with all of a coder's state, as numba counts the references to each array at each call: the
-places above, then for each slot the weights of the zeros and the ones that it has seen (its chance is the
-share of ones), then a writer's words, each of 16 bits but for its carry, or a reader's bytes."""
+"""(N,) one array with all of a coder's state: the places above, then for each slot the weights of the zeros
+and the ones that it has seen (its chance is the share of ones), then a writer's words, each of 16 bits but
+for its carry, or a reader's bytes."""
 
 
-def compiled(function: Any) -> Any:
-    """Compile a function with numba; it is kept on disk and runs beside other threads."""
-    return numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-
-
-def inlined(function: Any) -> Any:
-    """Compile a function as part of each caller: numba counts references to arrays at a call, which takes
-    longer than what the function does.
-    """
-    return numba.njit(inline="always", error_model="numpy")(function)
+compiled = numba.njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # type: ignore[call-overload]
+"""Compile once, with caching, without the interpreter's lock and without counts of the references to arrays,
+which take longer than what a function does here; such a function creates no array."""
+compiled_with_arrays = numba.njit(cache=True, nogil=True, error_model="numpy")
+"""The same for functions that create arrays."""
+inlined = numba.njit(inline="always", error_model="numpy")
+"""Compile a function as a part of each of its callers."""
 
 
 def counts_of(chances: NDArray[np.integer], trust: int = TRUST) -> NDArray[np.int64]:
@@ -75,7 +70,7 @@ def counts_of(chances: NDArray[np.integer], trust: int = TRUST) -> NDArray[np.in
     return np.stack([trust * BIT - ones, ones], axis=1).ravel()
 
 
-@compiled
+@compiled_with_arrays
 def writer(counts: NDArray[np.int64], most_words: int) -> Coder:
     """Return a coder that writes a new stream of at most so many words."""
     body = COUNTS + counts.size
@@ -88,7 +83,7 @@ def writer(counts: NDArray[np.int64], most_words: int) -> Coder:
     return coder
 
 
-@compiled
+@compiled_with_arrays
 def reader(counts: NDArray[np.int64], stream: ByteArray) -> Coder:
     """Return a coder that reads the (B,) bytes of a stream, or the first of them."""
     body = COUNTS + counts.size
@@ -147,7 +142,7 @@ def code_lower_digits(mode: Mode, coder: Coder, slot: int, digits: int, number: 
     return coded
 
 
-@compiled
+@compiled_with_arrays
 def finish(coder: Coder) -> ByteArray:
     """Return the (B,) bytes of the words, and the fewest after them that determine all bits."""
     for count in range(_BYTES + 1):

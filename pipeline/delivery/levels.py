@@ -23,6 +23,7 @@ from pipeline.delivery.arithmetic import (
     Mode,
     code_number,
     compiled,
+    compiled_with_arrays,
     counts_of,
     finish,
     reader,
@@ -152,14 +153,14 @@ def _write_tile(tile: Indices, table: int, level_count: int) -> bytes:
     return _code_whole(_table(table), tile, level_count).tobytes()
 
 
-@compiled
+@compiled_with_arrays
 def _code_whole(counts: NDArray[np.int64], tile: Indices, level_count: int) -> ByteArray:
     coder = writer(counts, MOST_WORDS_PER_PIXEL * tile.size)
     code_tile(WRITE, coder, tile, level_count)
     return finish(coder)
 
 
-@compiled
+@compiled_with_arrays
 def _read_tile(stream: ByteArray, counts: NDArray[np.int64], tile: Indices, level_count: int) -> int:
     return code_tile(READ, reader(counts, stream), tile, level_count)
 

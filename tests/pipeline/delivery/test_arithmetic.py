@@ -90,7 +90,7 @@ def test_carries_pass_through_full_words():
 
 
 def test_the_last_bytes_may_carry_as_well():
-    """From ffff ffff 0001, of length 2 ** 36: all numbers that begin with the carry and two zeros lie within."""
+    """From ffff ffff 0001, of length 2 ** 36: all that begin with the carry and two zeros lie within."""
     coder = writer(EVEN, 8)
     coder[coder[BODY] + 1] = 0x00FF
     coder[POSITION] = coder[BODY] + 1
