@@ -16,6 +16,8 @@ MARKS = {
     **dict.fromkeys(("not reproduced", "does not hold"), "not-reproduced"),
 }
 """Classes of the page's style; other verdicts are neutral."""
+IN_POINTS = ("D01", "D04", "D05", "D07", "D08")
+"""Claims whose F-scores and shares of rays are in points."""
 
 
 def write_reproduction_report(verdicts: Sequence[Verdict], path: Path) -> None:
@@ -29,10 +31,9 @@ def write_reproduction_report(verdicts: Sequence[Verdict], path: Path) -> None:
         "runs of the network.</p>{}"
     ).format(_verdict_counts(thesis), Markup("").join(map(_section, thesis)))
     if ours:
-        body += Markup(
-            '<h1>Our claims beyond the thesis</h1><p class="lead">{}</p><p class="note">In D01, D04, D05, '
-            "D07 and D08 F-scores, shares of rays and their changes are in points of 100.</p>{}"
-        ).format(_verdict_counts(ours), Markup("").join(map(_section, ours)))
+        body += Markup('<h1>Our claims beyond the thesis</h1><p class="lead">{}</p>{}{}').format(
+            _verdict_counts(ours), _points_note(ours), Markup("").join(map(_section, ours))
+        )
     write_page(path, "PacketMesh: the thesis, computed again", body)
 
 
@@ -41,6 +42,13 @@ def _verdict_counts(verdicts: Sequence[Verdict]) -> str:
     counts = Counter(verdict.verdict for verdict in verdicts)
     parts = (f"{count} {word}" for word in VERDICTS if (count := counts[word]))
     return f"Claims: {', '.join(parts)}."
+
+
+def _points_note(verdicts: Sequence[Verdict]) -> Markup:
+    """Return a note that names the verdicts whose claims are of ``IN_POINTS``; empty without one."""
+    named = ", ".join(verdict.id for verdict in verdicts if verdict.id in IN_POINTS)
+    note = Markup('<p class="note">In points of 100: F-scores, shares of rays and their changes in {}.</p>')
+    return note.format(named) if named else Markup("")
 
 
 def _section(verdict: Verdict) -> Markup:

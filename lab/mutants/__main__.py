@@ -59,7 +59,7 @@ def answered(copies: list[Path], drawn: list[Mutation], answers: Path) -> list[b
         answers: file with a line of JSON for each answer.
 
     Raises:
-        InputError: a test fails without a fault.
+        InputError: a test fails without a fault, or tests were killed.
     """
     keys = [(one.name, digest(copies[0], one)) for one in drawn]
     seen = _read(answers)

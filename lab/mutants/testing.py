@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -18,8 +19,11 @@ from packetmesh.errors import InputError
 PATIENCE = 10.0
 """Time limit of each test run, as a multiple of the time that the group's tests take without a fault; a fault
 that exceeds it counts as seen, because the run may never stop."""
-FAILED = 1
-"""Exit code of pytest if a test fails or, with -x, a module cannot be imported."""
+UNSEEN = (0, 5)
+"""Exit codes of pytest if all tests pass, and if there is none to run, as all of a file are skipped. With any
+other a test failed, an import failed or the interpreter crashed; without the fault none does."""
+KILLED = (-signal.SIGKILL, -signal.SIGTERM)
+"""Exit codes of a run that was stopped from outside, as for lack of memory."""
 
 
 def copied(folder: Path) -> Path:
@@ -72,6 +76,9 @@ def sees(copy: Path, mutation: Mutation, limit_s: float) -> bool:
 
     The module's own tests run first, then those of its group. Numba's whole cache is deleted before: it
     notices a changed function, but no changed constant and no changed callee of another module.
+
+    Raises:
+        InputError: a run was stopped from outside, which tells nothing of the fault.
     """
     module = copy / mutation.path
     code = module.read_text(encoding="utf-8")
@@ -79,20 +86,34 @@ def sees(copy: Path, mutation: Mutation, limit_s: float) -> bool:
     shutil.rmtree(copy / ".numba", ignore_errors=True)
     try:
         paths = own_tests(copy, mutation), group_tests(copy, mutation.group)
-        return any(_fails(copy, some, limit_s) for some in paths if some)
+        return any(_fails(copy, mutation, some, limit_s) for some in paths if some)
     finally:
         module.write_text(code, encoding="utf-8")
 
 
-def _fails(copy: Path, paths: Sequence[Path], limit_s: float) -> bool:
+def _fails(copy: Path, mutation: Mutation, paths: Sequence[Path], limit_s: float) -> bool:
     try:
-        return _run(copy, paths, limit_s).returncode == FAILED
+        code = _run(copy, paths, limit_s).returncode
     except subprocess.TimeoutExpired:
         return True
+    if code in KILLED:
+        raise InputError(
+            f"The tests with the fault {mutation.name} were killed, perhaps for lack of memory, so it is "
+            "neither seen nor unseen; run again with --workers 1"
+        )
+    return code not in UNSEEN
 
 
 def _run(copy: Path, paths: Sequence[Path], limit_s: float | None) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *map(str, paths)]
     environment = os.environ | {"PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"}
     environment |= {"NUMBA_CACHE_DIR": str(copy / ".numba"), "OMP_NUM_THREADS": "1"}
-    return subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True, timeout=limit_s)
+    return subprocess.run(
+        command,
+        cwd=copy,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=limit_s,
+        start_new_session=True,  # so that Ctrl-C stops no tests, which would count as failed
+    )

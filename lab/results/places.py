@@ -64,7 +64,7 @@ def verdict_picture(runs: list[Row]) -> str:
     """Return a chart of our shares over the overlap: right, called sure, and called sure but wrong."""
     own = [run for run in runs if run["program"] == OURS and run["overlap"] != "all" and run["pairs"]]
     kinds = {"right": "right", "called sure": "sure", "called sure but wrong": "sure_wrong"}
-    names = [_overlap(run).replace(" to ", "–") for run in own]
+    names = [_overlap(run).partition(" (")[0].replace(" to ", "–") for run in own]
     series = [_series(label, own, key) for label, key in kinds.items()]
     return chart("overlap", "share of the pairs", [name.removesuffix(" %") for name in names], series)
 
@@ -97,7 +97,7 @@ def _lists(runs: list[Row]) -> str:
 def _overlap(run: Row) -> str:
     """Return the text of a group's overlap; views that should have none may share ``TOLERANCE``."""
     overlap: str = run["overlap"]
-    return f"at most {percent(TOLERANCE, 0)}" if overlap == NOTHING else overlap
+    return f"none (at most {percent(TOLERANCE, 0)})" if overlap == NOTHING else overlap
 
 
 _COUNTED = ("pairs", "right", "95 %", "called sure", "of these wrong", "seconds, median")

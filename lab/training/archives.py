@@ -45,23 +45,33 @@ def _unpacked(package: Path, folder: Path) -> list[Path]:
     done = folder / "unpacked"
     if not done.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        archive_name, data = _data_of(package)
-        try:
-            with tarfile.open(fileobj=io.BytesIO(data)) as archive:
-                for member in archive:
-                    name = PurePosixPath(member.name).name
-                    content = archive.extractfile(member) if name.endswith(ZIP_SUFFIXES) else None
-                    if content is not None:
-                        temporary = folder / f"{name}.{os.getpid()}.tmp"
-                        temporary.write_bytes(content.read())
-                        temporary.rename(folder / name)
-        except (tarfile.TarError, EOFError, lzma.LZMAError, zlib.error):
-            raise InputError(
-                f"'{package}' is damaged or its {archive_name} unreadable; download it again, or unpack it "
-                "with dpkg -x."
-            ) from None
+        for name, content in _zip_contents(package):
+            temporary = folder / f"{name}.{os.getpid()}.tmp"
+            temporary.write_bytes(content)
+            temporary.rename(folder / name)
         done.touch()
     return [file for file in folder.iterdir() if file.suffix in ZIP_SUFFIXES]
+
+
+def _zip_contents(package: Path) -> Iterator[tuple[str, bytes]]:
+    """Yield name and content of each zip file in a Debian package.
+
+    Raises:
+        InputError: the package is damaged, or Python cannot decompress it.
+    """
+    archive_name, data = _data_of(package)
+    try:
+        with tarfile.open(fileobj=io.BytesIO(data)) as archive:
+            for member in archive:
+                name = PurePosixPath(member.name).name
+                content = archive.extractfile(member) if name.endswith(ZIP_SUFFIXES) else None
+                if content is not None:
+                    yield name, content.read()
+    except (tarfile.TarError, EOFError, OSError, lzma.LZMAError, zlib.error):  # bz2 and gzip raise OSError
+        raise InputError(
+            f"'{package}' is damaged or its {archive_name} unreadable; download it again, or unpack it "
+            "with dpkg -x."
+        ) from None
 
 
 def _data_of(package: Path) -> tuple[str, bytes]:

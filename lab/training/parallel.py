@@ -6,6 +6,7 @@ On shared cores this loses far less time than torch's threads, which wait for ea
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from multiprocessing.connection import wait
@@ -52,8 +53,7 @@ class Team:
 def run_team(size: int, parameters: int, work: Callable[..., None], *arguments: object) -> None:
     """Run ``work(team, *arguments)`` in ``size`` processes of one thread each, until all have stopped.
 
-    A process that fails or is killed stops the others at their next step; the traceback of an exception is
-    printed.
+    If a process fails or is killed, the others are killed; the traceback of an exception is printed.
 
     Args:
         size: number of processes.
@@ -73,18 +73,22 @@ def run_team(size: int, parameters: int, work: Callable[..., None], *arguments: 
     for process in processes:
         process.start()
     running = {process.sentinel: process for process in processes}
-    failed: list[int] = []
+    failure = 0
     while running:
         for sentinel in wait(list(running)):
             process = running.pop(sentinel)
             process.join()
-            if process.exitcode:
-                failed.append(process.exitcode)
-                barrier.abort()
-    if failed:
-        raise PacketMeshError(
-            f"The training stopped because a process failed (exit code {failed[0]}); its messages are above"
+            if process.exitcode and not failure:
+                failure = process.exitcode
+                for other in running.values():  # to abort the barrier would wait for a dead process in it
+                    other.kill()
+    if failure:
+        how = (
+            f"was killed by {signal.Signals(-failure).name}"
+            if failure < 0
+            else f"failed (exit code {failure}); its messages are above"
         )
+        raise PacketMeshError(f"The training stopped because a process {how}")
 
 
 def _member(team: Team, work: Callable[..., None], arguments: tuple[object, ...]) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from lab.walks.path import NoWalkError
 from lab.walks.walk import kinect, render_walk
 from lab.worlds.rooms import random_room
 from packetmesh.errors import InputError
@@ -66,7 +67,7 @@ def held_out_walks(walks: int, frames: int, width_px: int, folder: Path = CACHE)
     Rooms that have no walk of ``frames`` frames are left out.
 
     Raises:
-        InputError: ``frames`` is not positive, or the folder cannot be written.
+        InputError: ``frames`` is not positive, or a walk cannot be written.
     """
     if frames < 1:
         raise InputError(f"A walk of {frames} frames is not possible; it has at least 1")
@@ -81,7 +82,7 @@ def held_out_walks(walks: int, frames: int, width_px: int, folder: Path = CACHE)
             shutil.rmtree(unfinished, ignore_errors=True)
             try:
                 render_walk(random_room(seed), frames, kinect(width_px), unfinished)
-            except InputError:  # the room is too full for a camera or a walk
+            except NoWalkError:
                 shutil.rmtree(unfinished, ignore_errors=True)
                 continue
             unfinished.rename(path)

@@ -46,6 +46,10 @@ _FINE = 4000
 """Steps of a curve along which its time is summed."""
 
 
+class NoWalkError(InputError):
+    """A room is too full for a walk."""
+
+
 class FreeSpace:
     """Clearances of the places in a room at which a hand can hold a camera.
 
@@ -139,7 +143,8 @@ def walk_poses(scene: Scene, camera: CameraIntrinsics, count: int, rng: Rng) -> 
         rng: source of all randomness.
 
     Raises:
-        InputError: ``count`` is not positive, or no path that was tried is free and has only usable views.
+        NoWalkError: no path that was tried is free and has only usable views.
+        InputError: ``count`` is not positive.
     """
     if count < 1:
         raise InputError(f"A walk of {count} frames is not possible; it has at least 1")
@@ -159,7 +164,7 @@ def walk_poses(scene: Scene, camera: CameraIntrinsics, count: int, rng: Rng) -> 
                 is_usable(meter.look(T)) for T in poses
             ):
                 return poses
-    raise InputError(f"Scene '{scene.name}' leaves no room for a walk of {count} frames; take another seed.")
+    raise NoWalkError(f"Scene '{scene.name}' leaves no room for a walk of {count} frames; take another seed.")
 
 
 def _random_curve(space: FreeSpace, duration_s: float, rng: Rng) -> _Curve:

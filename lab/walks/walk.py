@@ -67,7 +67,8 @@ def render_walk(scene: Scene, frames: int, camera: CameraIntrinsics, out: AnyPat
         seed: seed of path, light, film and sensor.
 
     Raises:
-        InputError: the room has no such walk (``walk_poses``), or the folder cannot be written.
+        NoWalkError: the room has no such walk (``walk_poses``).
+        InputError: ``frames`` is not positive, or the folder cannot be written.
     """
     folder = writable_folder(out)
     poses = walk_poses(scene, camera, frames, np.random.default_rng([seed, 29]))

@@ -16,8 +16,9 @@ QUANTILES = (
     (-0.878, -0.159, -0.137, -0.069, -0.012, 0.003, 0.019, 0.057, 0.115, 0.140, 0.752),
     (-0.197, -0.073, -0.028, -0.009, -0.003, 0.000, 0.003, 0.011, 0.020, 0.029, 0.069),
 )
-"""Quantiles of log(true range / guessed range), a row per class. ``python -m lab.measuring guesses`` fits
-them on 40 rendered rooms (seeds 7,900,000 to 7,900,039), at marks on the surface of the fused cloud."""
+"""Quantiles of log(true range / guessed range), a row per class, at marks on the surface of the fused cloud
+of 40 rendered rooms (seeds 7,900,000 to 7,900,039). ``python -m lab.measuring guesses`` prints those of rooms
+from 8,000,000 up (``lab.measuring.rooms.TUNING``)."""
 UNKNOWN_RANGE_M = 5.0
 """Range of guessed points whose camera is unknown: that of the far side of a room, so that no interval is too
 narrow."""

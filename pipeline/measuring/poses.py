@@ -18,8 +18,9 @@ ASSUMED_SCALE_SD = 0.01
 SLACK_OF_SCALE = 0.35
 """Error of a registration by a wrong scale of the cameras, relative to the scale's standard deviation: a turn
 in rad, and a shift as a share of the distance of the points. In rendered rooms (seeds from
-``lab.measuring.rooms.TUNING``), two nodes each, with focal lengths wrong by 0.3 % (standard deviation), the
-errors were 1.1 mrad and 1.05 mm per m (SPEC 11). ``python -m lab.measuring poses`` prints it."""
+7,900,000 up), two nodes each, with focal lengths wrong by 0.3 % (standard deviation), the errors were
+1.1 mrad and 1.05 mm per m (SPEC 11). ``python -m lab.measuring poses`` prints those of rooms from 8,000,000
+up."""
 UNHELD_RAD, UNHELD_M = 0.02, 0.03
 """Standard deviations of a placed node that no registration holds: it stands where its given pose says."""
 

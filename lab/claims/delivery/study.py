@@ -66,13 +66,14 @@ class Study:
         name = f"f_{when}"
         return 100.0 * (self.value(lossless(task.rig, task.coding), name) - self.value(task, name))
 
+    def rate_tasks(self, coding: str, rig: str) -> list[LossTask]:
+        """Return a rig's tasks with bursts of up to 10 %: shares that every seed has, unlike larger ones."""
+        return [task for task in self.tasks(coding, rigs=(rig,)) if task.share <= RATE_SHARE]
+
     def rate_terms(self, coding: str, when: str) -> list[FloatArray]:
         """Return each rig's (S, 2) slope terms by seed: F-score points over % lost in bursts, up to 10 %."""
         return [
-            self.terms_by_seed(
-                [task for task in self.tasks(coding, rigs=(rig,)) if task.share <= RATE_SHARE],
-                lambda task: self.cost(task, when),
-            )
+            self.terms_by_seed(self.rate_tasks(coding, rig), lambda task: self.cost(task, when))
             for rig in self.rigs
         ]
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from lab.training.evaluate import FIRST_TEST_ROOM, Example, demo, held_out_rooms
+from packetmesh.errors import InputError
 from pipeline.io.demos import CALIBRATED_SCENES
 from pipeline.io.rigs import load_frame
 from pipeline.types import DepthMap, RgbdFrame
@@ -108,8 +109,19 @@ def user_sets() -> tuple[Site, ...]:
 
 
 def named_sets() -> list[str]:
-    """Return ``kind=path`` of each set that ``PACKETMESH_DEPTH_SETS`` names."""
-    return [text for text in os.environ.get(SETS_VARIABLE, "").split(os.pathsep) if text]
+    """Return ``kind=path`` of each set that ``PACKETMESH_DEPTH_SETS`` names.
+
+    Raises:
+        InputError: a set lacks its kind or its path.
+    """
+    named = [text for text in os.environ.get(SETS_VARIABLE, "").split(os.pathsep) if text]
+    for text in named:
+        kind, _, path = text.partition("=")
+        if not kind.strip() or not path.strip():
+            raise InputError(
+                f"{SETS_VARIABLE} names the set '{text}' without its kind or path; try nyu=/path/to/the/set"
+            )
+    return named
 
 
 def set_paths() -> tuple[Path, ...]:

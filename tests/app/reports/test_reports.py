@@ -1,5 +1,7 @@
 """Written reports: self-contained pages whose pictures show what a camera would see."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -85,4 +87,12 @@ def test_claims_of_ours_stand_apart_from_the_thesis_s(tmp_path):
     assert places == sorted(places)
     assert "Claims: 1 reproduced." in text
     assert "Claims: 1 holds, 1 does not hold." in text
-    assert text.index("Our claims beyond") < text.index("are in points of 100") < text.index("claim D1")
+
+
+@pytest.mark.parametrize(
+    ("ids", "named"), [(("C1", "D01", "D02", "D07"), ["D01, D07"]), (("D02", "D11"), []), (("C1",), [])]
+)
+def test_a_note_names_the_claims_in_points_that_are_in_the_report(tmp_path, ids, named):
+    verdicts = [Verdict(id_, "claim", "thesis", "tolerance", {}, {}, "holds", "why") for id_ in ids]
+    write_reproduction_report(verdicts, tmp_path / "r.html")
+    assert re.findall(r"In points of 100: .* in (.*?)\.</p>", (tmp_path / "r.html").read_text()) == named

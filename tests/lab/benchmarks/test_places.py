@@ -77,8 +77,8 @@ def test_views_without_overlap_are_said_to_share_at_most_the_tolerance():
         BY_OVERLAP: {"runs": by_overlap(ROWS)},
         ANY_OVERLAP: {"runs": by_verdict([row(0.0, False, "none"), row(0.31, True)])},
     }
-    assert "| at most 2 % | 1 | 0.0 % |" in places(numbers)
-    assert ">at most 2</text>" in pictures(numbers)[VERDICT]
+    assert "| none (at most 2 %) | 1 | 0.0 % |" in places(numbers)
+    assert ">none</text>" in pictures(numbers)[VERDICT]
 
 
 def test_the_readme_says_how_many_are_placed_at_the_least_and_the_largest_overlap():

@@ -14,6 +14,7 @@ from lab.walks import peers
 from lab.walks.held_out import FIRST_ROOM, WalkTask, frames_in_memory, held_out_walks
 from lab.walks.judging import map_errors, rpe_m, to_truth, trajectory_errors
 from lab.walks.ours import OURS, OURS_TRACKING, OWN, solve_own
+from lab.walks.path import NoWalkError
 from lab.walks.peers import available_walk_peers, solve_peer
 from lab.walks.surfaces import BESIDE_M, Mesh, surface_errors
 from lab.walks.walk import TRUE_POSES, TRUTH, WalkTruth, kinect, read_truth
@@ -52,6 +53,17 @@ def test_walks_that_no_room_can_have_are_refused(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="cannot be written"):
         held_out_walks(1, FRAMES, WIDTH_PX, tmp_path / "file")
+
+
+def test_a_full_room_is_left_out_and_a_full_disk_is_reported(tmp_path, monkeypatch):
+    errors = [NoWalkError("the room is full"), InputError("the disk is full")]
+
+    def render(*_):
+        raise errors.pop(0)
+
+    monkeypatch.setattr("lab.walks.held_out.render_walk", render)
+    with pytest.raises(InputError, match="the disk is full"):
+        held_out_walks(1, FRAMES, WIDTH_PX, tmp_path)
 
 
 @pytest.mark.parametrize("program", [*OWN, *PEERS])

@@ -34,11 +34,13 @@ from lab.claims.depth.scenes import (
     Site,
     held_out_scenes,
     real_folders,
+    set_paths,
     sites,
     user_sets,
 )
 from lab.training.dataset import FIRST_SEED
 from lab.training.evaluate import Example
+from packetmesh.errors import InputError
 from packetmesh.files import finite
 from packetmesh.progress import Progress, drain
 from pipeline.depth import DepthNetwork
@@ -338,6 +340,13 @@ def test_a_user_s_sets_are_named_by_a_variable(monkeypatch):
     assert (nyu.group, nyu.cap_m) == ("set nyu", 10.0)
     assert isinstance(nyu.examples, partial)
     assert nyu.examples.args == ("nyu=/b",)
+
+
+@pytest.mark.parametrize("text", ["nyu", "nyu= ", "=/b"])
+def test_a_set_without_kind_or_path_is_refused(monkeypatch, text):
+    monkeypatch.setenv("PACKETMESH_DEPTH_SETS", os.pathsep.join(("kitti=/a", text)))
+    with pytest.raises(InputError, match=f"PACKETMESH_DEPTH_SETS names the set '{text}' without"):
+        set_paths()
 
 
 def test_the_trials_depend_on_the_files_of_the_user_s_sets(tmp_path, monkeypatch):

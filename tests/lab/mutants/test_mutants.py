@@ -59,15 +59,34 @@ def test_a_mutant_knows_its_line(copy):
 
 @pytest.mark.parametrize(
     ("codes", "seen"),
-    [((1,), True), ((0, 1), True), ((0, 0), False), ((None,), True), ((-11, 0), False), ((2, 4), False)],
+    [
+        ((1,), True),
+        ((0, 1), True),
+        ((0, 0), False),
+        ((None,), True),
+        ((2,), True),  # an import fails
+        ((0, 4), True),  # the import of a conftest.py fails
+        ((-11,), True),  # a crash
+        ((0, 139), True),
+        ((5, 0), False),  # all tests of the module are skipped
+    ],
 )
-def test_only_a_failed_test_or_an_exceeded_time_sees_a_fault(copy, monkeypatch, codes, seen):
+def test_a_fault_is_seen_unless_all_tests_pass_in_time(copy, monkeypatch, codes, seen):
     ran = _exits(monkeypatch, *codes)
     (copy / ".numba").mkdir()
     assert testing.sees(copy, _doubles(copy), 1.0) == seen
     assert ran == [["test_half.py"], ["shop"]][: len(codes)]
     assert (copy / "shop/half.py").read_text() == HALF
     assert not (copy / ".numba").exists()
+
+
+@pytest.mark.parametrize("code", [-9, -15])
+def test_killed_tests_are_no_answer(copy, monkeypatch, tmp_path, code):
+    _exits(monkeypatch, 0, 0, code)
+    with pytest.raises(InputError, match=r"half\.py .*Div_Mul.* were killed.* neither seen nor unseen"):
+        answered([copy], [_doubles(copy)], tmp_path / "answers.jsonl")
+    assert (copy / "shop/half.py").read_text() == HALF
+    assert not (tmp_path / "answers.jsonl").exists()
 
 
 def test_no_fault_is_planted_if_a_test_fails_without_one(copy, monkeypatch, tmp_path):

@@ -1,3 +1,4 @@
+import bz2
 import io
 import lzma
 import tarfile
@@ -111,7 +112,7 @@ def write_catalogue(file):
     return file
 
 
-def write_package(file, content):
+def write_package(file, content, compress=lzma.compress):
     """A Debian package with one file in it."""
     tar = io.BytesIO()
     with tarfile.open(fileobj=tar, mode="w") as archive:
@@ -121,7 +122,7 @@ def write_package(file, content):
     members = {
         "debian-binary": b"2.0\n",
         "control.tar.xz": b"abc",
-        "data.tar.xz": lzma.compress(tar.getvalue()),
+        "data.tar": compress(tar.getvalue()),
     }
     with file.open("wb") as stream:
         stream.write(b"!<arch>\n")
@@ -245,6 +246,16 @@ def test_a_package_that_was_cut_off_is_refused_in_one_sentence(tmp_path, share):
     package = write_package(tmp_path / "tiny.deb", content)
     package.write_bytes(package.read_bytes()[: int(share * package.stat().st_size)])
     with pytest.raises(InputError, match=r"tiny\.deb' .*download it again"):
+        Catalogue.open(package, tmp_path / "cache")
+
+
+def test_a_damaged_package_is_refused_in_one_sentence(tmp_path):
+    noise = np.random.default_rng(4).bytes(300_000)
+    package = write_package(tmp_path / "tiny.deb", noise, lambda data: bz2.compress(data, 1))
+    data = bytearray(package.read_bytes())
+    data[200_000:200_100] = bytes(100)
+    package.write_bytes(data)
+    with pytest.raises(InputError, match=r"tiny\.deb' is damaged .*download it again"):
         Catalogue.open(package, tmp_path / "cache")
 
 

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 
 import pytest
 
@@ -40,8 +41,30 @@ def test_a_team_descends_the_mean_gradient(capfd):
     assert "Traceback" not in capfd.readouterr().err
 
 
-@pytest.mark.parametrize(("by", "code"), [(None, 1), (signal.SIGKILL, -9)])
-def test_a_process_that_fails_stops_the_team_and_is_reported(capfd, by, code):
-    with pytest.raises(PacketMeshError, match=rf"exit code {code}\)"):
+def kill_the_waiting(team: Team, pid: torch.Tensor) -> None:
+    """Wait for a step; the leader first kills the process that waits for it."""
+    if team.leads:
+        while not team.barrier.n_waiting:
+            time.sleep(0.01)
+        os.kill(int(pid), signal.SIGTERM)
+    else:
+        pid.fill_(os.getpid())
+    team.barrier.wait()
+
+
+@pytest.mark.parametrize(
+    ("by", "how"),
+    [
+        (None, r"failed \(exit code 1\); its messages are above"),
+        (signal.SIGKILL, r"was killed by SIGKILL$"),
+    ],
+)
+def test_a_process_that_fails_stops_the_team_and_is_reported(capfd, by, how):
+    with pytest.raises(PacketMeshError, match=how):
         run_team(2, 1, fail, by)
     assert ("ValueError: the leader failed" in capfd.readouterr().err) == (by is None)
+
+
+def test_a_process_that_is_killed_while_it_waits_stops_the_team():
+    with pytest.raises(PacketMeshError, match=r"was killed by SIGTERM$"):
+        run_team(2, 1, kill_the_waiting, torch.zeros((), dtype=torch.int64).share_memory_())
