@@ -9,8 +9,9 @@ import numpy as np
 from pipeline.acquisition import acquire
 from pipeline.config import AcquisitionConfig, RegistrationConfig
 from pipeline.delivery import levels
+from pipeline.delivery.coding import areas_of
 from pipeline.delivery.sink import images_of
-from pipeline.delivery.tiled import TILE, areas_of
+from pipeline.delivery.tiled import TILE
 from pipeline.depth.extension import extrapolated
 from pipeline.depth.robust import best_random_line
 from pipeline.kernels.rays import Camera, camera_hits, triangle_scene

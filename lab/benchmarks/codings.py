@@ -19,7 +19,7 @@ from lab.training.dataset import FIRST_SEED
 from lab.training.level_tables import sensed_views
 from packetmesh.memory import peak_memory_bytes
 from pipeline.delivery import levels, rvl, tiled
-from pipeline.delivery.coding import DepthArray
+from pipeline.delivery.coding import DepthArray, areas_of
 from pipeline.delivery.pictures import (
     read_av1,
     read_picture,
@@ -174,7 +174,7 @@ def _at_likeness(coder: ColorCoder, rgb: ByteArray, depth: DepthArray, least: fl
 def _coded(coder: ColorCoder, rgb: ByteArray, quality: int) -> tuple[int, ByteArray, float, float]:
     """Return bytes, decoded image, and seconds of encoding and decoding."""
     image, size, encode_s, decode_s = np.zeros_like(rgb), 0, 0.0, 0.0
-    for area in tiled.areas_of(rgb.shape, coder.side_px or max(rgb.shape)):
+    for area in areas_of(rgb.shape, coder.side_px or max(rgb.shape)):
         piece, spent_s = _timed(partial(coder.write, np.ascontiguousarray(rgb[area]), quality))
         size, encode_s = size + len(piece), encode_s + spent_s
         image[area], spent_s = _timed(partial(coder.read, piece, rgb[area].shape[:2], quality))
@@ -271,13 +271,13 @@ def _cut(
 
 
 def _write_levels(depth: DepthArray) -> list[Packed]:
-    coded = levels.encode(depth, tiled.areas_of(depth.shape, tiled.TILE))
+    coded = levels.encode(depth, areas_of(depth.shape, tiled.TILE))
     return [coded.header, *coded.tiles]
 
 
 def _read_levels(pieces: list[Packed], shape: tuple[int, int]) -> DepthArray:
     listed, depth = levels.read_header(bytes(pieces[0])), np.zeros(shape, np.uint16)
-    for area, piece in zip(tiled.areas_of(shape, tiled.TILE), pieces[1:], strict=True):
+    for area, piece in zip(areas_of(shape, tiled.TILE), pieces[1:], strict=True):
         if piece:
             tile = depth[area].shape
             depth[area] = levels.decode_tile(np.frombuffer(piece, np.uint8), listed, tile).reshape(tile)

@@ -19,10 +19,10 @@ from lab.training.dataset import FIRST_SEED, viewed_room
 from lab.worlds.sensor import sense_depth
 from packetmesh.files import atomic_path
 from pipeline.delivery.arithmetic import BIT, BODY, COUNTS, MEMORY, ONE, WRITE, compiled_with_arrays, writer
-from pipeline.delivery.coding import DepthArray
+from pipeline.delivery.coding import DepthArray, areas_of
 from pipeline.delivery.levels import SHIPPED_TABLES, TABLES, indices_of
 from pipeline.delivery.tile_model import MOST_WORDS_PER_PIXEL, SLOTS, Indices, code_tile
-from pipeline.delivery.tiled import TILE, areas_of
+from pipeline.delivery.tiled import TILE
 from pipeline.io.depth_to_color import register_depth
 from pipeline.kernels.geometry import scaled
 from pipeline.types import ByteArray, DepthMap

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.delivery import levels
-from pipeline.delivery.coding import DepthArray
+from pipeline.delivery.coding import DepthArray, areas_of
 from pipeline.delivery.pictures import read_av1, write_av1
-from pipeline.delivery.tiled import areas_of
 from pipeline.types import ByteArray
 
 DEPTH_BLOCK = 8

@@ -84,3 +84,12 @@ class Coding(Protocol):
             The received images; equal to those sent if the coding is lossless and everything arrived.
         """
         ...
+
+
+def areas_of(shape: tuple[int, ...], side_px: int) -> list[tuple[slice, slice]]:
+    """Return the areas of tiles, row after row; those at the right and lower edge may be smaller."""
+    return [
+        (slice(top, min(top + side_px, shape[0])), slice(left, min(left + side_px, shape[1])))
+        for top in range(0, shape[0], side_px)
+        for left in range(0, shape[1], side_px)
+    ]

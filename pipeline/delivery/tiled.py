@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from packetmesh.errors import InputError
-from pipeline.delivery.coding import Images, Received
+from pipeline.delivery.coding import Images, Received, areas_of
 from pipeline.delivery.protected import protect, unprotect
 from pipeline.types import BoolArray, ByteArray
 
@@ -117,15 +117,6 @@ class Tiled:
                     received.rgb[area] = self.colors.read(tile.tobytes(), received.depth[area].shape)
                     received.rgb_known[area] = True
         return received
-
-
-def areas_of(shape: tuple[int, ...], side_px: int) -> list[tuple[slice, slice]]:
-    """Return the areas of tiles, row after row; those at the right and lower edge may be smaller."""
-    return [
-        (slice(top, min(top + side_px, shape[0])), slice(left, min(left + side_px, shape[1])))
-        for top in range(0, shape[0], side_px)
-        for left in range(0, shape[1], side_px)
-    ]
 
 
 def _order(depth_count: int, color_count: int) -> NDArray[np.int64]:

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from packetmesh.errors import InputError
 from pipeline.delivery import levels, rvl
+from pipeline.delivery.coding import areas_of
 from pipeline.delivery.tile_model import _activity, _at, _context, _mask_slot, _predict
-from pipeline.delivery.tiled import TILE, areas_of
+from pipeline.delivery.tiled import TILE
 from tests.pipeline.delivery.pictures import IMAGES, noise_images, smooth_images
 
 ODD = [

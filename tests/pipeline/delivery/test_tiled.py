@@ -5,8 +5,8 @@ import pytest
 
 from packetmesh.errors import InputError
 from pipeline.delivery import CODINGS, levels, pictures
-from pipeline.delivery.coding import Images
-from pipeline.delivery.tiled import TILE, _sealed, areas_of
+from pipeline.delivery.coding import Images, areas_of
+from pipeline.delivery.tiled import TILE, _sealed
 from pipeline.io.demos import DEMO_SCENES, load_demo
 from tests.pipeline.delivery.losses import bursts
 from tests.pipeline.delivery.pictures import received, smooth_images
