@@ -110,16 +110,17 @@ def test_no_job_of_a_browser_that_left_runs_on(running, tmp_path):
 
 
 def test_a_browser_that_leaves_before_its_session_is_there_leaves_none(running, monkeypatch):
-    gone, begun = threading.Event(), []
+    building, gone, begun = threading.Event(), threading.Event(), []
 
     def late(*arguments):
+        building.set()
         assert gone.wait(LONG_S)
         begun.append(Session(*arguments))
         return begun[0]
 
     monkeypatch.setattr(app.server, "Session", late)
     with contextlib.closing(Connection(running.url)):
-        wait_for(lambda: bool(running.viser_server.get_clients()))
+        wait_for(building.is_set)
     wait_for(lambda: not running.viser_server.get_clients())
     gone.set()
     wait_for(lambda: bool(begun) and begun[0]._closed)

@@ -188,7 +188,7 @@ def test_reset_leaves_the_lesson_and_takes_back_what_its_stop_had_set(tmp_path):
 
 PLAIN = (
     r"3-D|k[12]|802\.11b?|1,500 bytes|only 1\.5 m|1\.25 m|20 µs|0\.02 ms|\b11? Mbit/s|250 kbit/s"
-    r"|0\.1 to the|node_02|16 × 16|16 pixels|√3|\+ 1, 2 and 4|from 0 to 2|within 5 %"
+    r"|0\.1 to the|node_02|32 × 32|32 pixels|√3|\+ 1, 2 and 4|from 0 to 2|within 5 %"
 )
 """Numbers that no scene changes: of formulas, standards and settings."""
 
