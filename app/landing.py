@@ -46,7 +46,7 @@ SCRIPTS = tuple(
         *("dock/dock_view", "dock/dock", "dock/dock_plots"),
         *("session/address", "window/actions", "window/palette", "lesson/lesson", "session/lecture"),
         *("window/frames", "screens/fuse/lanes", "screens/fuse/board", "looking/look", "looking/scale"),
-        *("landing", "web/refused"),
+        *("landing", "web/refused", "drawing/packing", "web/contents"),
     )
 )
 """Scripts in the order in which they run."""

@@ -22,6 +22,7 @@ from app.compute.shared import SharedViews
 from app.compute.state import Spec
 from app.compute.store import Store
 from app.drawing.colors import BRAND
+from app.drawing.packing import pack
 from app.landing import app_page
 from app.lesson.languages import preferred
 from app.lesson.reading import languages
@@ -37,6 +38,7 @@ from app.screens.surface.panel import SurfacePanel
 from app.session.lecture import Lecture
 from app.session.session import Session
 from app.web import viser_private as private
+from app.web.contents import Contents, offer_contents
 from app.web.crowd import MOST_OF_ONE_ADDRESS, MOST_SESSIONS, Crowd, Visitor
 from app.web.door import Door
 from app.web.entrance import Entrance, Token, is_loopback, is_unspecified
@@ -75,6 +77,7 @@ class AppServer:
     viser_server: viser.ViserServer
     pool: ComputePool
     folder: OwnFolder
+    contents: Contents
     sessions: dict[int, Session] = field(default_factory=dict)
     """Sessions by the numbers of their browsers; a lecture has one session, -1."""
     entrance: Entrance = field(default_factory=Entrance)
@@ -122,6 +125,7 @@ class AppServer:
             session.close()
         with contextlib.redirect_stdout(io.StringIO()):
             self.viser_server.stop()
+        self.contents.close()
         self.pool.close()
         self.folder.delete()
 
@@ -170,10 +174,12 @@ def build_server(
     visitor = Token("token") if with_token and not is_loopback(host) else None
     entrance = Entrance(visitor, teacher)
     door = Door()
-    server = _listening(host, port, door, entrance, page, allowed)
+    contents = Contents(pack)
+    server = _listening(host, port, door, entrance, page, allowed, contents)
     gate = Gate(server)
     limit_silent(server)
-    app = AppServer(server, pool, folder, entrance=entrance)
+    offer_contents(server, contents)
+    app = AppServer(server, pool, folder, contents, entrance=entrance)
     if port and server.get_port() != port:
         app.stop()
         raise InputError(_taken_sentence(port))
@@ -220,7 +226,13 @@ def _working_ahead(pool: ComputePool, store: Store, shared: SharedViews) -> Work
 
 
 def _listening(
-    host: str, port: int, door: Door, entrance: Entrance, page: Page, allowed: frozenset[str]
+    host: str,
+    port: int,
+    door: Door,
+    entrance: Entrance,
+    page: Page,
+    allowed: frozenset[str],
+    contents: Contents,
 ) -> viser.ViserServer:
     """Return a server whose requests pass these checks in this order."""
     with contextlib.ExitStack() as outermost_first:
@@ -230,6 +242,7 @@ def _listening(
             only_own_page(allowed),
             entrance.guarded(),
             door.guarded(),
+            contents.served(),
             page.served(),
         ):
             outermost_first.enter_context(answers)

@@ -1,37 +1,44 @@
-"""Meshes and lines as binary glTF that a browser draws quickly, even without a graphics card.
+"""Meshes and lines as binary glTF that a browser gets and draws quickly, even without a graphics card.
 
 All materials are unlit: the light is computed into the vertex colours beforehand. A software renderer would
 spend most of a frame on viser's lighting and its ribbon lines.
+
+Positions are 16-bit steps (``KHR_mesh_quantization``), at most 0.1 mm off; larger extents than 13 m stay
+32-bit floats. Vertices follow a curve and triangles their lowest vertex, so that ``packing.py`` finds small
+differences.
 """
 
 from __future__ import annotations
 
 import json
 import struct
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from app.drawing.ordering import curve_order, reordered
 from pipeline.types import ByteArray, FloatArray, IntArray
 
+STEP_M = 2e-4
+"""Step of the positions; finer for objects whose sides are shorter than ``FEWEST_STEPS`` of them."""
+FEWEST_STEPS, MOST_STEPS = 1 << 14, (1 << 16) - 1
+"""Steps along the longest side of the box."""
+UV_STEPS = 65535
 _TYPES = {"<f4": 5126, "<u2": 5123, "<u4": 5125}
 _LINES, _TRIANGLES = 1, 4
 _CLAMP = 33071
-_UNLIT = "KHR_materials_unlit"
+_UNLIT, _QUANTIZED, _WEBP = "KHR_materials_unlit", "KHR_mesh_quantization", "EXT_texture_webp"
+_VERTICES, _INDICES = 34962, 34963
 
 
 def mesh_glb(vertices_m: FloatArray, triangles: IntArray, colors: ByteArray) -> bytes:
     """Return a glTF of (V, 3) vertices, (F, 3) counterclockwise triangles, (V, 3) sRGB; empty if F is 0."""
     if not len(triangles):
         return b""
-    rgba = np.full((len(colors), 4), 65535, dtype="<u2")  # linear RGB, as glTF requires
-    rgba[:, :3] = _LINEAR[colors]
-    return _glb(
-        _TRIANGLES,
-        {"POSITION": vertices_m.astype("<f4"), "COLOR_0": rgba},
-        (1.0, 1.0, 1.0),
-        triangles.astype("<u2" if len(vertices_m) < 65535 else "<u4").reshape(-1),
-    )
+    order, faces = reordered(vertices_m, triangles)
+    places = Places.of(vertices_m[order])
+    return _glb(_TRIANGLES, places, {"COLOR_0": _light(colors[order])}, indices=_indices(faces, len(order)))
 
 
 def textured_glb(
@@ -44,37 +51,75 @@ def textured_glb(
         triangles: (F, 3) vertex indices, counterclockwise seen from the front.
         colors: (V, 3) sRGB by which the picture is multiplied.
         uv: (V, 2) texture coordinates, 0 to 1, from the picture's upper left corner.
-        picture: a JPEG file.
+        picture: a WebP file.
     """
     if not len(triangles):
         return b""
-    rgba = np.full((len(colors), 4), 65535, dtype="<u2")
-    rgba[:, :3] = _LINEAR[colors]
-    return _glb(
-        _TRIANGLES,
-        {"POSITION": vertices_m.astype("<f4"), "COLOR_0": rgba, "TEXCOORD_0": uv.astype("<f4")},
-        (1.0, 1.0, 1.0),
-        triangles.astype("<u2" if len(vertices_m) < 65535 else "<u4").reshape(-1),
-        picture,
-    )
+    order, faces = reordered(vertices_m, triangles)
+    places = Places.of(vertices_m[order])
+    worn = np.rint(UV_STEPS * np.clip(uv[order], 0.0, 1.0)).astype("<u2")
+    attributes = {"COLOR_0": _light(colors[order]), "TEXCOORD_0": worn}
+    return _glb(_TRIANGLES, places, attributes, indices=_indices(faces, len(order)), picture=picture)
 
 
 def lines_glb(segments_m: FloatArray, color: tuple[int, int, int]) -> bytes:
     """Return a glTF of (E, 2, 3) line segments in an sRGB colour, one pixel wide; empty without segments."""
     if not len(segments_m):
         return b""
-    red, green, blue = (_LINEAR[list(color)] / 65535.0).tolist()
-    return _glb(_LINES, {"POSITION": segments_m.reshape(-1, 3).astype("<f4")}, (red, green, blue))
+    red, green, blue = (LINEAR[list(color)] / 65535.0).tolist()
+    order = curve_order(segments_m[:, 0])
+    return _glb(_LINES, Places.of(segments_m[order].reshape(-1, 3)), {}, (red, green, blue))
+
+
+@dataclass(frozen=True, slots=True)
+class Places:
+    """Positions of vertices as a glTF holds them."""
+
+    steps: np.ndarray
+    """(V, 4) uint16 steps, the last column 0 (glTF aligns vertices to 4 bytes); or (V, 3) float32 metres."""
+    low_m: list[float]
+    step_m: float
+
+    @staticmethod
+    def of(points_m: FloatArray) -> Places:
+        """Return (V, 3) points, V at least 1, in steps from the lower corner of their box."""
+        points_m = points_m.astype(np.float64)
+        low_m = points_m.min(axis=0)
+        side_m = float((points_m.max(axis=0) - low_m).max())
+        step_m = max(min(STEP_M, side_m / FEWEST_STEPS), 1e-9)
+        if not side_m / step_m <= MOST_STEPS:
+            return Places(points_m.astype("<f4"), [0.0, 0.0, 0.0], 1.0)
+        steps = np.zeros((len(points_m), 4), "<u2")
+        steps[:, :3] = np.rint((points_m - low_m) / step_m)
+        return Places(steps, low_m.tolist(), step_m)
+
+    @property
+    def quantized(self) -> bool:
+        """Whether they are integers."""
+        return self.steps.dtype.kind == "u"
+
+
+def _light(colors: ByteArray) -> np.ndarray:
+    """Return (V, 4) uint16 linear RGB and opacity of (V, 3) sRGB, as glTF requires."""
+    rgba = np.full((len(colors), 4), 65535, dtype="<u2")
+    rgba[:, :3] = LINEAR[colors]
+    return rgba
+
+
+def _indices(triangles: IntArray, vertices: int) -> np.ndarray:
+    return triangles.astype("<u2" if vertices < 65535 else "<u4").reshape(-1)
 
 
 def _glb(
     mode: int,
+    places: Places,
     attributes: dict[str, np.ndarray],
-    linear_rgb: tuple[float, float, float],
+    linear_rgb: tuple[float, float, float] = (1.0, 1.0, 1.0),
     indices: np.ndarray | None = None,
     picture: bytes = b"",
 ) -> bytes:
-    """Return a glTF of one primitive with one material, which may have a JPEG texture."""
+    """Return a glTF of one primitive with one material, which may have a WebP texture."""
+    attributes = {"POSITION": places.steps, **attributes}
     arrays = list(attributes.values()) + ([] if indices is None else [indices])
     parts = [array.tobytes() for array in arrays] + ([picture] if picture else [])
     blocks = [part + bytes(-len(part) % 4) for part in parts]
@@ -86,28 +131,43 @@ def _glb(
     }
     if indices is not None:
         primitive["indices"] = len(attributes)
+    node: dict[str, Any] = {"mesh": 0}
+    if places.quantized:
+        node |= {"translation": places.low_m, "scale": [places.step_m] * 3}
+    material: dict[str, Any] = {
+        "pbrMetallicRoughness": {"baseColorFactor": [*linear_rgb, 1.0]},
+        "extensions": {_UNLIT: {}},
+    }
+    views: list[dict[str, Any]] = [
+        {"buffer": 0, "byteOffset": start, "byteLength": len(part)}
+        for start, part in zip(starts, parts, strict=False)
+    ]
+    for row, array in enumerate(arrays):
+        views[row]["target"] = _VERTICES if row < len(attributes) else _INDICES
+        if row < len(attributes):
+            views[row]["byteStride"] = array.strides[0]
     head: dict[str, Any] = {
         "asset": {"version": "2.0"},
         "extensionsUsed": [_UNLIT],
         "scene": 0,
         "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
+        "nodes": [node],
         "meshes": [{"primitives": [primitive]}],
-        "materials": [
-            {"pbrMetallicRoughness": {"baseColorFactor": [*linear_rgb, 1.0]}, "extensions": {_UNLIT: {}}}
-        ],
-        "accessors": [_accessor(row, array) for row, array in enumerate(arrays)],
-        "bufferViews": [
-            {"buffer": 0, "byteOffset": start, "byteLength": len(part)}
-            for start, part in zip(starts, parts, strict=False)
-        ],
+        "materials": [material],
+        "accessors": [_accessor(row, array, row == 0) for row, array in enumerate(arrays)],
+        "bufferViews": views,
         "buffers": [{"byteLength": starts[-1]}],
     }
+    needed = [_QUANTIZED] if places.quantized else []
     if picture:
-        head["images"] = [{"bufferView": len(arrays), "mimeType": "image/jpeg"}]
+        needed.append(_WEBP)
+        head["images"] = [{"bufferView": len(arrays), "mimeType": "image/webp"}]
         head["samplers"] = [{"wrapS": _CLAMP, "wrapT": _CLAMP}]
-        head["textures"] = [{"source": 0, "sampler": 0}]
-        head["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
+        head["textures"] = [{"sampler": 0, "extensions": {_WEBP: {"source": 0}}}]
+        material["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
+    if needed:
+        head["extensionsUsed"] += needed
+        head["extensionsRequired"] = needed
     text = json.dumps(head).encode()
     text += b" " * (-len(text) % 4)
     body = struct.pack("<I4s", len(text), b"JSON") + text
@@ -115,17 +175,19 @@ def _glb(
     return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
 
 
-def _accessor(row: int, array: np.ndarray) -> dict[str, Any]:
+def _accessor(row: int, array: np.ndarray, position: bool) -> dict[str, Any]:
+    columns = 1 if array.ndim == 1 else 3 if position else array.shape[1]
     accessor: dict[str, Any] = {
         "bufferView": row,
         "componentType": _TYPES[array.dtype.str],
         "count": len(array),
+        "type": "SCALAR" if columns == 1 else f"VEC{columns}",
     }
-    accessor["type"] = "SCALAR" if array.ndim == 1 else f"VEC{array.shape[1]}"
-    if array.dtype.str == "<u2" and array.ndim == 2:
+    if position:
+        seen = array[:, :3]
+        accessor["min"], accessor["max"] = seen.min(axis=0).tolist(), seen.max(axis=0).tolist()
+    elif columns > 1:
         accessor["normalized"] = True
-    if array.ndim == 2 and array.shape[1] == 3:
-        accessor["min"], accessor["max"] = array.min(axis=0).tolist(), array.max(axis=0).tolist()
     return accessor
 
 
@@ -136,4 +198,4 @@ def _linear_light() -> np.ndarray:
     return np.rint(65535.0 * linear).astype("<u2")
 
 
-_LINEAR = _linear_light()
+LINEAR = _linear_light()

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import io
+from functools import lru_cache
+
 import numpy as np
+from PIL import Image
 
 from app.compute.records import MeshView
 from app.drawing.colors import LOSS, NEUTRAL
 from app.drawing.glb import lines_glb, mesh_glb, textured_glb
-from pipeline.io.images import jpeg_of
 from pipeline.io.textures import Texture
 from pipeline.types import ByteArray, FloatArray, PointSource, Surface, SurfaceResult
 
 DARKEST = {True: 0.75, False: 0.45}
 """Least brightness, by whether the colours are a camera's: photographs already contain shadows."""
+
+WEBP_QUALITY, WEBP_EFFORT = 85, 2
+"""Quality of photographs, 0 to 100; effort 2 of 6 takes half the time of the usual 4 for 3 % more bytes."""
 
 VIOLET = (0.72, 0.5, 1.0)
 """Factor on a photograph's RGB where the surface was inferred."""
@@ -67,8 +73,23 @@ def photographed_glb(surface: Surface, texture: Texture, tinted: bool = False) -
         colors[guessed] = colors[guessed] * VIOLET
     places_m = surface.vertices_m[corners.vertices]
     return textured_glb(
-        places_m, corners.triangles, colors.astype(np.uint8), corners.uv, jpeg_of(texture.image)
+        places_m, corners.triangles, colors.astype(np.uint8), corners.uv, _picture_of(texture.image)
     )
+
+
+def _picture_of(rgb: ByteArray) -> bytes:
+    """Return (H, W, 3) photographs as a WebP file, which takes three fifths of a JPEG's bytes."""
+    return _encoded(rgb.tobytes(), rgb.shape)
+
+
+@lru_cache(maxsize=2)
+def _encoded(data: bytes, shape: tuple[int, ...]) -> bytes:
+    """Encode an image; the surfaces of a scene have the same one."""
+    stream = io.BytesIO()
+    Image.fromarray(np.frombuffer(data, np.uint8).reshape(shape)).save(
+        stream, "WEBP", quality=WEBP_QUALITY, method=WEBP_EFFORT
+    )
+    return stream.getvalue()
 
 
 def _lit(surface: Surface, colors: ByteArray | None, photographed: bool) -> ByteArray:

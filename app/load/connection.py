@@ -6,6 +6,7 @@ import re
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
 
 import msgspec.msgpack
 import viser
@@ -131,10 +132,13 @@ class Connection:
         size = int.from_bytes(packet[8:16], "little")
         inner = zstandard.ZstdDecompressor().decompress(packet[16 : 16 + size])
         for message in msgspec.msgpack.decode(inner)["messages"]:
-            if message["type"] == "SetCameraPositionMessage":
-                self.positions.append(tuple(message["position"]))
-            if "uuid" in message:
-                self._take_control(message["uuid"], message)
+            self._take_message(message)
+
+    def _take_message(self, message: dict[str, Any]) -> None:
+        if message["type"] == "SetCameraPositionMessage":
+            self.positions.append(tuple(message["position"]))
+        if "uuid" in message:
+            self._take_control(message["uuid"], message)
 
     def _take_control(self, uuid: str, message: dict[str, object]) -> None:
         props = message.get("props")

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.drawing.ordering import reordered
 from pipeline.kernels.open3d_runtime import o3d
 from pipeline.types import ByteArray, FloatArray, IntArray, Surface
 
@@ -27,7 +28,6 @@ STEPS = 65_535
 """Steps of a position along the longest side of the box."""
 FEWEST_TRIANGLES = 500
 """Least number of triangles after thinning, even if there are too few bytes."""
-_MORTON_BITS = 10
 _TRIES = 6
 _LEVEL = 6
 """Compression level of deflate; 9 takes four times as long for 0.7 % fewer bytes."""
@@ -54,10 +54,7 @@ def pack(mesh: Surface, box: Box) -> bytes:
     used, triangles = np.unique(mesh.triangles, return_inverse=True)
     steps = np.rint((mesh.vertices_m[used] - box.low_m) / box.step_m).astype(np.int64).reshape(-1, 3)
     colors = np.zeros((len(used), 3), np.uint8) if mesh.colors is None else mesh.colors[used]
-    order = np.argsort(_morton(steps), kind="stable")
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
-    faces = _lowest_first(place[triangles.reshape(-1, 3)])
+    order, faces = reordered(steps, triangles)
     low = faces[:, :1]
     columns = np.hstack([np.diff(low, axis=0, prepend=0), faces[:, 1:] - low])
     parts = (
@@ -121,23 +118,6 @@ def thinned(mesh: Surface, triangles: int) -> Surface:
     low_m, high_m = mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)
     vertices_m = np.clip(np.asarray(thin.vertices), low_m, high_m)
     return Surface(vertices_m, np.asarray(thin.triangles), colors if len(colors) else None)
-
-
-def _morton(steps: IntArray) -> IntArray:
-    """Return (V,) positions along a Morton curve of (V, 3) points, on which neighbours stay close."""
-    coarse = steps >> (16 - _MORTON_BITS)
-    code = np.zeros(len(steps), np.int64)
-    for bit in range(_MORTON_BITS):
-        for axis in range(3):
-            code |= ((coarse[:, axis] >> bit) & 1) << (3 * bit + axis)
-    return code
-
-
-def _lowest_first(triangles: IntArray) -> IntArray:
-    """Rotate each triangle so that its smallest index comes first (orientation kept), then sort them."""
-    turns = (np.argmin(triangles, axis=1)[:, None] + np.arange(3)) % 3
-    turned = np.take_along_axis(triangles, turns, axis=1)
-    return turned[np.lexsort(turned.T[::-1])]
 
 
 def _decorrelated(rgb: ByteArray) -> ByteArray:

@@ -19,6 +19,15 @@ vec3 srgb(vec3 c) { return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.05
 void main() { color = vec4(srgb(linear(texture(picture, at).rgb) * tint.rgb), 1.0); }`;
 const ARRAYS = {5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array};
 
+// Return positions in metres; steps have a fourth, empty column.
+function inMetres(places, {translation = [0, 0, 0], scale = [1, 1, 1]}) {
+  if (places instanceof Float32Array) return places;
+  return Float32Array.from({length: 3 * places.length / 4}, (_, at) => {
+    const axis = at % 3;
+    return translation[axis] + scale[axis] * places[4 * (at - axis) / 3 + axis];
+  });
+}
+
 // Read the one primitive of a binary glTF as app/drawing/glb.py writes it.
 function readGlb(bytes) {
   const length = new DataView(bytes.buffer).getUint32(12, true), body = 28 + length;
@@ -30,7 +39,7 @@ function readGlb(bytes) {
   const array = row => row === undefined ? null : new ARRAYS[head.accessors[row].componentType](part(row).buffer);
   const {attributes, indices} = head.meshes[0].primitives[0];
   return {
-    places: array(attributes.POSITION),
+    places: inMetres(array(attributes.POSITION), head.nodes[0]),
     colors: array(attributes.COLOR_0),
     uv: array(attributes.TEXCOORD_0),
     triangles: array(indices),
@@ -57,7 +66,7 @@ class Split extends View {
     gl.bindVertexArray(array);
     this.attribute(0, mesh.places, gl.FLOAT, false, 3);
     this.attribute(1, mesh.colors, gl.UNSIGNED_SHORT, true, 4);
-    if (mesh.uv) this.attribute(2, mesh.uv, gl.FLOAT, false, 2);
+    if (mesh.uv) this.attribute(2, mesh.uv, gl.UNSIGNED_SHORT, true, 2);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array(mesh.triangles), gl.STATIC_DRAW);
     gl.bindVertexArray(null);

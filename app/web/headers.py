@@ -11,7 +11,7 @@ nothing from and send nothing to another server. A policy cannot forbid leaving 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Awaitable, Collection, Sequence
 from contextlib import AbstractContextManager
 from functools import partial
 from typing import Any
@@ -41,8 +41,14 @@ def strict_headers(hashes: Sequence[str] = (), allowed: Collection[str] = ()) ->
 
 
 def _with_headers(hashes: str, others: str, answer: Answer) -> Answer:
+    async def later(awaited: Awaitable[Any], request: Any) -> Any:
+        return dressed(await awaited, request)
+
     def answered(connection: Any, request: Any) -> Any:
         response = answer(connection, request)
+        return later(response, request) if isinstance(response, Awaitable) else dressed(response, request)
+
+    def dressed(response: Any, request: Any) -> Any:
         if response is not None:
             host = request.headers.get("Host", "")
             plain = bool(host) and all(letter.isalnum() or letter in ".-:[]_" for letter in host)

@@ -20,8 +20,8 @@ _ACTIVE = re.compile(
     r"|([\\`*\[\]~|]|(?<![^\W_])_|_(?![^\W_]))"
 )
 """Characters that markdown takes for emphasis, code, links, tables and escapes."""
-_LEADING = re.compile(r"^(\d*)([#+\-=.)])(?=[\s#+\-=]|$)")
-"""Characters that make a heading, a rule or a list at the beginning of a line."""
+_LEADING = re.compile(r"^(\s*\d*)([#+\-=.)])(?=[\s#+\-=]|$)")
+"""Characters that make a heading, a rule or a list at the beginning of a line, also behind spaces."""
 _NOTHING = re.compile(r"(?!)")
 
 

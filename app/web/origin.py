@@ -31,7 +31,8 @@ from websockets.asyncio import server as websockets_server
 from app.web.names import OPTION, host_name
 
 Answer: TypeAlias = Callable[[Any, Any], Any]
-"""Takes a connection and its request. Returns a response, or None to continue to the websocket."""
+"""Takes a connection and its request. Returns a response or an awaitable of one, or None to continue to the
+websocket."""
 ONCE = ("Host", "Origin", "Upgrade", "Cookie", "Accept-Encoding")
 """Headers that a request may have only once."""
 NOT_WELL_FORMED = "This is not a request that PacketMesh understands.\n"

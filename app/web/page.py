@@ -26,6 +26,7 @@ import zstandard
 from websockets.datastructures import Headers
 from websockets.http11 import Response
 
+from app.web.contents import page_cookie
 from app.web.markup import Markup, plain_text
 from app.web.origin import Answer, answering
 from packetmesh.errors import InputError
@@ -54,8 +55,8 @@ class File:
         """The content, compressed with gzip."""
         return gzip.compress(self.content)
 
-    def response(self, accepted: str) -> Response:
-        """Return the response to a browser that accepts these encodings."""
+    def response(self, accepted: str, cookies: str) -> Response:
+        """Return the response to a browser that accepts these encodings and sends these cookies."""
         packed = "gzip" in accepted
         body = self.packed if packed else self.content
         headers = Headers()
@@ -64,6 +65,9 @@ class File:
         headers["Content-Encoding"] = "gzip" if packed else "identity"
         headers["Vary"] = "Accept-Encoding"
         headers["Cache-Control"] = "public, max-age=31536000, immutable" if self.kept else "no-cache"
+        cookie = "" if self.kept else page_cookie(cookies)
+        if cookie:
+            headers["Set-Cookie"] = cookie
         return Response(http.HTTPStatus.OK, "OK", headers, body)
 
 
@@ -114,7 +118,8 @@ class Page:
             found = self._greetings.get(path) or self._files.get(path.partition("?")[0])
             if found is None or "Upgrade" in request.headers:
                 return answer(connection, request)
-            return found.response(request.headers.get("Accept-Encoding", ""))
+            sent = request.headers
+            return found.response(sent.get("Accept-Encoding", ""), sent.get("Cookie", ""))
 
         return answered
 

@@ -9,6 +9,7 @@ half built.
 is a seventh of the time in which a session's panels are built.
 - ``call_in_order``: viser handles a browser's messages on any of 32 threads, so that on busy cores a click on
 *Reset* can be handled before the choice that it should undo.
+- ``replace_data``: viser sends the bytes and arrays of a message inside it, encoded anew for each browser.
 - ``listen``: viser gives every message of a browser to its handlers and has no hook before them.
 - ``on_opened``, ``on_closed``: viser reports a browser with its first view only, and not the end of a
 connection that sent none.
@@ -25,11 +26,14 @@ import asyncio
 import functools
 from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import ContextVar
 from typing import Any, TypeAlias, get_type_hints
 
+import numpy as np
 import viser
 from viser import _messages as messages
 from viser._assignable_props_api import AssignablePropsBase
+from viser.infra import _messages as infra_messages
 
 Listener: TypeAlias = Callable[[int, Any, Callable[[], Awaitable[None]]], Awaitable[None]]
 """Takes the browser's number, its message, and a function that lets viser handle the message."""
@@ -71,6 +75,33 @@ def remember_hints() -> None:
     hints_of = functools.cache(get_type_hints)
     hints = property(lambda handle: hints_of(type(handle._impl.props)))  # type: ignore[arg-type]
     setattr(AssignablePropsBase, "_prop_hints", hints)  # noqa: B010
+
+
+def replace_data(server: viser.ViserServer, replacement: Callable[[int, Any], object | None]) -> None:
+    """Send what ``replacement(number, data)`` returns in place of bytes and arrays in messages to a browser.
+
+    None leaves the data as they are. Viser starts a browser's senders after its callbacks for connections,
+    in the same context, so that they know the browser.
+    """
+    server._websock_server.on_client_connect(
+        lambda connection: _replacement.set(functools.partial(replacement, connection.client_id))
+    )
+    if infra_messages._prepare_for_serialization is not _prepared:
+        setattr(infra_messages, "_prepare_for_serialization", _prepared)  # noqa: B010
+
+
+_replacement = ContextVar[Callable[[Any], object | None] | None]("replacement", default=None)
+_prepare = infra_messages._prepare_for_serialization
+
+
+def _prepared(value: Any, annotation: object, binary_buffers: list[memoryview] | None = None) -> Any:
+    """Prepare a value of a message for sending, as viser does, with its data replaced."""
+    replace = _replacement.get()
+    if replace is not None and binary_buffers is not None and isinstance(value, bytes | np.ndarray):
+        replaced = replace(value)
+        if replaced is not None:
+            return replaced
+    return _prepare(value, annotation, binary_buffers)
 
 
 def _on_loop() -> bool:

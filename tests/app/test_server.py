@@ -50,7 +50,7 @@ def test_an_address_that_cannot_be_used_is_one_sentence(host, port, sentence):
 def test_links_name_an_address_that_a_browser_can_open(monkeypatch, host, here, elsewhere):
     monkeypatch.setattr("app.server.own_address", lambda family: f"own {family.name}")
     listening = SimpleNamespace(get_host=lambda: host, get_port=lambda: 8080)
-    app = AppServer(listening, None, None, crowd=None)
+    app = AppServer(listening, None, None, None, crowd=None)
     assert (app.link, app.class_link) == (f"http://{here}:8080", f"http://{elsewhere}:8080")
 
 

@@ -7,6 +7,7 @@ import viser
 
 from app.drawing.clouds import clear, shorten
 from app.drawing.colors import BACKGROUND, BRAND, DELIVERED, LOSS, NEUTRAL, SOURCE
+from app.drawing.packing import rounded
 from app.drawing.poses import place
 from app.screens.network.delivery_view import DeliveryView, MomentView, PacketView
 from app.screens.network.draw import MOST_PACKETS, ON_THE_WAY, Flights
@@ -239,7 +240,7 @@ class DeliveryDrawing:
         self._made += 1
         handle = self._scene.add_point_cloud(
             f"{self._below}/cloud-{self._view.nodes[row].name}-{self._made}",
-            now.points_m,  # type: ignore[attr-defined]
+            rounded(now.points_m),  # type: ignore[attr-defined]
             now.colors,  # type: ignore[attr-defined]
             point_size=POINT_M,
             point_shape="rounded",

@@ -35,6 +35,8 @@ its points and its pose as tracking found it. Holes are pixels that the sensor c
 **Fuse** to see the walk."""
 )
 TITLES = {name: scene.title for name, scene in DEMOS.items()}
+QUALITY = 85
+"""JPEG quality of the depth picture."""
 EMPTY = np.full((480, 640, 3), 235, np.uint8)
 
 
@@ -79,7 +81,7 @@ class ScenePanel(Panel):
         self.ui.when_clicked(self.drawn_below, self._clicked)
         self._notes = gui.add_markdown(Markdown(""))
         self._color = gui.add_image(EMPTY, label="Colour image")
-        self._depth = gui.add_image(EMPTY, label="Sensor depth", format="png")
+        self._depth = gui.add_image(EMPTY, label="Sensor depth", format="jpeg", jpeg_quality=QUALITY)
         self._numbers = gui.add_html(Markup(""))
 
     def on_spec(self, spec: Spec) -> None:

@@ -3,13 +3,16 @@
 import io
 
 import numpy as np
+import pytest
 import trimesh
 
 from app.drawing.glb import lines_glb, mesh_glb
 from app.drawing.meshes import DARKEST, mesh_view, rim_segments_m, surface_glb, vertex_normals
+from app.drawing.ordering import curve_order
 from pipeline.types import SurfaceQuality, SurfaceResult
 from tests.app.gltf import arrays, srgb
 
+SPHERE = trimesh.creation.icosphere()
 QUALITY = SurfaceQuality(0.0, 0, 0.0, 0.0, 0, 0, 0.0, 0)
 
 
@@ -38,10 +41,35 @@ def test_the_mesh_survives_the_way_to_the_browser():
     glb = mesh_glb(np.asarray(sphere.vertices), np.asarray(sphere.faces), colors)
     mode, read = arrays(glb)
     assert mode == 4
-    assert np.allclose(read["POSITION"], sphere.vertices, atol=1e-6)
-    assert np.array_equal(read["indices"], sphere.faces)
-    assert np.array_equal(np.rint(255 * srgb(read["COLOR_0"][:, :3])), colors)
-    assert len(trimesh.load(io.BytesIO(glb), file_type="glb", force="mesh").faces) == len(sphere.faces)
+    order = curve_order(np.asarray(sphere.vertices))
+    assert np.abs(read["POSITION"] - sphere.vertices[order]).max() < 1e-4
+    assert np.array_equal(np.rint(255 * srgb(read["COLOR_0"][:, :3])), colors[order])
+    assert_same_triangles(order[read["indices"]], sphere.faces)
+    others = trimesh.load(io.BytesIO(glb), file_type="glb", force="mesh", process=False)
+    assert_same_triangles(order[others.faces], sphere.faces)
+    assert np.abs(others.vertices - sphere.vertices[order]).max() < 1e-4
+
+
+@pytest.mark.parametrize(("scale", "off_m"), [(0.01, 1e-6), (1.0, 1e-4), (6.5, 1e-4), (7.0, 1e-6)])
+def test_a_vertex_is_at_most_a_tenth_of_a_millimetre_off(scale, off_m):
+    vertices = scale * np.asarray(SPHERE.vertices) + 40.0
+    read = arrays(mesh_glb(vertices, np.asarray(SPHERE.faces), np.zeros((len(vertices), 3), np.uint8)))[1]
+    floats_m = 40.0 * 2.0**-22
+    assert np.abs(read["POSITION"] - vertices[curve_order(vertices)]).max() <= 1.001 * off_m + floats_m
+
+
+def test_equal_vertices_are_one_place():
+    three = np.full((3, 3), 0.7)
+    read = arrays(mesh_glb(three, np.array([[0, 1, 2]]), np.zeros((3, 3), np.uint8)))[1]
+    assert np.allclose(read["POSITION"], 0.7, atol=1e-12)
+
+
+def assert_same_triangles(one, other):
+    turned = [
+        sorted(min(row[turn:] + row[:turn] for turn in range(3)) for row in np.asarray(triangles).tolist())
+        for triangles in (one, other)
+    ]
+    assert turned[0] == turned[1]
 
 
 def test_light_comes_from_above_and_darkens_no_photograph_by_much():
@@ -64,7 +92,8 @@ def test_lines_survive_the_way_to_the_browser():
     segments_m = np.random.default_rng(0).uniform(-1, 1, (7, 2, 3)).astype(np.float32)
     mode, read = arrays(lines_glb(segments_m, (213, 40, 30)))
     assert mode == 1
-    assert np.array_equal(read["POSITION"].reshape(-1, 2, 3), segments_m)
+    order = curve_order(segments_m[:, 0])
+    assert np.abs(read["POSITION"].reshape(-1, 2, 3) - segments_m[order]).max() <= 1e-4
 
 
 def test_a_surface_without_triangles_is_empty():

@@ -45,6 +45,8 @@ def squeezed(text):
 @example("1. one")
 @example("- two\n\n# three\n> four")
 @example("a | b\n- | -\n1 | 2")
+@example(" #")
+@example("  12. a")
 @example("&lt;b&gt; &#42; \\* <b onclick=x>")
 def test_text_in_markdown_is_a_paragraph_of_that_text(text):
     read = Read(RENDER(plain_text(Markdown("{}").format(text))))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from app.compute.state import Spec
 from app.screens.surface.baselines_job import baseline_job
@@ -48,8 +49,8 @@ def test_the_notes_are_one_sentence_with_the_parameters(views, clouds):
 
 def test_vertices_of_the_alpha_shape_are_points_of_the_fused_cloud(views, clouds):
     _, drawn = arrays(views["alpha"].mesh.glb)
-    known = {tuple(point) for point in clouds.fused.points_m.astype(np.float32)}
-    assert {tuple(vertex) for vertex in drawn["POSITION"]} <= known
+    off_m = cKDTree(clouds.fused.points_m).query(drawn["POSITION"])[0]
+    assert off_m.max() <= np.sqrt(3.0) * 1e-4  # as far as the browser's mesh rounds
 
 
 def test_they_are_remembered_and_only_the_alpha_shape_depends_on_the_ball(store, views):

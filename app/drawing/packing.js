@@ -1,0 +1,113 @@
+// Unpacks what packing.py packs; its text describes the parts.
+window.packetmeshUnpack = (() => {
+  const SHADES = Uint16Array.from({length: 256}, (_, shade) => {
+    const srgb = shade / 255;
+    return Math.round(65535 * (srgb <= 0.04045 ? srgb / 12.92 : ((srgb + 0.055) / 1.055) ** 2.4));
+  });
+  const OPAQUE = 65535;
+
+  // Undo planes and zig-zag: return a function that gives the next column's `rows` differences.
+  function columnsOf(bytes, rows, size) {
+    let at = 0;
+    return () => {
+      const column = new Int32Array(rows);
+      for (let plane = 0; plane < size; plane++, at += rows)
+        for (let row = 0; row < rows; row++) column[row] |= bytes[at + row] << 8 * plane;
+      for (let row = 0; row < rows; row++) column[row] = (column[row] >>> 1) ^ -(column[row] & 1);
+      return column;
+    };
+  }
+
+  function summed(column) {
+    for (let row = 1; row < column.length; row++) column[row] += column[row - 1];
+    return column;
+  }
+
+  // (rows, 3) RGB of three planes of differences.
+  function rgbOf(bytes, rows) {
+    const rgb = new Uint8Array(3 * rows);
+    let [green, red, blue] = [0, 0, 0];
+    for (let row = 0; row < rows; row++) {
+      green += bytes[row];
+      red += bytes[rows + row];
+      blue += bytes[2 * rows + row];
+      rgb.set([red + green, green, blue + green], 3 * row);
+    }
+    return rgb;
+  }
+
+  function put(view, at, size, value) {
+    if (size === 1) view.setUint8(at, value);
+    else if (size === 2) view.setUint16(at, value, true);
+    else view.setUint32(at, value, true);
+  }
+
+  // For each kind of part: its packed bytes, its unpacked bytes, and how to unpack it at a place of a DataView.
+  const KINDS = {
+    raw: count => ({
+      packed: count,
+      unpacked: count,
+      write: (bytes, view, at) => new Uint8Array(view.buffer, at, count).set(bytes),
+    }),
+    rows: (rows, columns, size, stride) => ({
+      packed: rows * columns * size,
+      unpacked: rows * stride,
+      write(bytes, view, at) {
+        const next = columnsOf(bytes, rows, size);
+        for (let column = 0; column < columns; column++)
+          summed(next()).forEach((value, row) => put(view, at + row * stride + column * size, size, value));
+      },
+    }),
+    grid: (rows, columns, bits) => ({
+      packed: 4 * rows * columns,
+      unpacked: 4 * rows * columns,
+      write(bytes, view, at) {
+        const next = columnsOf(bytes, rows, 4);
+        for (let column = 0; column < columns; column++)
+          summed(next()).forEach((value, row) => view.setFloat32(at + 4 * (row * columns + column), value / 2 ** bits, true));
+      },
+    }),
+    triangles: (rows, size) => ({
+      packed: 3 * rows * size,
+      unpacked: 3 * rows * size,
+      write(bytes, view, at) {
+        const next = columnsOf(bytes, rows, size), first = summed(next());
+        first.forEach((value, row) => put(view, at + 3 * row * size, size, value));
+        for (const column of [1, 2])
+          next().forEach((value, row) => put(view, at + (3 * row + column) * size, size, first[row] + value));
+      },
+    }),
+    colors: rows => ({
+      packed: 3 * rows,
+      unpacked: 3 * rows,
+      write: (bytes, view, at) => new Uint8Array(view.buffer, at, 3 * rows).set(rgbOf(bytes, rows)),
+    }),
+    light: rows => ({
+      packed: 3 * rows,
+      unpacked: 8 * rows,
+      write(bytes, view, at) {
+        const rgb = rgbOf(bytes, rows);
+        for (let row = 0; row < rows; row++) {
+          for (let column = 0; column < 3; column++)
+            view.setUint16(at + 8 * row + 2 * column, SHADES[rgb[3 * row + column]], true);
+          view.setUint16(at + 8 * row + 6, OPAQUE, true);
+        }
+      },
+    }),
+  };
+
+  // Return the unpacked content of a Uint8Array as a Uint8Array of its own.
+  return packed => {
+    const length = new DataView(packed.buffer, packed.byteOffset).getUint32(0, true);
+    const parts = JSON.parse(new TextDecoder().decode(packed.subarray(4, 4 + length)))
+      .map(([kind, ...numbers]) => KINDS[kind](...numbers));
+    const view = new DataView(new ArrayBuffer(parts.reduce((sum, part) => sum + part.unpacked, 0)));
+    let from = 4 + length, to = 0;
+    for (const part of parts) {
+      part.write(packed.subarray(from, from + part.packed), view, to);
+      from += part.packed;
+      to += part.unpacked;
+    }
+    return new Uint8Array(view.buffer);
+  };
+})();

@@ -1,0 +1,192 @@
+// Fetches the contents that messages name (contents.py) and puts them into the messages before viser gets these.
+//
+// Messages stay in order: those after a content wait for it. A scene node or control whose content nobody would
+// see, because it is hidden or lies in something hidden, is held back with all its messages until it is shown. When
+// the line is idle, held contents are fetched ahead.
+(() => {
+  const FOLDER = "contents/";
+  const TRIES = 4;
+  const PAUSE_MS = 1000; // before a fetch is tried again
+  const IDLE_MS = 2500; // time without new contents after which held ones are fetched ahead
+  const ASIDE_MS = 8000; // longest time for which the first screen waits until the address's screen is shown
+  const SHOWN_MS = 20000;
+  const LOST = "A part of the picture did not arrive: reload the page.";
+  const ARRAYS = {
+    "": Uint8Array, "|u1": Uint8Array, "|i1": Int8Array, "<u2": Uint16Array, "<i2": Int16Array, "<f2": Uint16Array,
+    "<u4": Uint32Array, "<i4": Int32Array, "<f4": Float32Array, "<f8": Float64Array,
+  };
+  const FIRST = "/scene"; // the node of the screen that a session shows before it has read the page's address
+  const VISIBILITY = "SetSceneNodeVisibilityMessage";
+  const REMOVALS = ["RemoveSceneNodeMessage", "GuiRemoveMessage"];
+  const UPDATES = ["SceneNodeUpdateMessage", "GuiUpdateMessage"];
+
+  const hidden = new Set(); // nodes and controls that are not shown themselves
+  const containers = new Map(); // for each control the one that holds it
+  const held = new Map(); // for each held node or control its messages
+  const loading = new Map(); // for each name of a content the promise of its bytes
+  let aside = false; // whether the address names another screen than the first, which is not shown yet
+  let deliver = () => {}; // gives viser's page an event
+  let chain = Promise.resolve(); // the deliveries that wait for contents
+  let waiting = 0; // their number
+  let connection = 0; // number of the connection whose messages are valid
+  let idle = 0; // timer of the fetches ahead
+
+  const isContent = value => value !== null && typeof value === "object" && typeof value.packetmesh === "string";
+
+  // Yield each content in a message, with its place.
+  function* contentsOf(value) {
+    if (value === null || typeof value !== "object" || ArrayBuffer.isView(value)) return;
+    for (const [key, one] of Object.entries(value))
+      if (isContent(one)) yield [value, key, one];
+      else yield* contentsOf(one);
+  }
+
+  async function fetched(name, ahead) {
+    for (let tried = 1; ; tried++) {
+      try {
+        const answer = await fetch(new URL(FOLDER + name, document.baseURI), {priority: ahead ? "low" : "high"});
+        if (answer.ok) return packetmeshUnpack(new Uint8Array(await answer.arrayBuffer()));
+        if (answer.status < 500) throw new RangeError(LOST);
+      } catch (error) {
+        if (error instanceof RangeError || tried === TRIES) throw error;
+      }
+      await new Promise(done => setTimeout(done, tried * PAUSE_MS));
+    }
+  }
+
+  function load(name, ahead = false) {
+    if (!loading.has(name)) loading.set(name, fetched(name, ahead));
+    return loading.get(name);
+  }
+
+  // Put the contents into a message; false if one did not arrive.
+  async function filled(message) {
+    try {
+      for (const [owner, key, {packetmesh: name, dtype}] of [...contentsOf(message)]) {
+        const bytes = await load(name);
+        owner[key] = new ARRAYS[dtype](bytes.slice().buffer);
+      }
+      return true;
+    } catch {
+      packetmesh.notice(LOST, SHOWN_MS);
+      return false;
+    }
+  }
+
+  // What a message is about: a scene node's name or a control's uuid; undefined for others.
+  const subject = ({type, name, uuid}) => name?.startsWith?.("/") ? name : type.startsWith("Gui") ? uuid : undefined;
+
+  function isHidden(one) {
+    if (aside) return true;
+    if (one.startsWith("/")) return [...hidden].some(above => one === above || one.startsWith(`${above}/`));
+    for (let within = one; within !== undefined; within = containers.get(within)) if (hidden.has(within)) return true;
+    return false;
+  }
+
+  function note(message) {
+    const one = subject(message);
+    if (one === undefined) return;
+    const {type, props, updates} = message;
+    const visible = type === VISIBILITY ? message.visible : (props ?? updates)?.visible;
+    if (props && message.container_uuid) containers.set(one, message.container_uuid);
+    if (visible === false) hidden.add(one);
+    else if (visible === true || props || REMOVALS.includes(type)) hidden.delete(one);
+    if (type === VISIBILITY && visible && one.lastIndexOf("/") === 0 && one !== FIRST) aside = false;
+  }
+
+  // Add a message to those of its held subject. What it replaces is not fetched.
+  function hold(messages, message) {
+    const [first] = messages;
+    if (UPDATES.includes(message.type)) Object.assign(first.props ?? first.updates, message.updates);
+    else messages.push(message);
+  }
+
+  // Split the messages of a batch: return those for viser now, and keep those of held subjects.
+  function sorted(batch) {
+    batch.forEach(note);
+    const passed = released();
+    for (const message of batch) {
+      const {type} = message, one = subject(message), named = !contentsOf(message).next().done;
+      const known = held.get(one);
+      if (one === undefined) passed.push(message);
+      else if (REMOVALS.includes(type) || message.props) {
+        held.delete(one);
+        if (message.props && named && isHidden(one)) held.set(one, [message]);
+        else if (message.props || !known?.[0].props) passed.push(message); // viser knows nothing of a held new one
+      } else if (known) hold(known, message);
+      else if (named && isHidden(one)) held.set(one, [message]);
+      else passed.push(message);
+    }
+    return passed;
+  }
+
+  // Return the messages of subjects that are hidden no more.
+  function released() {
+    const passed = [];
+    for (const [one, messages] of held)
+      if (!isHidden(one)) {
+        passed.push(...messages);
+        held.delete(one);
+      }
+    return passed;
+  }
+
+  // Fetch the next held content, and forget those that are no longer needed.
+  function fetchAhead() {
+    if (waiting > 0) return;
+    const needed = new Set([...held.values()].flatMap(found => found.flatMap(message => [...contentsOf(message)]))
+      .map(([, , {packetmesh: name}]) => name));
+    for (const name of loading.keys()) if (!needed.has(name)) loading.delete(name);
+    for (const name of needed)
+      if (!loading.has(name)) return void load(name, true).catch(() => loading.delete(name)).then(fetchAhead);
+  }
+
+  // Give viser messages once their contents are there.
+  function pass(messages) {
+    const mine = connection;
+    const named = messages.map(message => [...contentsOf(message)]);
+    const send = found => found.length && deliver({data: {type: "message_batch", messages: found}});
+    if (waiting === 0 && !named.flat().length) return send(messages);
+    for (const [, , {packetmesh: name}] of named.flat()) load(name).catch(() => {});
+    waiting += 1;
+    chain = chain.then(async () => {
+      const came = await Promise.all(messages.map((message, row) => named[row].length ? filled(message) : true));
+      waiting -= 1;
+      if (mine !== connection) return;
+      for (const [, , {packetmesh: name}] of named.flat()) loading.delete(name);
+      send(messages.filter((_, row) => came[row]));
+      clearTimeout(idle);
+      idle = setTimeout(fetchAhead, IDLE_MS);
+    });
+  }
+
+  function reset() {
+    connection += 1;
+    for (const all of [hidden, containers, held, loading]) all.clear();
+    const screen = new URLSearchParams(location.search).get("screen");
+    aside = screen !== null && `/${screen}` !== FIRST;
+    setTimeout(() => {
+      aside = false;
+      pass(released());
+    }, ASIDE_MS);
+  }
+
+  // viser's page makes a worker that opens the websocket, and listens to what it posts.
+  window.Worker = class extends Worker {
+    set onmessage(listener) {
+      super.onmessage = listener && (event => {
+        if (event.data?.type === "message_batch") {
+          deliver = listener;
+          pass(sorted(event.data.messages));
+          return;
+        }
+        if (event.data?.type === "connected") reset();
+        listener(event);
+      });
+    }
+
+    get onmessage() {
+      return super.onmessage;
+    }
+  };
+})();

@@ -1,0 +1,198 @@
+"""What a page draws, fetched over HTTP by the name of its content.
+
+Viser sends each mesh, cloud and picture over each browser's websocket, encoded anew for each. Here a message
+carries the content's name, and the page fetches the content (``contents.js``): it is packed once for all
+browsers, the browser's cache keeps it, and what is hidden is fetched when it is shown.
+
+A name is a digest of the content. A browser gets only contents that were offered to one of its own pages,
+which it proves with a cookie of the page. A page without the cookie gets the contents in the messages.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import gzip
+import hashlib
+import http
+import re
+import secrets
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import AbstractContextManager
+from http.cookies import CookieError, SimpleCookie
+from typing import Any, TypeAlias
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+from websockets.datastructures import Headers
+from websockets.http11 import Response
+
+from app.web import viser_private as private
+from app.web.origin import Answer, answering
+
+Data: TypeAlias = bytes | NDArray[Any]
+"""A file, or an array of rows."""
+COOKIE = "packetmesh_page"
+FOLDER = "/contents/"
+"""Path below which the contents are."""
+GONE = "This content is no longer there, or belongs to another browser: reload the page.\n"
+FEWEST_BYTES = 32_000
+"""Size from which a content is fetched rather than sent in its message; steps of animations are smaller."""
+MOST_BYTES = 64 << 20
+"""Limit of the contents that one browser may fetch; its oldest are forgotten first."""
+REMEMBERED = 64
+"""Number of contents whose names are known without computing them again."""
+_FORMAT = b"1"
+"""Part of each name; another one makes browsers forget contents that were packed differently."""
+_NAME = re.compile(r"[0-9a-f]{32}")
+_NUMBER = re.compile(r"[A-Za-z0-9_-]{22}")
+
+
+class Content:
+    """A content that browsers may fetch, packed when the first one does."""
+
+    def __init__(self, data: Data, size: int) -> None:
+        self.data, self.size = data, size
+        self._packed: Future[bytes] | None = None
+
+    def packed(self, packer: ThreadPoolExecutor, pack: Callable[[Data], bytes]) -> Future[bytes]:
+        """Return the compressed content, which is being made; to be called on the connections' thread."""
+        if self._packed is None:
+            self._packed = packer.submit(lambda: gzip.compress(pack(self.data), 6, mtime=0))
+        return self._packed
+
+
+class Contents:
+    """The contents that a server offers to its browsers."""
+
+    def __init__(self, pack: Callable[[Data], bytes]) -> None:
+        """``pack`` writes a content as the page's script unpacks it."""
+        self._pack = pack
+        self._packer = ThreadPoolExecutor(1, thread_name_prefix="contents")
+        self._lock = threading.Lock()
+        self._known: dict[str, Content] = {}
+        self._offered: dict[str, OrderedDict[str, Content]] = {}
+        """Contents by name of each browser, by the number in its cookie; the oldest first."""
+        self._pages: dict[int, str] = {}
+        """Number in the cookie of each page, by the number of its connection."""
+        self._names: OrderedDict[int, tuple[bytes, str]] = OrderedDict()
+
+    def close(self) -> None:
+        """Stop packing."""
+        self._packer.shutdown(wait=False, cancel_futures=True)
+
+    def opened(self, page: int, cookies: str) -> None:
+        """Note a page that has opened its websocket with these cookies."""
+        browser = _browser_in(cookies)
+        if browser is not None:
+            with self._lock:
+                self._pages[page] = browser
+                self._offered.setdefault(browser, OrderedDict())
+
+    def closed(self, page: int) -> None:
+        """Forget a page, and with a browser's last page its contents."""
+        with self._lock:
+            browser = self._pages.pop(page, None)
+            if browser is not None and browser not in self._pages.values():
+                for name in self._offered.pop(browser):
+                    self._forget(name)
+
+    def offer(self, page: int, data: Data) -> dict[str, object] | None:
+        """Return what a message to this page has in place of the data; None if it has the data itself."""
+        size = len(data) if isinstance(data, bytes) else data.nbytes
+        browser = self._pages.get(page)
+        if browser is None or size < FEWEST_BYTES:
+            return None
+        name = self._name_of(data)
+        with self._lock:
+            offered = self._offered.get(browser)
+            if offered is None:
+                return None
+            offered[name] = self._known.setdefault(name, Content(data, size))
+            offered.move_to_end(name)
+            total = sum(one.size for one in offered.values())
+            while total > MOST_BYTES and len(offered) > 1:
+                oldest, content = offered.popitem(last=False)
+                total -= content.size
+                self._forget(oldest)
+        kind = "" if isinstance(data, bytes) else data.dtype.str
+        return {"packetmesh": name, "dtype": kind, "bytes": size}
+
+    def served(self) -> AbstractContextManager[None]:
+        """Return a context. A server started in it sends the contents."""
+        return answering(self._answering)
+
+    def _name_of(self, data: Data) -> str:
+        with self._lock:
+            known = self._names.get(id(data))
+            if known is not None and known[0] is data:
+                return known[1]
+        kind = b"" if isinstance(data, bytes) else repr((data.dtype.str, data.shape)).encode()
+        digest = hashlib.blake2b(_FORMAT + kind, digest_size=16)
+        digest.update(data if isinstance(data, bytes) else np.ascontiguousarray(data).data.cast("B"))
+        name = digest.hexdigest()
+        if isinstance(data, bytes):  # nobody can change it
+            with self._lock:
+                self._names[id(data)] = data, name
+                while len(self._names) > REMEMBERED:
+                    self._names.popitem(last=False)
+        return name
+
+    def _forget(self, name: str) -> None:
+        """Forget a content that no browser may fetch any more."""
+        if any(name in offered for offered in self._offered.values()):
+            return
+        self._known.pop(name, None)
+        for key in [key for key, (_, known) in self._names.items() if known == name]:
+            del self._names[key]
+
+    def _answering(self, answer: Answer) -> Answer:
+        def answered(connection: Any, request: Any) -> Any:
+            path = request.path.partition("?")[0]
+            if not path.startswith(FOLDER) or "Upgrade" in request.headers:
+                return answer(connection, request)
+            browser, name = _browser_in(request.headers.get("Cookie", "")), path.removeprefix(FOLDER)
+            content = self._offered.get(browser or "", {}).get(name) if _NAME.fullmatch(name) else None
+            if content is None:
+                return connection.respond(http.HTTPStatus.NOT_FOUND, GONE)
+            return self._send(content)
+
+        return answered
+
+    async def _send(self, content: Content) -> Response:
+        body = await asyncio.wrap_future(content.packed(self._packer, self._pack))
+        headers = Headers()
+        headers["Content-Type"] = "application/octet-stream"
+        headers["Content-Encoding"] = "gzip"
+        headers["Content-Length"] = str(len(body))
+        headers["Cache-Control"] = "private, max-age=31536000, immutable"
+        return Response(http.HTTPStatus.OK, "OK", headers, body)
+
+
+def offer_contents(server: viser.ViserServer, contents: Contents) -> None:
+    """Send each page names in place of large contents, from its first message on."""
+    private.on_opened(server, lambda page: contents.opened(page, private.cookies(server, page)))
+    private.on_closed(server, contents.closed)
+    private.replace_data(server, contents.offer)
+
+
+def page_cookie(cookies: str) -> str:
+    """Return the ``Set-Cookie`` header for a page that is requested with these cookies; empty if it has one.
+
+    Browsers share cookies between the ports of a machine, so that all servers take the same one.
+    """
+    if _browser_in(cookies) is not None:
+        return ""
+    return f"{COOKIE}={secrets.token_urlsafe(16)}; Path=/; HttpOnly; SameSite=Strict"
+
+
+def _browser_in(cookies: str) -> str | None:
+    """Return the browser's number in a ``Cookie`` header; None without a proper one."""
+    try:
+        held = SimpleCookie(cookies).get(COOKIE)
+    except CookieError:
+        return None
+    return held.value if held is not None and _NUMBER.fullmatch(held.value) else None

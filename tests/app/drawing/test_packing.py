@@ -1,0 +1,109 @@
+"""Contents in few bytes: what is packed comes out as it was."""
+
+import gzip
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays as any_array
+
+from app.drawing.glb import lines_glb, mesh_glb, textured_glb
+from app.drawing.ordering import curve_order, lowest_first, reordered
+from app.drawing.packing import GRID_BITS, pack, rounded
+from tests.app.packed import unpacked
+
+SPHERE = trimesh.creation.icosphere(subdivisions=3)
+SPHERE_COLORS = np.random.default_rng(0).integers(0, 256, (len(SPHERE.vertices), 3), dtype=np.uint8)
+KINDS = ["<f2", "<f4", "<u2", "<u4", "|u1", "|i1", "<i2", "<i4"]
+
+
+def sphere_glb():
+    return mesh_glb(np.asarray(SPHERE.vertices), np.asarray(SPHERE.faces), SPHERE_COLORS)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_any_array_comes_out_to_the_bit(data):
+    kind, columns = data.draw(st.sampled_from(KINDS)), data.draw(st.integers(1, 4))
+    array = data.draw(any_array(kind, (data.draw(st.integers(0, 20)), columns)))
+    assert unpacked(pack(array)) == array.tobytes()
+
+
+@pytest.mark.parametrize("array", [np.arange(7.0), np.zeros((2, 5), "<f4"), np.zeros((3, 2), ">f4")], ids=str)
+def test_an_array_of_another_form_is_left_as_it_is(array):
+    assert unpacked(pack(array)) == array.tobytes()
+
+
+@settings(max_examples=60, deadline=None)
+@given(any_array(np.uint8, st.tuples(st.integers(0, 40), st.just(3))))
+def test_any_colours_come_out_to_the_bit(colors):
+    assert unpacked(pack(colors)) == colors.tobytes()
+
+
+@pytest.mark.parametrize("data", [b"", b"x", b"\xff\xd8 a picture", bytes(range(256))])
+def test_a_file_comes_out_as_it_was(data):
+    assert unpacked(pack(data)) == data
+
+
+FILES = {
+    "mesh": sphere_glb(),
+    "textured": textured_glb(
+        np.asarray(SPHERE.vertices),
+        np.asarray(SPHERE.faces),
+        SPHERE_COLORS,
+        np.random.default_rng(1).uniform(0, 1, (len(SPHERE.vertices), 2)),
+        b"\xff\xd8 a picture\xff\xd9",
+    ),
+    "large": mesh_glb(400.0 * np.asarray(SPHERE.vertices), np.asarray(SPHERE.faces), SPHERE_COLORS),
+    "lines": lines_glb(np.random.default_rng(0).uniform(-1, 1, (77, 2, 3)), (213, 40, 30)),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_gltf_comes_out_to_the_bit(name):
+    assert unpacked(pack(FILES[name])) == FILES[name]
+
+
+def test_a_surface_takes_far_less_than_its_deflated_bytes():
+    grid = np.stack(np.meshgrid(np.arange(60), np.arange(60)), axis=-1).reshape(-1, 2)
+    noise = np.random.default_rng(0).normal(0.0, 0.003, (3600, 3))
+    vertices_m = np.column_stack([0.02 * grid, np.zeros(3600)]) + noise
+    corner = (60 * np.arange(59)[:, None] + np.arange(59)).ravel()
+    triangles = np.concatenate(
+        [np.stack([corner, corner + 1, corner + 60], 1), np.stack([corner + 1, corner + 61, corner + 60], 1)]
+    )
+    shuffled = np.random.default_rng(1).permutation(3600)
+    glb = mesh_glb(vertices_m[shuffled], np.argsort(shuffled)[triangles], np.full((3600, 3), 120, np.uint8))
+    assert len(gzip.compress(pack(glb))) < 0.6 * len(gzip.compress(glb))
+
+
+def test_points_on_the_grid_moved_by_at_most_half_a_step_and_take_half_the_bytes():
+    points_m = np.random.default_rng(0).uniform(-5, 5, (2000, 3)).astype(np.float32)
+    moved_m = rounded(points_m)
+    assert np.abs(moved_m - points_m).max() <= 0.5 / 2**GRID_BITS + 1e-6
+    assert unpacked(pack(moved_m)) == moved_m.tobytes()
+    assert len(gzip.compress(pack(moved_m))) < 0.7 * len(gzip.compress(pack(points_m)))
+
+
+def test_neighbours_along_the_curve_are_near():
+    points = np.random.default_rng(0).uniform(0, 1, (4000, 3))
+    order = curve_order(points)
+    assert sorted(order) == list(range(4000))
+    steps = np.linalg.norm(np.diff(points[order], axis=0), axis=1)
+    assert np.median(steps) < 0.15 * np.median(np.linalg.norm(np.diff(points, axis=0), axis=1))
+    assert len(curve_order(np.empty((0, 3)))) == 0
+    assert list(curve_order(np.ones((3, 3)))) == [0, 1, 2]
+
+
+def test_reordered_triangles_are_the_same_and_keep_their_orientation():
+    order, triangles = reordered(np.asarray(SPHERE.vertices), np.asarray(SPHERE.faces))
+
+    def turned(corners):
+        return sorted(min(one[turn:] + one[:turn] for turn in range(3)) for one in corners.tolist())
+
+    assert turned(order[triangles]) == turned(np.asarray(SPHERE.faces))
+    assert np.all(triangles[:, 0] < triangles[:, 1:].min(axis=1))
+    assert np.all(np.diff(triangles[:, 0]) >= 0)
+    assert np.array_equal(lowest_first(np.array([[2, 0, 1], [5, 4, 3]])), [[0, 1, 2], [3, 5, 4]])

@@ -1,0 +1,106 @@
+"""Packed contents read back, as the text of ``app/drawing/packing.py`` says, number by number."""
+
+import json
+import struct
+
+import numpy as np
+
+from tests.app.gltf import srgb
+
+
+def unpacked(packed):
+    """The bytes of a content."""
+    (length,) = struct.unpack_from("<I", packed)
+    parts, at, out = json.loads(packed[4 : 4 + length]), 4 + length, b""
+    for kind, *numbers in parts:
+        size, write = KINDS[kind](*numbers)
+        out += write(packed[at : at + size])
+        at += size
+    assert at == len(packed)
+    return out
+
+
+def _raw(count):
+    return count, lambda data: data
+
+
+def _rows(rows, columns, size, stride):
+    def write(data):
+        found = [_summed(column, size) for column in _columns(data, rows, columns, size)]
+        wide = [b"".join(one[row].to_bytes(size, "little") for one in found) for row in range(rows)]
+        return b"".join(row.ljust(stride, b"\0") for row in wide)
+
+    return rows * columns * size, write
+
+
+def _grid(rows, columns, bits):
+    def write(data):
+        found = [_summed(column, 4) for column in _columns(data, rows, columns, 4)]
+        signed = [[value - (value >> 31 << 32) for value in column] for column in found]
+        return b"".join(struct.pack("<f", one[row] / 2**bits) for row in range(rows) for one in signed)
+
+    return 4 * rows * columns, write
+
+
+def _triangles(rows, size):
+    def write(data):
+        first, *others = _columns(data, rows, 3, size)
+        low = _summed(first, size)
+        whole = [low, *([(a + b) % 256**size for a, b in zip(low, one, strict=True)] for one in others)]
+        return b"".join(one[row].to_bytes(size, "little") for row in range(rows) for one in whole)
+
+    return 3 * rows * size, write
+
+
+def _colors(rows):
+    return 3 * rows, lambda data: bytes(value for rgb in _rgb(data, rows) for value in rgb)
+
+
+def _light(rows):
+    values = np.arange(65536)
+    shades = 255.0 * srgb(values)
+    table = [int(values[np.argmin(np.abs(shades - shade))]) for shade in range(256)]
+
+    def write(data):
+        found = ([table[value] for value in rgb] for rgb in _rgb(data, rows))
+        return b"".join(struct.pack("<4H", *linear, 65535) for linear in found)
+
+    return 3 * rows, write
+
+
+KINDS = {
+    "raw": _raw,
+    "rows": _rows,
+    "grid": _grid,
+    "triangles": _triangles,
+    "colors": _colors,
+    "light": _light,
+}
+
+
+def _columns(data, rows, columns, size):
+    """The differences of each column."""
+    found = []
+    for column in range(columns):
+        planes = [data[(column * size + plane) * rows :][:rows] for plane in range(size)]
+        numbers = [sum(plane[row] << 8 * place for place, plane in enumerate(planes)) for row in range(rows)]
+        found.append([number // 2 if number % 2 == 0 else -(number + 1) // 2 for number in numbers])
+    return found
+
+
+def _summed(differences, size):
+    total, values = 0, []
+    for difference in differences:
+        total = (total + difference) % 256**size
+        values.append(total)
+    return values
+
+
+def _rgb(data, rows):
+    """The colours of three planes."""
+    green = red = blue = 0
+    for row in range(rows):
+        green = (green + data[row]) % 256
+        red = (red + data[rows + row]) % 256
+        blue = (blue + data[2 * rows + row]) % 256
+        yield (red + green) % 256, green, (blue + green) % 256

@@ -1,0 +1,207 @@
+"""What a page draws: named in its messages, fetched over HTTP, and only by the browser that it is for."""
+
+import contextlib
+import gzip
+import http.client
+import re
+import threading
+
+import numpy as np
+import pytest
+import viser
+
+from app.drawing.glb import lines_glb
+from app.drawing.packing import pack
+from app.load.connection import Connection, wait_for
+from app.web import contents as module
+from app.web.contents import COOKIE, FEWEST_BYTES, FOLDER, GONE, Contents, offer_contents, page_cookie
+from app.web.headers import strict_headers
+from tests.app.packed import unpacked
+
+HERS, HIS = f"{COOKIE}={'a' * 22}", f"{COOKIE}={'b' * 22}"
+LARGE = lines_glb(np.random.default_rng(0).uniform(-1, 1, (3000, 2, 3)), (213, 40, 30))
+POINTS = np.random.default_rng(1).uniform(-1, 1, (4000, 3)).astype(np.float32)
+
+
+class Packing:
+    """Packs as the app does, and counts."""
+
+    def __init__(self):
+        self.packed = 0
+
+    def __call__(self, data):
+        self.packed += 1
+        return pack(data)
+
+
+@pytest.fixture
+def served():
+    packing = Packing()
+    contents = Contents(packing)
+    with strict_headers(), contents.served():
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    offer_contents(server, contents)
+    yield server, packing
+    contents.close()
+    server.stop()
+
+
+@contextlib.contextmanager
+def page(server, cookie=""):
+    with contextlib.closing(Listener(f"http://127.0.0.1:{server.get_port()}", cookie)) as one:
+        yield one
+
+
+class Listener(Connection):
+    """Keeps the messages."""
+
+    def __init__(self, *arguments):
+        self.named = {}
+        super().__init__(*arguments)
+
+    def _take_message(self, message):
+        for key, value in message.get("props", {}).items():
+            if key in ("glb_data", "points"):
+                self.named[message["name"], key] = value
+        super()._take_message(message)
+
+
+def get(server, path, cookie=""):
+    with contextlib.closing(http.client.HTTPConnection("127.0.0.1", server.get_port(), timeout=10)) as one:
+        one.request("GET", path, headers={"Cookie": cookie} if cookie else {})
+        answer = one.getresponse()
+        return answer.status, dict(answer.headers), answer.read()
+
+
+def draw(server):
+    server.scene.add_glb("/mesh", LARGE)
+    server.scene.add_point_cloud("/cloud", POINTS, np.zeros(3, np.uint8), precision="float32")
+    server.scene.add_glb("/small", LARGE[:100])
+
+
+def test_a_page_with_the_cookie_gets_names_and_fetches_the_same_bytes(served):
+    server, packing = served
+    draw(server)
+    with page(server, HERS) as one:
+        wait_for(lambda: len(one.named) == 3)
+        assert one.named["/small", "glb_data"] == LARGE[:100]
+        for key, data, kind in (
+            (("/mesh", "glb_data"), LARGE, ""),
+            (("/cloud", "points"), POINTS.tobytes(), "<f4"),
+        ):
+            told = one.named[key]
+            assert (told["dtype"], told["bytes"]) == (kind, len(data))
+            status, headers, body = get(server, FOLDER + told["packetmesh"], HERS)
+            assert status == 200
+            assert "immutable" in headers["Cache-Control"]
+            assert "private" in headers["Cache-Control"]
+            assert "default-src 'none'" in headers["Content-Security-Policy"]
+            assert len(body) < len(data)
+            assert unpacked(gzip.decompress(body)) == data
+    assert packing.packed == 2
+
+
+def test_a_page_without_the_cookie_gets_the_data_themselves(served):
+    server, packing = served
+    draw(server)
+    with page(server) as one:
+        wait_for(lambda: len(one.named) == 3)
+        assert one.named["/mesh", "glb_data"] == LARGE
+        assert "__binary_index" in one.named["/cloud", "points"]
+    assert packing.packed == 0
+
+
+def test_many_browsers_get_the_same_name_and_it_is_packed_once(served):
+    server, packing = served
+    draw(server)
+    cookies = [f"{COOKIE}={number:022}" for number in range(5)]
+    with contextlib.ExitStack() as stack:
+        pages = [stack.enter_context(page(server, cookie)) for cookie in cookies]
+        wait_for(lambda: all(len(one.named) == 3 for one in pages))
+        (name,) = {one.named["/mesh", "glb_data"]["packetmesh"] for one in pages}
+        found = []
+        threads = [
+            threading.Thread(target=lambda cookie=cookie: found.append(get(server, FOLDER + name, cookie)[0]))
+            for cookie in cookies
+        ]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert found == [200] * 5
+    assert packing.packed == 1
+
+
+def test_a_content_of_another_browser_is_refused_like_one_that_is_gone(served):
+    server, _ = served
+    with page(server, HERS) as hers, page(server, HIS) as his:
+        wait_for(lambda: len(server.get_clients()) == 2)
+        (her_client,) = [
+            client for number, client in server.get_clients().items() if number == min(server.get_clients())
+        ]
+        her_client.scene.add_glb("/private", LARGE)
+        wait_for(lambda: bool(hers.named) or bool(his.named))
+        owner, other = (HERS, HIS) if hers.named else (HIS, HERS)
+        name = (hers.named or his.named)["/private", "glb_data"]["packetmesh"]
+        assert get(server, FOLDER + name, owner)[0] == 200
+        refusals = [
+            get(server, FOLDER + name, other),
+            get(server, FOLDER + name),
+            get(server, FOLDER + "0" * 32, owner),
+            get(server, FOLDER + "../x", owner),
+            get(server, FOLDER, owner),
+        ]
+        assert {(status, body.decode()) for status, _, body in refusals} == {(404, GONE)}
+    wait_for(lambda: not server.get_clients())
+    wait_for(lambda: get(server, FOLDER + name, owner)[0] == 404)  # nobody shows it any more
+
+
+def test_other_paths_and_websockets_are_not_answered(served):
+    server, _ = served
+    assert get(server, "/")[0] == 200
+    assert get(server, "/contents")[0] != 200 or b"html" in get(server, "/contents")[2]
+
+
+def test_a_browser_keeps_its_newest_contents(monkeypatch):
+    monkeypatch.setattr(module, "MOST_BYTES", 3 * FEWEST_BYTES)
+    contents = Contents(pack)
+    contents.opened(1, HERS)
+    datas = [bytes([number]) * FEWEST_BYTES for number in range(4)]
+    names = [contents.offer(1, data)["packetmesh"] for data in datas]
+    (offered,) = contents._offered.values()
+    assert list(offered) == names[1:]
+    assert set(contents._known) == set(names[1:])
+    assert contents.offer(1, datas[1])["packetmesh"] == names[1]
+    assert contents.offer(1, bytes(FEWEST_BYTES - 1)) is None
+    assert contents.offer(2, datas[1]) is None
+    contents.closed(1)
+    assert not contents._known
+    assert not contents._names
+    assert contents.offer(1, datas[1]) is None
+
+
+def test_equal_bytes_of_another_kind_have_another_name():
+    contents = Contents(pack)
+    contents.opened(1, HERS)
+    array = np.zeros((FEWEST_BYTES, 2), np.uint16)
+    others = [array, array.astype(np.int16), array.reshape(-1, 4), array.tobytes()]
+    assert len({contents.offer(1, one)["packetmesh"] for one in others}) == 4
+
+
+def test_an_array_that_changes_gets_another_name():
+    contents = Contents(pack)
+    contents.opened(1, HERS)
+    array = np.zeros((FEWEST_BYTES, 3), np.uint8)
+    before = contents.offer(1, array)["packetmesh"]
+    array[0] = 1
+    assert contents.offer(1, array)["packetmesh"] != before
+
+
+def test_the_page_gives_each_browser_a_cookie_of_its_own_once():
+    given = [page_cookie("") for _ in range(2)]
+    assert len(set(given)) == 2
+    for one in given:
+        assert re.fullmatch(rf"{COOKIE}=[A-Za-z0-9_-]{{22}}; Path=/; HttpOnly; SameSite=Strict", one)
+        assert page_cookie(one.partition(";")[0]) == ""
+    for broken in (f"{COOKIE}=short", f"{COOKIE}={'<' * 22}", 'x="', f"{COOKIE}="):
+        assert page_cookie(broken) != ""
