@@ -21,6 +21,7 @@ from app.compute.prepared import take_prepared
 from app.compute.shared import SharedViews
 from app.compute.state import Spec
 from app.compute.store import Store
+from app.drawing.coarse import coarse_glb, is_mesh
 from app.drawing.colors import BRAND
 from app.drawing.packing import pack
 from app.landing import app_page
@@ -38,7 +39,7 @@ from app.screens.surface.panel import SurfacePanel
 from app.session.lecture import Lecture
 from app.session.session import Session
 from app.web import viser_private as private
-from app.web.contents import Contents, offer_contents
+from app.web.contents import Contents, Packing, offer_contents
 from app.web.crowd import MOST_OF_ONE_ADDRESS, MOST_SESSIONS, Crowd, Visitor
 from app.web.door import Door
 from app.web.entrance import Entrance, Token, is_loopback, is_unspecified
@@ -174,7 +175,7 @@ def build_server(
     visitor = Token("token") if with_token and not is_loopback(host) else None
     entrance = Entrance(visitor, teacher)
     door = Door()
-    contents = Contents(pack)
+    contents = Contents(Packing(pack, is_mesh, coarse_glb))
     server = _listening(host, port, door, entrance, page, allowed, contents)
     gate = Gate(server)
     limit_silent(server)

@@ -99,6 +99,39 @@ class Places:
         return self.steps.dtype.kind == "u"
 
 
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """A binary glTF that this module wrote, taken apart."""
+
+    head: dict[str, Any]
+    body: bytes
+
+    @staticmethod
+    def of(glb: bytes) -> Parts:
+        (size,) = struct.unpack_from("<I", glb, 12)
+        return Parts(json.loads(glb[20 : 20 + size]), glb[28 + size :])
+
+    @property
+    def primitive(self) -> dict[str, Any]:
+        """Its only primitive."""
+        (primitive,) = self.head["meshes"][0]["primitives"]
+        return dict(primitive)
+
+    def data(self, view: int) -> bytes:
+        """Return the bytes of a buffer view."""
+        where = self.head["bufferViews"][view]
+        return self.body[where["byteOffset"] :][: where["byteLength"]]
+
+    def array(self, row: int) -> np.ndarray:
+        """Return an accessor's numbers, (N,) or (N, columns)."""
+        accessor = self.head["accessors"][row]
+        kind = next(kind for kind, number in _TYPES.items() if number == accessor["componentType"])
+        numbers = np.frombuffer(self.data(accessor["bufferView"]), kind)
+        if accessor["type"] == "SCALAR":
+            return numbers
+        return numbers.reshape(accessor["count"], -1)[:, : int(accessor["type"][-1])]
+
+
 def _light(colors: ByteArray) -> np.ndarray:
     """Return (V, 4) uint16 linear RGB and opacity of (V, 3) sRGB, as glTF requires."""
     rgba = np.full((len(colors), 4), 65535, dtype="<u2")

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.drawing.glb import LINEAR
+from app.drawing.glb import LINEAR, Parts
 from pipeline.types import ByteArray
 
 GRID_BITS = 12
@@ -80,33 +80,27 @@ def _packed_array(array: NDArray[Any]) -> Part:
 
 def _packed_gltf(glb: bytes) -> Iterator[Part]:
     """Yield the parts of a binary glTF: its accessors' arrays in differences, the rest as it is."""
-    (size,) = struct.unpack_from("<I", glb, 12)
-    head, start = json.loads(glb[20 : 20 + size]), 28 + size
-    (primitive,) = head["meshes"][0]["primitives"]
-    kinds = {row: name for name, row in primitive["attributes"].items()}
-    done = 0
-    for row, accessor in enumerate(head["accessors"]):
-        view = head["bufferViews"][accessor["bufferView"]]
+    parts = Parts.of(glb)
+    kinds = {row: name for name, row in parts.primitive["attributes"].items()}
+    done, start = 0, len(glb) - len(parts.body)
+    for row, accessor in enumerate(parts.head["accessors"]):
+        view = parts.head["bufferViews"][accessor["bufferView"]]
         first = start + view["byteOffset"]
-        last = first + view["byteLength"]
         yield _raw(glb[done:first])
-        yield _packed_accessor(glb[first:last], accessor, view.get("byteStride"), kinds.get(row, ""))
-        done = last
+        yield _packed_accessor(parts.array(row), view.get("byteStride"), kinds.get(row, ""))
+        done = first + view["byteLength"]
     yield _raw(glb[done:])
 
 
-def _packed_accessor(data: bytes, accessor: dict[str, Any], stride: int | None, kind: str) -> Part:
-    size = 2 if accessor["componentType"] == 5123 else 4
-    numbers = np.frombuffer(data, f"<u{size}")
+def _packed_accessor(numbers: NDArray[Any], stride: int | None, kind: str) -> Part:
     if stride is None:
         rows = numbers.reshape(-1, 3).astype(np.int64)
         first = np.vstack([np.zeros((1, 1), np.int64), rows[:, :1]])
         columns = np.hstack([first[1:] - first[:-1], rows[:, 1:] - rows[:, :1]])
-        return ["triangles", len(rows), size], _planes(_zigzag(columns, size))
-    rows = numbers.reshape(accessor["count"], -1)
+        return ["triangles", len(rows), numbers.itemsize], _planes(_zigzag(columns, numbers.itemsize))
     if kind == "COLOR_0":
-        return ["light", len(rows)], _color_planes(_SHADE[rows[:, :3]])
-    described, planes = _rows(rows[:, : int(accessor["type"][-1])])
+        return ["light", len(numbers)], _color_planes(_SHADE[numbers[:, :3]])
+    described, planes = _rows(np.ascontiguousarray(numbers).view(f"<u{numbers.itemsize}"))
     return [*described[:-1], stride], planes
 
 

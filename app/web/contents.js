@@ -1,15 +1,19 @@
 // Fetches the contents that messages name (contents.py) and puts them into the messages before viser gets these.
 //
-// Messages stay in order: those after a content wait for it. A scene node or control whose content nobody would
-// see, because it is hidden or lies in something hidden, is held back with all its messages until it is shown. When
-// the line is idle, held contents are fetched ahead.
+// Messages stay in order: those after a content wait for it. On a slow line they wait for its coarse copy only, and
+// the content replaces that when it comes. A scene node or control whose content nobody would see, because it is
+// hidden or lies in something hidden, is held back with all its messages until it is shown. When the line is idle,
+// held contents are fetched ahead.
 (() => {
   const FOLDER = "contents/";
   const TRIES = 4;
   const PAUSE_MS = 1000; // before a fetch is tried again
   const IDLE_MS = 2500; // time without new contents after which held ones are fetched ahead
   const ASIDE_MS = 8000; // longest time for which the first screen waits until the address's screen is shown
+  const MEASURED_BYTES = 30000; // least size of a content that tells the line's rate
   const SHOWN_MS = 20000;
+  const SLOW_B_PER_MS = 500; // rate of the last bytes below which coarse copies come first
+  const COARSE = "Coarse until all has arrived.";
   const LOST = "A part of the picture did not arrive: reload the page.";
   const ARRAYS = {
     "": Uint8Array, "|u1": Uint8Array, "|i1": Int8Array, "<u2": Uint16Array, "<i2": Int16Array, "<f2": Uint16Array,
@@ -23,13 +27,22 @@
   const hidden = new Set(); // nodes and controls that are not shown themselves
   const containers = new Map(); // for each control the one that holds it
   const held = new Map(); // for each held node or control its messages
-  const loading = new Map(); // for each name of a content the promise of its bytes
+  const loading = new Map(); // for each name of a content, or of its coarse copy, the promise of its bytes
+  const drawn = new Set(); // nodes with a content that has a coarse copy
+  const refining = new Map(); // for each node that is drawn coarsely its content
   let aside = false; // whether the address names another screen than the first, which is not shown yet
   let deliver = () => {}; // gives viser's page an event
   let chain = Promise.resolve(); // the deliveries that wait for contents
   let waiting = 0; // their number
   let connection = 0; // number of the connection whose messages are valid
   let idle = 0; // timer of the fetches ahead
+  let bytesPerMs = pageRate();
+
+  // The rate at which the page itself came; unknown from the browser's cache.
+  function pageRate() {
+    const {transferSize, requestStart, responseEnd} = performance.getEntriesByType("navigation")[0] ?? {};
+    return transferSize > 100000 ? transferSize / Math.max(responseEnd - requestStart, 1) : Infinity;
+  }
 
   const isContent = value => value !== null && typeof value === "object" && typeof value.packetmesh === "string";
 
@@ -44,8 +57,13 @@
   async function fetched(name, ahead) {
     for (let tried = 1; ; tried++) {
       try {
+        const began = performance.now();
         const answer = await fetch(new URL(FOLDER + name, document.baseURI), {priority: ahead ? "low" : "high"});
-        if (answer.ok) return packetmeshUnpack(new Uint8Array(await answer.arrayBuffer()));
+        if (answer.ok) {
+          const packed = await answer.arrayBuffer(), size = Number(answer.headers.get("Content-Length"));
+          if (size > MEASURED_BYTES) bytesPerMs = size / Math.max(performance.now() - began, 1);
+          return packetmeshUnpack(new Uint8Array(packed));
+        }
         if (answer.status < 500) throw new RangeError(LOST);
       } catch (error) {
         if (error instanceof RangeError || tried === TRIES) throw error;
@@ -59,12 +77,21 @@
     return loading.get(name);
   }
 
+  const above = name => name.slice(0, name.lastIndexOf("/"));
+
+  // The name to fetch for a content of a node: that of the coarse copy on a slow line, unless a mesh is there.
+  function first(content, node) {
+    const name = content.packetmesh;
+    if (!content.coarse || bytesPerMs >= SLOW_B_PER_MS) return name;
+    return [...drawn].some(other => above(other) === above(node)) ? name : `${name}?coarse`;
+  }
+
   // Put the contents into a message; false if one did not arrive.
-  async function filled(message) {
+  async function filled(message, wanted) {
     try {
-      for (const [owner, key, {packetmesh: name, dtype}] of [...contentsOf(message)]) {
-        const bytes = await load(name);
-        owner[key] = new ARRAYS[dtype](bytes.slice().buffer);
+      for (const [owner, key, content] of [...contentsOf(message)]) {
+        const bytes = await load(wanted.get(content));
+        owner[key] = new ARRAYS[content.dtype](bytes.slice().buffer);
       }
       return true;
     } catch {
@@ -143,26 +170,54 @@
 
   // Give viser messages once their contents are there.
   function pass(messages) {
-    const mine = connection;
-    const named = messages.map(message => [...contentsOf(message)]);
-    const send = found => found.length && deliver({data: {type: "message_batch", messages: found}});
+    const mine = connection, named = messages.map(message => [...contentsOf(message)]);
     if (waiting === 0 && !named.flat().length) return send(messages);
-    for (const [, , {packetmesh: name}] of named.flat()) load(name).catch(() => {});
+    const wanted = new Map(named.flatMap((found, row) =>
+      found.map(([, , content]) => [content, first(content, messages[row].name)])));
+    for (const name of wanted.values()) load(name).catch(() => {});
     waiting += 1;
     chain = chain.then(async () => {
-      const came = await Promise.all(messages.map((message, row) => named[row].length ? filled(message) : true));
+      const came = await Promise.all(messages.map((message, row) => named[row].length ? filled(message, wanted) : true));
       waiting -= 1;
       if (mine !== connection) return;
-      for (const [, , {packetmesh: name}] of named.flat()) loading.delete(name);
+      for (const name of wanted.values()) loading.delete(name);
       send(messages.filter((_, row) => came[row]));
+      messages.forEach((message, row) => came[row] && refine(message, named[row], wanted));
       clearTimeout(idle);
       idle = setTimeout(fetchAhead, IDLE_MS);
     });
   }
 
+  function send(messages) {
+    if (!messages.length) return;
+    for (const {type, name, props, updates} of messages) {
+      if (REMOVALS.includes(type)) drawn.delete(name);
+      if (REMOVALS.includes(type) || props || updates?.[refining.get(name)?.key]) refining.delete(name);
+    }
+    deliver({data: {type: "message_batch", messages}});
+  }
+
+  // Fetch what a message has only a coarse copy of, and update its node unless that has changed.
+  async function refine({name, owner}, found, wanted) {
+    for (const [, key, content] of found) {
+      if (content.coarse) drawn.add(name);
+      if (wanted.get(content) === content.packetmesh) continue;
+      const mine = {key};
+      refining.set(name, mine);
+      packetmesh.notice(COARSE, SHOWN_MS);
+      const bytes = await load(content.packetmesh).catch(() => null);
+      loading.delete(content.packetmesh);
+      if (refining.get(name) !== mine) return;
+      refining.delete(name);
+      if (bytes === null) return void packetmesh.notice(LOST, SHOWN_MS);
+      send([{type: "SceneNodeUpdateMessage", name, owner, updates: {[key]: new ARRAYS[content.dtype](bytes.slice().buffer)}}]);
+      if (!refining.size) packetmesh.notice("", 0);
+    }
+  }
+
   function reset() {
     connection += 1;
-    for (const all of [hidden, containers, held, loading]) all.clear();
+    for (const all of [hidden, containers, held, loading, drawn, refining]) all.clear();
     const screen = new URLSearchParams(location.search).get("screen");
     aside = screen !== null && `/${screen}` !== FIRST;
     setTimeout(() => {

@@ -21,6 +21,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from http.cookies import CookieError, SimpleCookie
 from typing import Any, TypeAlias
 
@@ -41,6 +42,10 @@ FOLDER = "/contents/"
 GONE = "This content is no longer there, or belongs to another browser: reload the page.\n"
 FEWEST_BYTES = 32_000
 """Size from which a content is fetched rather than sent in its message; steps of animations are smaller."""
+COARSE_BYTES = 300_000
+"""Size from which a content may have a coarse copy."""
+COARSE = "coarse"
+"""Query of a content's coarse copy."""
 MOST_BYTES = 64 << 20
 """Limit of the contents that one browser may fetch; its oldest are forgotten first."""
 REMEMBERED = 64
@@ -51,26 +56,41 @@ _NAME = re.compile(r"[0-9a-f]{32}")
 _NUMBER = re.compile(r"[A-Za-z0-9_-]{22}")
 
 
+@dataclass(frozen=True, slots=True)
+class Packing:
+    """How contents are written for the page."""
+
+    pack: Callable[[Data], bytes]
+    """Writes a content as the page's script unpacks it."""
+    has_coarse: Callable[[Data], bool]
+    """Whether a large content has a coarse copy, which a page on a slow line shows first."""
+    coarse: Callable[[Data], Data]
+    """Makes the coarse copy."""
+
+
 class Content:
-    """A content that browsers may fetch, packed when the first one does."""
+    """A content that browsers may fetch; it and its coarse copy are packed when the first one does."""
 
     def __init__(self, data: Data, size: int) -> None:
         self.data, self.size = data, size
-        self._packed: Future[bytes] | None = None
+        self._packed: dict[bool, Future[bytes]] = {}
 
-    def packed(self, packer: ThreadPoolExecutor, pack: Callable[[Data], bytes]) -> Future[bytes]:
+    def packed(self, packer: ThreadPoolExecutor, packing: Packing, coarse: bool) -> Future[bytes]:
         """Return the compressed content, which is being made; to be called on the connections' thread."""
-        if self._packed is None:
-            self._packed = packer.submit(lambda: gzip.compress(pack(self.data), 6, mtime=0))
-        return self._packed
+
+        def made() -> bytes:
+            return gzip.compress(packing.pack(packing.coarse(self.data) if coarse else self.data), 6, mtime=0)
+
+        if coarse not in self._packed:
+            self._packed[coarse] = packer.submit(made)
+        return self._packed[coarse]
 
 
 class Contents:
     """The contents that a server offers to its browsers."""
 
-    def __init__(self, pack: Callable[[Data], bytes]) -> None:
-        """``pack`` writes a content as the page's script unpacks it."""
-        self._pack = pack
+    def __init__(self, packing: Packing) -> None:
+        self._packing = packing
         self._packer = ThreadPoolExecutor(1, thread_name_prefix="contents")
         self._lock = threading.Lock()
         self._known: dict[str, Content] = {}
@@ -119,7 +139,8 @@ class Contents:
                 total -= content.size
                 self._forget(oldest)
         kind = "" if isinstance(data, bytes) else data.dtype.str
-        return {"packetmesh": name, "dtype": kind, "bytes": size}
+        coarse = size >= COARSE_BYTES and self._packing.has_coarse(data)
+        return {"packetmesh": name, "dtype": kind, "bytes": size, "coarse": coarse}
 
     def served(self) -> AbstractContextManager[None]:
         """Return a context. A server started in it sends the contents."""
@@ -151,19 +172,19 @@ class Contents:
 
     def _answering(self, answer: Answer) -> Answer:
         def answered(connection: Any, request: Any) -> Any:
-            path = request.path.partition("?")[0]
+            path, _, query = request.path.partition("?")
             if not path.startswith(FOLDER) or "Upgrade" in request.headers:
                 return answer(connection, request)
             browser, name = _browser_in(request.headers.get("Cookie", "")), path.removeprefix(FOLDER)
             content = self._offered.get(browser or "", {}).get(name) if _NAME.fullmatch(name) else None
             if content is None:
                 return connection.respond(http.HTTPStatus.NOT_FOUND, GONE)
-            return self._send(content)
+            return self._send(content, query == COARSE)
 
         return answered
 
-    async def _send(self, content: Content) -> Response:
-        body = await asyncio.wrap_future(content.packed(self._packer, self._pack))
+    async def _send(self, content: Content, coarse: bool) -> Response:
+        body = await asyncio.wrap_future(content.packed(self._packer, self._packing, coarse))
         headers = Headers()
         headers["Content-Type"] = "application/octet-stream"
         headers["Content-Encoding"] = "gzip"

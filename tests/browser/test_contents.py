@@ -22,7 +22,7 @@ window.send = (...messages) => worker.postMessage({type: "message_batch", messag
 window.connect = () => worker.postMessage({type: "connected"});
 </script>"""
 ADDRESS = "http://packetmesh.test/"
-CONTENT = {"a": b"first", "b": b"second", "c": b"third"}
+CONTENT = {"a": b"first", "b": b"second", "c": b"third", "a?coarse": b"few", "b?coarse": b"less"}
 RAW = {"dtype": "", "bytes": 5}
 
 
@@ -52,10 +52,11 @@ class Line:
                 body=text[name].read_text() if name else PAGE,
                 content_type="text/javascript" if name else "text/html",
             )
-        name = name.removeprefix("contents/")
+        name = route.request.url.removeprefix(f"{ADDRESS}contents/")
         self.asked.append(name)
-        if self.refusals:
-            return route.fulfill(status=self.refusals.pop(0))
+        status = self.refusals.pop(0) if self.refusals else 200
+        if status != 200:
+            return route.fulfill(status=status)
         if name not in CONTENT:
             return route.fulfill(status=404)
         return route.fulfill(body=pack(CONTENT[name]))
@@ -233,6 +234,81 @@ def test_the_first_screen_waits_for_the_one_that_the_address_names(page):
         ["SetSceneNodeVisibilityMessage", "/fuse"],
     ]
     assert page.line.asked == ["b"]
+
+
+SLOW = """() => {
+  const found = performance.getEntriesByType;
+  performance.getEntriesByType = kind => kind === "navigation"
+    ? [{transferSize: 600000, requestStart: 0, responseEnd: 6000}] : found.call(performance, kind);
+}"""
+
+
+@pytest.fixture
+def slow(browser):
+    """A page that came at 100 kB/s."""
+    context = browser.new_context()
+    tab = context.new_page()
+    tab.set_default_timeout(10_000)
+    tab.line = Line()
+    tab.route("**/*", tab.line.answer)
+    tab.add_init_script(f"({SLOW})()")
+    tab.goto(ADDRESS)
+    connect(tab)
+    yield tab
+    context.close()
+
+
+def large(name, content):
+    return {
+        "type": "GlbMessage",
+        "name": name,
+        "owner": "",
+        "props": {"glb_data": named(content, coarse=True)},
+    }
+
+
+def test_on_a_slow_line_the_coarse_copy_comes_first_and_then_the_whole(slow):
+    send(slow, large("/surface/mesh-1", "a"), DONE)
+    assert [row[::2] for row in seen(slow, 3)] == [
+        ["GlbMessage", {"glb_data": "few"}],
+        ["ReplayDoneMessage", None],
+        ["SceneNodeUpdateMessage", {"glb_data": "first"}],
+    ]
+    assert slow.line.asked == ["a?coarse", "a"]
+    assert slow.evaluate("notices") == ["Coarse until all has arrived.", ""]
+
+
+def test_where_a_mesh_is_there_the_next_one_comes_whole(slow):
+    send(slow, large("/surface/mesh-1", "a"))
+    seen(slow, 2)
+    send(slow, large("/surface/mesh-2", "b"))
+    assert seen(slow, 3)[2] == ["GlbMessage", "/surface/mesh-2", {"glb_data": "second"}]
+    send(slow, {"type": "RemoveSceneNodeMessage", "name": "/surface/mesh-1"})
+    send(slow, {"type": "RemoveSceneNodeMessage", "name": "/surface/mesh-2"})
+    send(slow, large("/surface/mesh-3", "a"))
+    assert [row[2] for row in seen(slow, 7)[5:]] == [{"glb_data": "few"}, {"glb_data": "first"}]
+
+
+def test_a_mesh_that_is_removed_is_not_refined(slow):
+    slow.line.refusals = [200, 503]
+    send(slow, large("/surface/mesh-1", "a"))
+    slow.wait_for_function("() => got.length === 2")
+    send(
+        slow, visible("/surface/mesh-1", True), {"type": "RemoveSceneNodeMessage", "name": "/surface/mesh-1"}
+    )
+    slow.wait_for_timeout(2500)
+    assert slow.line.asked == ["a?coarse", "a", "a"]
+    assert [row[0] for row in slow.evaluate(SEEN)] == [
+        "GlbMessage",
+        "SetSceneNodeVisibilityMessage",
+        "RemoveSceneNodeMessage",
+    ]
+
+
+def test_on_a_quick_line_the_whole_comes_at_once(page):
+    send(page, large("/surface/mesh-1", "a"), DONE)
+    assert seen(page, 2)[0][2] == {"glb_data": "first"}
+    assert page.line.asked == ["a"]
 
 
 NUMBERS = np.random.default_rng(0)

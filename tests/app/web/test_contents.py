@@ -8,22 +8,38 @@ import threading
 
 import numpy as np
 import pytest
+import trimesh
 import viser
 
-from app.drawing.glb import lines_glb
+from app.drawing.coarse import coarse_glb, is_mesh
+from app.drawing.glb import lines_glb, mesh_glb
 from app.drawing.packing import pack
 from app.load.connection import Connection, wait_for
 from app.web import contents as module
-from app.web.contents import COOKIE, FEWEST_BYTES, FOLDER, GONE, Contents, offer_contents, page_cookie
+from app.web.contents import (
+    COOKIE,
+    FEWEST_BYTES,
+    FOLDER,
+    GONE,
+    Contents,
+    Packing,
+    offer_contents,
+    page_cookie,
+)
 from app.web.headers import strict_headers
 from tests.app.packed import unpacked
 
 HERS, HIS = f"{COOKIE}={'a' * 22}", f"{COOKIE}={'b' * 22}"
 LARGE = lines_glb(np.random.default_rng(0).uniform(-1, 1, (3000, 2, 3)), (213, 40, 30))
+PACKING = Packing(pack, is_mesh, coarse_glb)
+SPHERE = trimesh.creation.icosphere(subdivisions=6)
+MESH = mesh_glb(
+    np.asarray(SPHERE.vertices), np.asarray(SPHERE.faces), np.full((len(SPHERE.vertices), 3), 9, "u1")
+)
 POINTS = np.random.default_rng(1).uniform(-1, 1, (4000, 3)).astype(np.float32)
 
 
-class Packing:
+class Counting:
     """Packs as the app does, and counts."""
 
     def __init__(self):
@@ -36,8 +52,8 @@ class Packing:
 
 @pytest.fixture
 def served():
-    packing = Packing()
-    contents = Contents(packing)
+    packing = Counting()
+    contents = Contents(Packing(packing, is_mesh, coarse_glb))
     with strict_headers(), contents.served():
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     offer_contents(server, contents)
@@ -98,6 +114,23 @@ def test_a_page_with_the_cookie_gets_names_and_fetches_the_same_bytes(served):
             assert "default-src 'none'" in headers["Content-Security-Policy"]
             assert len(body) < len(data)
             assert unpacked(gzip.decompress(body)) == data
+    assert packing.packed == 2
+
+
+def test_a_large_mesh_has_a_coarse_copy(served):
+    server, packing = served
+    server.scene.add_glb("/mesh", MESH)
+    server.scene.add_glb("/lines", lines_glb(np.zeros((30_000, 2, 3)), (1, 2, 3)))
+    with page(server, HERS) as one:
+        wait_for(lambda: len(one.named) == 2)
+        assert one.named["/mesh", "glb_data"]["coarse"]
+        assert not one.named["/lines", "glb_data"]["coarse"]
+        path = FOLDER + one.named["/mesh", "glb_data"]["packetmesh"]
+        whole, coarse = (gzip.decompress(get(server, path + query, HERS)[2]) for query in ("", "?coarse"))
+        assert unpacked(whole) == MESH
+        assert unpacked(coarse) == coarse_glb(MESH)
+        assert len(coarse) < 0.7 * len(whole)
+        assert get(server, path + "?coarse", HIS)[0] == 404
     assert packing.packed == 2
 
 
@@ -164,7 +197,7 @@ def test_other_paths_and_websockets_are_not_answered(served):
 
 def test_a_browser_keeps_its_newest_contents(monkeypatch):
     monkeypatch.setattr(module, "MOST_BYTES", 3 * FEWEST_BYTES)
-    contents = Contents(pack)
+    contents = Contents(PACKING)
     contents.opened(1, HERS)
     datas = [bytes([number]) * FEWEST_BYTES for number in range(4)]
     names = [contents.offer(1, data)["packetmesh"] for data in datas]
@@ -181,7 +214,7 @@ def test_a_browser_keeps_its_newest_contents(monkeypatch):
 
 
 def test_equal_bytes_of_another_kind_have_another_name():
-    contents = Contents(pack)
+    contents = Contents(PACKING)
     contents.opened(1, HERS)
     array = np.zeros((FEWEST_BYTES, 2), np.uint16)
     others = [array, array.astype(np.int16), array.reshape(-1, 4), array.tobytes()]
@@ -189,7 +222,7 @@ def test_equal_bytes_of_another_kind_have_another_name():
 
 
 def test_an_array_that_changes_gets_another_name():
-    contents = Contents(pack)
+    contents = Contents(PACKING)
     contents.opened(1, HERS)
     array = np.zeros((FEWEST_BYTES, 3), np.uint8)
     before = contents.offer(1, array)["packetmesh"]
