@@ -2,8 +2,8 @@
 //
 // Messages stay in order: those after a content wait for it. On a slow line they wait for its coarse copy only, and
 // the content replaces that when it comes. A scene node or control whose content nobody would see, because it is
-// hidden or lies in something hidden, is held back with all its messages until it is shown. When the line is idle,
-// held contents are fetched ahead.
+// hidden or lies in something hidden, is held back with all its messages until it is shown. When a quick line is
+// idle, held contents are fetched ahead.
 (() => {
   const FOLDER = "contents/";
   const TRIES = 4;
@@ -12,8 +12,8 @@
   const ASIDE_MS = 8000; // longest time for which the first screen waits until the address's screen is shown
   const MEASURED_BYTES = 30000; // least size of a content that tells the line's rate
   const SHOWN_MS = 20000;
-  const SLOW_B_PER_MS = 500; // rate of the last bytes below which coarse copies come first
-  const COARSE = "Coarse until all has arrived.";
+  const SLOW_B_PER_MS = 500; // rate of the last bytes below which coarse copies come first, and nothing ahead
+  const COARSE = "A coarse surface, until the whole one has arrived.";
   const LOST = "A part of the picture did not arrive: reload the page.";
   const ARRAYS = {
     "": Uint8Array, "|u1": Uint8Array, "|i1": Int8Array, "<u2": Uint16Array, "<i2": Int16Array, "<f2": Uint16Array,
@@ -57,9 +57,9 @@
   async function fetched(name, ahead) {
     for (let tried = 1; ; tried++) {
       try {
-        const began = performance.now();
         const answer = await fetch(new URL(FOLDER + name, document.baseURI), {priority: ahead ? "low" : "high"});
         if (answer.ok) {
+          const began = performance.now(); // the server may have packed it until now
           const packed = await answer.arrayBuffer(), size = Number(answer.headers.get("Content-Length"));
           if (size > MEASURED_BYTES) bytesPerMs = size / Math.max(performance.now() - began, 1);
           return packetmeshUnpack(new Uint8Array(packed));
@@ -77,12 +77,13 @@
     return loading.get(name);
   }
 
+  const isSlow = () => bytesPerMs < SLOW_B_PER_MS;
   const above = name => name.slice(0, name.lastIndexOf("/"));
 
   // The name to fetch for a content of a node: that of the coarse copy on a slow line, unless a mesh is there.
   function first(content, node) {
     const name = content.packetmesh;
-    if (!content.coarse || bytesPerMs >= SLOW_B_PER_MS) return name;
+    if (!content.coarse || !isSlow()) return name;
     return [...drawn].some(other => above(other) === above(node)) ? name : `${name}?coarse`;
   }
 
@@ -160,7 +161,7 @@
 
   // Fetch the next held content, and forget those that are no longer needed.
   function fetchAhead() {
-    if (waiting > 0) return;
+    if (waiting > 0 || refining.size > 0 || isSlow()) return;
     const needed = new Set([...held.values()].flatMap(found => found.flatMap(message => [...contentsOf(message)]))
       .map(([, , {packetmesh: name}]) => name));
     for (const name of loading.keys()) if (!needed.has(name)) loading.delete(name);
@@ -183,9 +184,13 @@
       for (const name of wanted.values()) loading.delete(name);
       send(messages.filter((_, row) => came[row]));
       messages.forEach((message, row) => came[row] && refine(message, named[row], wanted));
-      clearTimeout(idle);
-      idle = setTimeout(fetchAhead, IDLE_MS);
+      rest();
     });
+  }
+
+  function rest() {
+    clearTimeout(idle);
+    idle = setTimeout(fetchAhead, IDLE_MS);
   }
 
   function send(messages) {
@@ -212,6 +217,7 @@
       if (bytes === null) return void packetmesh.notice(LOST, SHOWN_MS);
       send([{type: "SceneNodeUpdateMessage", name, owner, updates: {[key]: new ARRAYS[content.dtype](bytes.slice().buffer)}}]);
       if (!refining.size) packetmesh.notice("", 0);
+      rest();
     }
   }
 

@@ -40,8 +40,10 @@ COOKIE = "packetmesh_page"
 FOLDER = "/contents/"
 """Path below which the contents are."""
 GONE = "This content is no longer there, or belongs to another browser: reload the page.\n"
-FEWEST_BYTES = 32_000
-"""Size from which a content is fetched rather than sent in its message; steps of animations are smaller."""
+FEWEST_BYTES = 4_000
+"""Size from which a content of something new is fetched rather than sent in its message."""
+FEWEST_CHANGED_BYTES = 32_000
+"""The same for what changes; steps of animations are smaller, and must not wait for a request each."""
 COARSE_BYTES = 300_000
 """Size from which a content may have a coarse copy."""
 COARSE = "coarse"
@@ -120,11 +122,14 @@ class Contents:
                 for name in self._offered.pop(browser):
                     self._forget(name)
 
-    def offer(self, page: int, data: Data) -> dict[str, object] | None:
-        """Return what a message to this page has in place of the data; None if it has the data itself."""
+    def offer(self, page: int, data: Data, of_new: bool = True) -> dict[str, object] | None:
+        """Return what a message to this page has in place of the data; None if it has the data itself.
+
+        ``of_new`` is whether the message adds something, rather than changes it.
+        """
         size = len(data) if isinstance(data, bytes) else data.nbytes
         browser = self._pages.get(page)
-        if browser is None or size < FEWEST_BYTES:
+        if browser is None or size < (FEWEST_BYTES if of_new else FEWEST_CHANGED_BYTES):
             return None
         name = self._name_of(data)
         with self._lock:

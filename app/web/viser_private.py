@@ -23,6 +23,7 @@ and whether a user could reach it.
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import functools
 from collections.abc import Awaitable, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -77,11 +78,11 @@ def remember_hints() -> None:
     setattr(AssignablePropsBase, "_prop_hints", hints)  # noqa: B010
 
 
-def replace_data(server: viser.ViserServer, replacement: Callable[[int, Any], object | None]) -> None:
-    """Send what ``replacement(number, data)`` returns in place of bytes and arrays in messages to a browser.
+def replace_data(server: viser.ViserServer, replacement: Callable[[int, Any, bool], object | None]) -> None:
+    """Send what ``replacement(number, data, of_new)`` returns in place of bytes and arrays to a browser.
 
-    None leaves the data as they are. Viser starts a browser's senders after its callbacks for connections,
-    in the same context, so that they know the browser.
+    None leaves the data as they are. ``of_new`` is whether the message adds a node or a control. Viser starts
+    a browser's senders after its callbacks for connections, in the same context, so that they know the browser.
     """
     server._websock_server.on_client_connect(
         lambda connection: _replacement.set(functools.partial(replacement, connection.client_id))
@@ -90,18 +91,26 @@ def replace_data(server: viser.ViserServer, replacement: Callable[[int, Any], ob
         setattr(infra_messages, "_prepare_for_serialization", _prepared)  # noqa: B010
 
 
-_replacement = ContextVar[Callable[[Any], object | None] | None]("replacement", default=None)
+_replacement = ContextVar[Callable[[Any, bool], object | None] | None]("replacement", default=None)
+_of_new = ContextVar[bool]("of_new", default=False)
 _prepare = infra_messages._prepare_for_serialization
 
 
 def _prepared(value: Any, annotation: object, binary_buffers: list[memoryview] | None = None) -> Any:
     """Prepare a value of a message for sending, as viser does, with its data replaced."""
     replace = _replacement.get()
-    if replace is not None and binary_buffers is not None and isinstance(value, bytes | np.ndarray):
-        replaced = replace(value)
-        if replaced is not None:
-            return replaced
-    return _prepare(value, annotation, binary_buffers)
+    if replace is None or binary_buffers is None:
+        return _prepare(value, annotation, binary_buffers)
+    if isinstance(value, bytes | np.ndarray):
+        replaced = replace(value, _of_new.get())
+        return _prepare(value, annotation, binary_buffers) if replaced is None else replaced
+    if not dataclasses.is_dataclass(value):
+        return _prepare(value, annotation, binary_buffers)
+    token = _of_new.set(True)  # only messages that add something have their properties in a record
+    try:
+        return _prepare(value, annotation, binary_buffers)
+    finally:
+        _of_new.reset(token)
 
 
 def _on_loop() -> bool:

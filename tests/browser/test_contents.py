@@ -275,7 +275,7 @@ def test_on_a_slow_line_the_coarse_copy_comes_first_and_then_the_whole(slow):
         ["SceneNodeUpdateMessage", {"glb_data": "first"}],
     ]
     assert slow.line.asked == ["a?coarse", "a"]
-    assert slow.evaluate("notices") == ["Coarse until all has arrived.", ""]
+    assert slow.evaluate("notices") == ["A coarse surface, until the whole one has arrived.", ""]
 
 
 def test_where_a_mesh_is_there_the_next_one_comes_whole(slow):
@@ -303,6 +303,13 @@ def test_a_mesh_that_is_removed_is_not_refined(slow):
         "SetSceneNodeVisibilityMessage",
         "RemoveSceneNodeMessage",
     ]
+
+
+def test_on_a_slow_line_nothing_is_fetched_ahead(slow):
+    send(slow, visible("/fuse", False), create("/fuse/mesh", "a"), create("/mesh", "b"))
+    seen(slow, 2)
+    slow.wait_for_timeout(3500)
+    assert slow.line.asked == ["b"]
 
 
 def test_on_a_quick_line_the_whole_comes_at_once(page):

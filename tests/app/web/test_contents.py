@@ -19,6 +19,7 @@ from app.web import contents as module
 from app.web.contents import (
     COOKIE,
     FEWEST_BYTES,
+    FEWEST_CHANGED_BYTES,
     FOLDER,
     GONE,
     Contents,
@@ -76,7 +77,7 @@ class Listener(Connection):
         super().__init__(*arguments)
 
     def _take_message(self, message):
-        for key, value in message.get("props", {}).items():
+        for key, value in (message.get("props") or message.get("updates") or {}).items():
             if key in ("glb_data", "points"):
                 self.named[message["name"], key] = value
         super()._take_message(message)
@@ -211,6 +212,28 @@ def test_a_browser_keeps_its_newest_contents(monkeypatch):
     assert not contents._known
     assert not contents._names
     assert contents.offer(1, datas[1]) is None
+
+
+def test_small_changes_stay_in_their_messages():
+    contents = Contents(PACKING)
+    contents.opened(1, HERS)
+    assert contents.offer(1, bytes(FEWEST_BYTES)) is not None
+    assert contents.offer(1, bytes(FEWEST_CHANGED_BYTES - 1), of_new=False) is None
+    assert contents.offer(1, bytes(FEWEST_CHANGED_BYTES), of_new=False) is not None
+
+
+def test_the_server_tells_what_is_new_from_what_changes(served):
+    server, _ = served
+    with page(server, HERS) as one:
+        handle = server.scene.add_point_cloud(
+            "/cloud", POINTS[:1000], np.zeros(3, np.uint8), precision="float32"
+        )
+        wait_for(lambda: len(one.named) == 1)
+        assert "packetmesh" in one.named["/cloud", "points"]
+        handle.points = POINTS[1000:2000]
+        wait_for(lambda: "__binary_index" in one.named["/cloud", "points"])
+        handle.points = POINTS
+        wait_for(lambda: "packetmesh" in one.named["/cloud", "points"])
 
 
 def test_equal_bytes_of_another_kind_have_another_name():
