@@ -33,7 +33,8 @@ def bench(
             and method.
         recording: Follow the camera of a recording instead, by ours and by other programs: a folder of TUM,
             7-Scenes or another form that has poses, which are the truth and no program gets.
-        load_s: Duration of the cases `load` and `soak`, which run thirty browsers, in seconds.
+        load_s: Duration of the cases `load` and `soak`, which run thirty browsers, in seconds; `load` then
+            lets thirty look at one surface behind a line of 20 Mbit/s, which takes some minutes.
         json: Print the results as one JSON object.
     """
     from lab.benchmarks import CASES, run_benchmarks
@@ -95,15 +96,17 @@ def _browsers(kind: Literal["load", "soak"], seconds: float) -> Benchmark:
     """Run the load test of thirty browsers; its time is the median from a click to its answer, NaN if none
     was answered.
     """
+    from app.load.classroom import hold_lesson
     from app.load.load import put_load, soak
     from lab.benchmarks.benchmark import Benchmark
 
     load = put_load(seconds) if kind == "load" else soak(seconds)
     record = load.record()
+    lessons = [hold_lesson(by_name) for by_name in (True, False)] if kind == "load" else []
     return Benchmark(
         record["answers_s"].get("median", math.nan),
         {},
         record["server_peak_bytes"] + record["workers_peak_bytes"],
-        runs=(record,),
-        notes=load.notes(),
+        runs=(record, *(lesson.record() for lesson in lessons)),
+        notes=(*load.notes(), *(lesson.note() for lesson in lessons)),
     )

@@ -51,6 +51,7 @@ class Connection:
             subprotocols=[f"viser-v{viser.__version__}"],  # type: ignore[list-item]
             additional_headers={"Cookie": cookie} if cookie else {},
             max_size=None,
+            ping_interval=None,  # browsers send none, and on a slow line the answer may take long
         )
         self.uuids: dict[str, list[str]] = {}
         self.commands: dict[str, str] = {}

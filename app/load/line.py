@@ -1,4 +1,4 @@
-"""A line of limited rate in front of a server, which many browsers share, as at a classroom's access point."""
+"""A line of limited rate in front of a server, which many browsers share, as behind an access point."""
 
 from __future__ import annotations
 

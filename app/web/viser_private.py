@@ -82,7 +82,7 @@ def replace_data(server: viser.ViserServer, replacement: Callable[[int, Any, boo
     """Send what ``replacement(number, data, of_new)`` returns in place of bytes and arrays to a browser.
 
     None leaves the data as they are. ``of_new`` is whether the message adds a node or a control. Viser starts
-    a browser's senders after its callbacks for connections, in the same context, so that they know the browser.
+    a browser's senders after its callbacks for connections, in the same context; so they know the browser.
     """
     server._websock_server.on_client_connect(
         lambda connection: _replacement.set(functools.partial(replacement, connection.client_id))

@@ -1,0 +1,142 @@
+"""A line of limited rate, and a class behind it."""
+
+import contextlib
+import http.client
+import socket
+import threading
+import time
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from urllib.parse import urlsplit
+
+import pytest
+
+from app.load import classroom
+from app.load.classroom import ClassPage, Lesson
+from app.load.line import BURST_S, line
+from app.web.contents import FOLDER
+
+SIZE = 300_000
+
+
+class Sender(BaseHTTPRequestHandler):
+    def do_GET(self):
+        self.send_response(200)
+        self.send_header("Content-Length", str(SIZE))
+        self.end_headers()
+        self.wfile.write(bytes(SIZE))
+
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture(scope="module")
+def sender():
+    with ThreadingHTTPServer(("127.0.0.1", 0), Sender) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+def get(url):
+    there = urlsplit(url)
+    with contextlib.closing(http.client.HTTPConnection(there.hostname, there.port)) as one:
+        one.request("GET", "/")
+        return one.getresponse().read()
+
+
+@pytest.mark.parametrize("browsers", [1, 4])
+def test_all_together_get_no_more_than_the_rate(sender, browsers):
+    bits_per_s = 8e6
+    with line(sender, bits_per_s) as shared:
+        began_s, found = time.monotonic(), []
+        threads = [threading.Thread(target=lambda: found.append(get(shared.url))) for _ in range(browsers)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        spent_s = time.monotonic() - began_s
+        assert [len(body) for body in found] == [SIZE] * browsers
+        assert browsers * SIZE <= shared.bytes_down < browsers * (SIZE + 1000)
+        assert 0 < shared.bytes_up < browsers * 1000
+        assert spent_s >= 8 * browsers * SIZE / bits_per_s - BURST_S
+
+
+def test_a_line_to_nowhere_ends_its_connections():
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        nowhere = f"http://127.0.0.1:{free.getsockname()[1]}"
+    with line(nowhere, 1e6) as shared, pytest.raises((http.client.HTTPException, OSError)):
+        get(shared.url)
+
+
+class Answers(ClassPage):
+    """A page whose server is a list."""
+
+    def __init__(self):
+        self.asked = []
+        self._hidden, self._held = set(), {}
+        self.coarse_s, self.whole_s = {}, {}
+        self._fetching = classroom.ThreadPoolExecutor(1)
+
+    def _get(self, path):
+        self.asked.append(path.removeprefix(FOLDER))
+        return b""
+
+    def take(self, *messages):
+        for message in messages:
+            self._take_message(message)
+        self._fetching.submit(int).result()
+
+
+def mesh(name, content, coarse=True):
+    data = {"packetmesh": content, "coarse": coarse}
+    return {"type": "GlbMessage", "name": name, "props": {"glb_data": data, "scale": 1.0}}
+
+
+def visible(name, shown):
+    return {"type": "SetSceneNodeVisibilityMessage", "name": name, "visible": shown}
+
+
+def test_a_page_fetches_what_is_shown_and_the_first_surface_coarse_first():
+    page = Answers()
+    first, second = classroom.MESHES + "1", classroom.MESHES + "2"
+    page.take(visible("/surface", False), mesh(first, "a"), mesh("/scene/x", "b", coarse=False))
+    assert page.asked == ["b"]
+    page.take(visible("/surface", True))
+    assert page.asked == ["b", "a?coarse", "a"]
+    assert page.coarse_s[first] <= page.whole_s[first]
+    page.take(mesh(second, "c"))
+    assert page.asked[3:] == ["c"]
+    removal = {"type": "RemoveSceneNodeMessage", "name": "/fuse/x"}
+    page.take(visible("/fuse", False), mesh("/fuse/x", "d"), removal)
+    page.take(visible("/fuse", True))
+    assert page.asked[4:] == []
+
+
+def test_a_page_whose_data_are_in_the_messages_has_its_surface_with_them():
+    page = Answers()
+    page.take({"type": "GlbMessage", "name": classroom.MESHES + "1", "props": {"glb_data": b"mesh"}})
+    assert page.asked == []
+    assert list(page.whole_s) == list(page.coarse_s) == [classroom.MESHES + "1"]
+
+
+def test_the_figures_of_a_lesson():
+    lesson = Lesson(True, 700_000, 600_000.0, (1.0, 2.0), (5.0, 7.0), 500_000.0, (1.5, 1.7))
+    assert lesson.record()["whole_s"] == {"median": 6.0, "p95": pytest.approx(6.9)}
+    assert "coarse 1.5 s, 95 % 1.9, whole 6.0 s" in lesson.note()
+    assert "0.60 MB each" in lesson.note()
+
+
+def test_a_class_on_the_running_app(monkeypatch):
+    """Two pages, a quick line, the smallest scene: all that is timed comes."""
+    monkeypatch.setattr(classroom, "BROWSERS", 2)
+    monkeypatch.setattr(classroom, "SCENE", "box-on-table")
+    monkeypatch.setattr(classroom, "BITS_PER_S", 400e6)
+    by_name, in_messages = (classroom.hold_lesson(by_name) for by_name in (True, False))
+    assert by_name.first_bytes < in_messages.first_bytes + 1_000_000  # what is hidden came before
+    assert by_name.drag_bytes < 0.6 * in_messages.drag_bytes
+    for lesson in (by_name, in_messages):
+        assert len(lesson.coarse_s) == len(lesson.whole_s) == 2
+        assert len(lesson.drags_s) == 4
+        assert min(lesson.drags_s) > 0.0
+        assert all(coarse <= whole for coarse, whole in zip(lesson.coarse_s, lesson.whole_s, strict=True))
