@@ -55,19 +55,27 @@ class File:
         """The content, compressed with gzip."""
         return gzip.compress(self.content)
 
-    def response(self, accepted: str, cookies: str) -> Response:
-        """Return the response to a browser that accepts these encodings and sends these cookies."""
-        packed = "gzip" in accepted
-        body = self.packed if packed else self.content
+    @cached_property
+    def mark(self) -> str:
+        """The content's entity tag."""
+        return f'"{hashlib.sha256(self.content).hexdigest()[:24]}"'
+
+    def response(self, request: Mapping[str, str]) -> Response:
+        """Return the response to a request with these headers; without the content if the browser has it."""
         headers = Headers()
+        headers["ETag"] = self.mark
+        headers["Cache-Control"] = "public, max-age=31536000, immutable" if self.kept else "no-cache"
+        cookie = "" if self.kept else page_cookie(request.get("Cookie", ""))
+        if cookie:
+            headers["Set-Cookie"] = cookie
+        if request.get("If-None-Match", "").removeprefix("W/") == self.mark:
+            return Response(http.HTTPStatus.NOT_MODIFIED, "Not Modified", headers, b"")
+        packed = "gzip" in request.get("Accept-Encoding", "")
+        body = self.packed if packed else self.content
         headers["Content-Type"] = self.kind
         headers["Content-Length"] = str(len(body))
         headers["Content-Encoding"] = "gzip" if packed else "identity"
         headers["Vary"] = "Accept-Encoding"
-        headers["Cache-Control"] = "public, max-age=31536000, immutable" if self.kept else "no-cache"
-        cookie = "" if self.kept else page_cookie(cookies)
-        if cookie:
-            headers["Set-Cookie"] = cookie
         return Response(http.HTTPStatus.OK, "OK", headers, body)
 
 
@@ -118,8 +126,7 @@ class Page:
             found = self._greetings.get(path) or self._files.get(path.partition("?")[0])
             if found is None or "Upgrade" in request.headers:
                 return answer(connection, request)
-            sent = request.headers
-            return found.response(sent.get("Accept-Encoding", ""), sent.get("Cookie", ""))
+            return found.response(request.headers)
 
         return answered
 

@@ -34,9 +34,9 @@ def port():
     server.stop()
 
 
-def fetch(port, path, encoding="gzip"):
+def fetch(port, path, encoding="gzip", **headers):
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
-    connection.request("GET", path, headers={"Accept-Encoding": encoding})
+    connection.request("GET", path, headers={"Accept-Encoding": encoding, **headers})
     answer = connection.getresponse()
     body = answer.read()
     connection.close()
@@ -72,6 +72,18 @@ def test_the_page_has_its_title_and_the_apps_own_files_from_the_first_byte(port)
     here = Path(app.landing.__file__).parent
     parts = {*here.rglob("*.js"), *here.rglob("*.css")} - {*(here / "reports").iterdir()}
     assert parts == {*SCRIPTS, *STYLES}
+
+
+def test_a_browser_that_has_the_page_gets_it_once(port):
+    first, page = fetch(port, "/?scene")
+    assert first.getheader("Set-Cookie").startswith("packetmesh_page=")
+    for name in (first.getheader("ETag"), f"W/{first.getheader('ETag')}"):  # a proxy that packs makes it weak
+        again, nothing = fetch(port, "/?scene", **{"If-None-Match": name})
+        assert (again.status, nothing) == (304, b"")
+        assert again.getheader("ETag") == first.getheader("ETag")
+        assert "Set-Cookie" in again.headers
+    other, same = fetch(port, "/?scene", **{"If-None-Match": fetch(port, "/")[0].getheader("ETag")})
+    assert (other.status, same) == (200, page)
 
 
 def test_browsers_keep_the_files_by_their_content_and_ask_for_the_page_again(port):
