@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.kernels.fans import walked
 from pipeline.types import FloatArray, IntArray
 
 _BITS = 10
@@ -32,8 +33,12 @@ def lowest_first(triangles: IntArray) -> IntArray:
 
 
 def reordered(places: FloatArray | IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
-    """Return (V,) rows of the vertices along a curve, and the (F, 3) triangles of those, sorted."""
-    order = curve_order(places)
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
-    return order, lowest_first(place[triangles.reshape(-1, 3)])
+    """Return (V,) rows of the vertices in the order of a walk, and the (F, 3) triangles of those.
+
+    The walk over the mesh begins each piece at its first vertex along a curve.
+    """
+    along = curve_order(places)
+    place = np.empty_like(along)
+    place[along] = np.arange(len(along))
+    order, faces = walked(place[triangles.reshape(-1, 3)], len(along))
+    return along[order], faces

@@ -71,10 +71,18 @@ window.packetmeshUnpack = (() => {
       packed: 3 * rows * size,
       unpacked: 3 * rows * size,
       write(bytes, view, at) {
-        const next = columnsOf(bytes, rows, size), first = summed(next());
-        first.forEach((value, row) => put(view, at + 3 * row * size, size, value));
-        for (const column of [1, 2])
-          next().forEach((value, row) => put(view, at + (3 * row + column) * size, size, first[row] + value));
+        const next = columnsOf(bytes, rows, size), columns = [next(), next(), next()], wrap = 2 ** (8 * size);
+        const within = value => ((value % wrap) + wrap) % wrap;
+        let [a, b, c, greatest, last] = [0, 0, 0, -1, -1];
+        for (let row = 0; row < rows; row++) {
+          a = within(a + columns[0][row]);
+          const following = Math.max(greatest, a) + 1;
+          b = within((a === last ? c : following) - columns[1][row]);
+          c = within(Math.max(following, b + 1) - columns[2][row]);
+          greatest = Math.max(following - 1, b, c);
+          last = a;
+          [a, b, c].forEach((value, column) => put(view, at + (3 * row + column) * size, size, value));
+        }
       },
     }),
     colors: rows => ({

@@ -7,8 +7,10 @@ part. Unpacked, the parts follow each other without a gap. A part is one of
 - ``["rows", n, columns, bytes, stride]``: n rows of little-endian integers of 1, 2 or 4 bytes, a row every
   ``stride`` bytes (zeros fill it up), as differences to the row before;
 - ``["grid", n, columns, bits]``: rows of 32-bit floats, each an integer over 2^bits, as differences of those;
-- ``["triangles", n, bytes]``: rows of three indices, as differences: the first to the one above, the others
-  to the first;
+- ``["triangles", n, bytes]``: rows of three indices. With N one more than the greatest index above and the
+  row's first: the first as difference to the one above, the second as what it is less than the last above,
+  or than N if the first is another than above, the last as what it is less than N, or one more than the
+  second if that is greater. In the order of a walk (``ordering.py``) nearly all are 0 or 1;
 - ``["colors", n]``: rows of RGB bytes: green, red - green, blue - green, as differences to the row before;
 - ``["light", n]``: rows of linear RGB and opacity 1 of 16 bits, which are sRGB bytes packed as ``colors``.
 
@@ -94,14 +96,23 @@ def _packed_gltf(glb: bytes) -> Iterator[Part]:
 
 def _packed_accessor(numbers: NDArray[Any], stride: int | None, kind: str) -> Part:
     if stride is None:
-        rows = numbers.reshape(-1, 3).astype(np.int64)
-        first = np.vstack([np.zeros((1, 1), np.int64), rows[:, :1]])
-        columns = np.hstack([first[1:] - first[:-1], rows[:, 1:] - rows[:, :1]])
-        return ["triangles", len(rows), numbers.itemsize], _planes(_zigzag(columns, numbers.itemsize))
+        return ["triangles", len(numbers) // 3, numbers.itemsize], _triangle_planes(numbers.reshape(-1, 3))
     if kind == "COLOR_0":
         return ["light", len(numbers)], _color_planes(_SHADE[numbers[:, :3]])
     described, planes = _rows(np.ascontiguousarray(numbers).view(f"<u{numbers.itemsize}"))
     return [*described[:-1], stride], planes
+
+
+def _triangle_planes(triangles: NDArray[np.unsignedinteger]) -> bytes:
+    a, b, c = triangles.astype(np.int64).T
+    above = np.concatenate([np.zeros((1, 3), np.int64), triangles[:-1].astype(np.int64)])[: len(triangles)]
+    greatest = np.concatenate([[-1], np.maximum.accumulate(triangles.max(axis=1).astype(np.int64))[:-1]])
+    following = np.maximum(greatest, a) + 1
+    same = a == above[:, 0]
+    same[:1] = False
+    expected = np.where(same, above[:, 2], following)
+    columns = np.column_stack([a - above[:, 0], expected - b, np.maximum(following, b + 1) - c])
+    return _planes(_zigzag(columns, triangles.itemsize))
 
 
 def _raw(data: bytes) -> Part:

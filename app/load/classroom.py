@@ -13,6 +13,7 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from math import nan
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -111,6 +112,8 @@ class Lesson:
     """What a class waited for; times in seconds from the moment at which all wanted it."""
 
     by_name: bool
+    lost: int
+    """Number of pages whose connection the server ended before the first surface was asked for."""
     page_bytes: int
     """Bytes of the page itself, which browsers keep."""
     first_bytes: float
@@ -127,6 +130,7 @@ class Lesson:
         spreads = {"coarse_s": self.coarse_s, "whole_s": self.whole_s, "drags_s": self.drags_s}
         return {
             "by_name": self.by_name,
+            "lost": self.lost,
             "page_bytes": self.page_bytes,
             "first_bytes": self.first_bytes,
             "drag_bytes": self.drag_bytes,
@@ -145,7 +149,7 @@ class Lesson:
         ]
         return (
             f"{BROWSERS} pages behind {BITS_PER_S / 1e6:.0f} Mbit/s, "
-            f"{'contents by name' if self.by_name else 'contents in messages'}: first surface "
+            f"{'contents by name' if self.by_name else 'contents in messages'}, {self.lost} lost: first surface "
             f"{', '.join(parts)}; {self.first_bytes / 1e6:.2f} MB each until it was whole (and the page's "
             f"{self.page_bytes / 1e6:.2f}), {self.drag_bytes / 1e6:.2f} MB a drag"
         )
@@ -158,8 +162,11 @@ def hold_lesson(by_name: bool) -> Lesson:
             stack.enter_context(contextlib.closing(ClassPage(shared.url, number, by_name)))
             for number in range(BROWSERS)
         ]
-        wait_for(lambda: all(page.mark("Surface") for page in pages), PATIENCE_S)
+        wait_for(lambda: all(page.lost or page.mark("Surface") for page in pages), PATIENCE_S)
         _quiet(shared)
+        pages = [page for page in pages if not page.lost]
+        if not pages:
+            return Lesson(by_name, BROWSERS, 0, nan, (nan,), (nan,), nan, (nan,))
         page_bytes, before = pages[0].page_bytes(), shared.bytes_down
         asked_s = time.monotonic()
         for page in pages:
@@ -167,14 +174,23 @@ def hold_lesson(by_name: bool) -> Lesson:
         wait_for(lambda: all(_meshes(page.whole_s) for page in pages), PATIENCE_S)
         coarse_s = tuple(min(_meshes(page.coarse_s)) - asked_s for page in pages)
         whole_s = tuple(min(_meshes(page.whole_s)) - asked_s for page in pages)
-        first_bytes = (shared.bytes_down - before) / BROWSERS
+        first_bytes = (shared.bytes_down - before) / len(pages)
         _quiet(shared)
         before, drags_s = shared.bytes_down, list[float]()
         for radius_mm in RADII_MM:
             drags_s += _drag(pages, radius_mm)
             _quiet(shared)
-        drag_bytes = (shared.bytes_down - before) / BROWSERS / len(RADII_MM)
-        return Lesson(by_name, page_bytes, first_bytes, coarse_s, whole_s, drag_bytes, tuple(drags_s))
+        drag_bytes = (shared.bytes_down - before) / len(pages) / len(RADII_MM)
+        return Lesson(
+            by_name,
+            BROWSERS - len(pages),
+            page_bytes,
+            first_bytes,
+            coarse_s,
+            whole_s,
+            drag_bytes,
+            tuple(drags_s),
+        )
 
 
 def _drag(pages: list[ClassPage], radius_mm: float) -> list[float]:

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.drawing.ordering import reordered
+from app.drawing.ordering import curve_order, lowest_first
 from pipeline.kernels.open3d_runtime import o3d
 from pipeline.types import ByteArray, FloatArray, IntArray, Surface
 
@@ -54,7 +54,10 @@ def pack(mesh: Surface, box: Box) -> bytes:
     used, triangles = np.unique(mesh.triangles, return_inverse=True)
     steps = np.rint((mesh.vertices_m[used] - box.low_m) / box.step_m).astype(np.int64).reshape(-1, 3)
     colors = np.zeros((len(used), 3), np.uint8) if mesh.colors is None else mesh.colors[used]
-    order, faces = reordered(steps, triangles)
+    order = curve_order(steps)
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    faces = lowest_first(place[triangles.reshape(-1, 3)])
     low = faces[:, :1]
     columns = np.hstack([np.diff(low, axis=0, prepend=0), faces[:, 1:] - low])
     parts = (

@@ -121,10 +121,11 @@ def test_a_page_whose_data_are_in_the_messages_has_its_surface_with_them():
 
 
 def test_the_figures_of_a_lesson():
-    lesson = Lesson(True, 700_000, 600_000.0, (1.0, 2.0), (5.0, 7.0), 500_000.0, (1.5, 1.7))
+    lesson = Lesson(True, 3, 700_000, 600_000.0, (1.0, 2.0), (5.0, 7.0), 500_000.0, (1.5, 1.7))
     assert lesson.record()["whole_s"] == {"median": 6.0, "p95": pytest.approx(6.9)}
     assert "coarse 1.5 s, 95 % 1.9, whole 6.0 s" in lesson.note()
     assert "0.60 MB each" in lesson.note()
+    assert "by name, 3 lost:" in lesson.note()
 
 
 def test_a_class_on_the_running_app(monkeypatch):
