@@ -149,9 +149,9 @@ class Lesson:
         ]
         return (
             f"{BROWSERS} pages behind {BITS_PER_S / 1e6:.0f} Mbit/s, "
-            f"{'contents by name' if self.by_name else 'contents in messages'}, {self.lost} lost: first surface "
-            f"{', '.join(parts)}; {self.first_bytes / 1e6:.2f} MB each until it was whole (and the page's "
-            f"{self.page_bytes / 1e6:.2f}), {self.drag_bytes / 1e6:.2f} MB a drag"
+            f"{'contents by name' if self.by_name else 'contents in messages'}, {self.lost} lost: "
+            f"first surface {', '.join(parts)}; {self.first_bytes / 1e6:.2f} MB each until it was whole "
+            f"(and the page's {self.page_bytes / 1e6:.2f}), {self.drag_bytes / 1e6:.2f} MB a drag"
         )
 
 
