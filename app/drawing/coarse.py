@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from app.drawing.glb import LINEAR, Parts, mesh_glb
-from app.drawing.ordering import lowest_first
+from app.drawing.glb import LINEAR, Parts, in_this_order
+from app.drawing.ordering import curve_order, lowest_first
 from pipeline.types import ByteArray
 
 CELLS = 48
@@ -33,7 +33,9 @@ def coarse_glb(glb: Any) -> bytes:
     whole = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
     node = parts.head["nodes"][0]
     vertices_m = places[first] * np.array(node.get("scale", [1.0] * 3)) + node.get("translation", [0.0] * 3)
-    return mesh_glb(vertices_m, np.unique(lowest_first(whole), axis=0), _colors(parts)[first])
+    order = curve_order(vertices_m)
+    faces = np.unique(lowest_first(np.argsort(order)[whole]), axis=0)
+    return in_this_order(vertices_m[order], faces, _colors(parts)[first[order]])
 
 
 def is_mesh(data: object) -> bool:

@@ -37,8 +37,13 @@ def mesh_glb(vertices_m: FloatArray, triangles: IntArray, colors: ByteArray) -> 
     if not len(triangles):
         return b""
     order, faces = reordered(vertices_m, triangles)
-    places = Places.of(vertices_m[order])
-    return _glb(_TRIANGLES, places, {"COLOR_0": _light(colors[order])}, indices=_indices(faces, len(order)))
+    return in_this_order(vertices_m[order], faces, colors[order])
+
+
+def in_this_order(vertices_m: FloatArray, triangles: IntArray, colors: ByteArray) -> bytes:
+    """Return what ``mesh_glb`` returns, with vertices and triangles in their order; F is at least 1."""
+    indices = _indices(triangles, len(vertices_m))
+    return _glb(_TRIANGLES, Places.of(vertices_m), {"COLOR_0": _light(colors)}, indices=indices)
 
 
 def textured_glb(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.kernels.fans import walked
 from pipeline.types import FloatArray, IntArray
 
 _BITS = 10
@@ -37,6 +36,8 @@ def reordered(places: FloatArray | IntArray, triangles: IntArray) -> tuple[IntAr
 
     The walk over the mesh begins each piece at its first vertex along a curve.
     """
+    from pipeline.kernels.fans import walked  # loads numba, which the serving process does without
+
     along = curve_order(places)
     place = np.empty_like(along)
     place[along] = np.arange(len(along))
