@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 import sys
+from functools import partial
 from pathlib import Path
 
+from lab.between_cameras.control import control
 from lab.between_cameras.rigs import room_seeds
 from lab.between_cameras.tables import lines
-from lab.between_cameras.trials import POSES, Row, Task, judged
+from lab.between_cameras.trials import POSES, RIGHT, Row, Task, judged
 from lab.trials import iterate_trials
 from packetmesh.progress import drain
 from pipeline.io.demos import CALIBRATED_SCENES
@@ -24,7 +26,9 @@ def main() -> None:
     options = parser.parse_args()
     rigs = [*CALIBRATED_SCENES, *(f"room-{seed}" for seed in room_seeds(options.split, options.rooms))]
     tasks = [Task(rig, poses) for rig in rigs for poses in POSES]
-    found = drain(iterate_trials("between cameras", judged, tasks, options.out, processes=options.processes))
+    right = [task for task in tasks if task.poses == RIGHT]
+    run = partial(iterate_trials, folder=options.out, processes=options.processes)
+    found = drain(run("between cameras", judged, tasks)) + drain(run("random tiles", control, right))
     rows: list[Row] = [row for rows_of_task in found for row in rows_of_task]
     for line in lines(rows):
         sys.stdout.write(f"{line}\n")

@@ -31,8 +31,8 @@ def lines(rows: Sequence[Row]) -> Iterator[str]:
             whole = {row["rig"]: row for row in some if (row["poses"], row["method"]) == (poses, ALL_TILES)}
             yield f"    {ALL_TILES}: " + "; ".join(_levels(whole.values()))
             for method in dict.fromkeys(str(row["method"]) for row in some):
-                if method != ALL_TILES:
-                    chosen = [row for row in some if (row["poses"], row["method"]) == (poses, method)]
+                chosen = [row for row in some if (row["poses"], row["method"]) == (poses, method)]
+                if chosen and method != ALL_TILES:
                     yield f"    {method}: " + "; ".join([*_saved(chosen), *_gained(chosen, whole)])
 
 
