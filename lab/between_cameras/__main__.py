@@ -17,7 +17,7 @@ from pipeline.io.demos import CALIBRATED_SCENES
 
 
 def main() -> None:
-    """Print the table of the demo rooms and of held-out rooms; about two minutes a rig and core."""
+    """Print the table of the demo rooms and of held-out rooms; about two minutes a rig on one core."""
     parser = argparse.ArgumentParser(prog="python -m lab.between_cameras", description=__doc__)
     parser.add_argument("--rooms", type=int, default=20, help="number of held-out rooms")
     parser.add_argument("--split", default="test", choices=("validation", "test"), help="split of the rooms")

@@ -206,7 +206,7 @@ def meshes(rig: Rig, frames: Sequence[RgbdFrame], poses: Sequence[FloatArray], w
         if way == "chain":
             placement = drain(compute(spec, "placement", cache)).value
             values["placed_cameras"] = float(len(placement.placed(rig.frames)))
-            values["camera_error_m"] = _camera_error_m(rig, placement.T_world_camera)
+            values["camera_error_m"] = camera_error_m(rig, placement.T_world_camera)
         else:
             placement = Placement((), tuple(frame.T_world_camera for frame in rig.frames))
         fused = drain(STAGES["fused"](*NEEDS["fused"].settings(spec), arrived, nodes, placement))
@@ -233,13 +233,13 @@ def trial(task: Task, methods: dict[str, Method], ways: Iterable[Way]) -> list[R
     for name, method in {ALL_TILES: Method(lambda *_: nothing, lambda *_: 0), **methods}.items():
         masks = method.masks(rig, poses)
         row: Row = {"rig": task.rig, "poses": task.poses, "method": name}
-        row["believed_error_m"] = _camera_error_m(rig, poses)
+        row["believed_error_m"] = camera_error_m(rig, poses)
         row["told_bytes"] = float(method.told_bytes(task.rig, masks))
         rows.append(row | saved(task.rig, masks) | meshes(rig, frames_sent(rig, masks), poses, ways))
     return rows
 
 
-def _camera_error_m(rig: Rig, poses: Sequence[FloatArray]) -> float:
+def camera_error_m(rig: Rig, poses: Sequence[FloatArray]) -> float:
     """Return the mean distance of all cameras but the first from their true places."""
     pairs = zip(poses, rig.frames, strict=True)
     return float(np.mean([np.linalg.norm((T - frame.T_world_camera)[:3, 3]) for T, frame in pairs][1:]))

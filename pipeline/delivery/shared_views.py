@@ -45,7 +45,7 @@ class Limits:
 
 
 STRICT = Limits(sigmas=2.0, least_share=0.5, missing_blocks=0, edge_blocks=0, shared=1.0)
-"""Limits for tiles all of which is replaced, on smooth surfaces only; they save half as much."""
+"""Limits for tiles all of which is replaced, on smooth surfaces only; they save 40 to 55 % as many bytes."""
 
 
 @dataclass(frozen=True, slots=True)
