@@ -70,7 +70,7 @@ def two_poses(
         middle_m = float(np.median(seen.t))
         for _ in range(PROPOSALS):
             T_source = _proposal(scene, T_target, middle_m, overlap, rng, renderer)
-            if not _is_free(caster, T_target, T_source):
+            if not is_free(caster, T_target, T_source):
                 continue
             other = meter.look(T_source)
             if not is_usable(other):
@@ -122,7 +122,7 @@ def _proposal(
     return T
 
 
-def _is_free(caster: RayCaster, T_first: FloatArray, T_second: FloatArray) -> bool:
+def is_free(caster: RayCaster, T_first: FloatArray, T_second: FloatArray) -> bool:
     """Return whether nothing is between two cameras, so that neither is in an object or outside the room."""
     way_m = T_second[:3, 3] - T_first[:3, 3]
     length_m = float(np.linalg.norm(way_m))

@@ -89,10 +89,15 @@ def render_demo_boards(name: str) -> BoardViews | None:
     return render_boards(DEMO_SCENES[name].seed) if name == UNCALIBRATED else None
 
 
-def disturbed(T_world_camera: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return a pose turned by ``POSE_ERROR_RAD`` and shifted by ``POSE_ERROR_M``, in random directions."""
+def disturbed(
+    T_world_camera: FloatArray,
+    rng: np.random.Generator,
+    turn_rad: float = POSE_ERROR_RAD,
+    shift_m: float = POSE_ERROR_M,
+) -> FloatArray:
+    """Return a pose turned by ``turn_rad`` and shifted by ``shift_m``, in random directions."""
     axis, way = (v / np.linalg.norm(v) for v in rng.standard_normal((2, 3)))
     T = T_world_camera.copy()
-    T[:3, :3] = T[:3, :3] @ rotation_exp(POSE_ERROR_RAD * axis)
-    T[:3, 3] += POSE_ERROR_M * way
+    T[:3, :3] = T[:3, :3] @ rotation_exp(turn_rad * axis)
+    T[:3, 3] += shift_m * way
     return T

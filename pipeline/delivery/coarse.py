@@ -49,6 +49,13 @@ def write_color(rgb: ByteArray) -> bytes:
 @lru_cache(maxsize=16)
 def read_depth(stream: bytes, shape: tuple[int, int]) -> DepthArray:
     """Decode (H, W) depth, interpolated between the blocks' centres; 0 where a block has none; read-only."""
+    depth = _blended(read_blocks(stream, shape).astype(np.float32), shape)
+    depth.setflags(write=False)
+    return depth
+
+
+def read_blocks(stream: bytes, shape: tuple[int, int]) -> DepthArray:
+    """Decode one depth a block of an (H, W) image; 0 where a block has none."""
     grid_shape = (-(-shape[0] // DEPTH_BLOCK), -(-shape[1] // DEPTH_BLOCK))
     tile = _LENGTH_BYTES + int.from_bytes(stream[:_LENGTH_BYTES], "big")
     grid = np.zeros(grid_shape, np.uint16)
@@ -56,10 +63,7 @@ def read_depth(stream: bytes, shape: tuple[int, int]) -> DepthArray:
         listed = levels.read_header(stream[_LENGTH_BYTES:tile])
         values = levels.decode_tile(np.frombuffer(stream[tile:], np.uint8), listed, grid_shape)
         grid[:] = values.reshape(grid_shape)
-
-    depth = _blended(grid.astype(np.float32), shape)
-    depth.setflags(write=False)
-    return depth
+    return grid
 
 
 @lru_cache(maxsize=16)

@@ -18,7 +18,7 @@ from pipeline.types import BoolArray, ByteArray
 TILE = 32
 """Side of a depth tile in pixels."""
 _LENGTH_BYTES = 4
-_SEAL_BYTES = 1
+SEAL_BYTES = 1
 _CHECK_BYTES = 4
 
 
@@ -105,7 +105,7 @@ class Tiled:
             whole = stream.size == lengths[index]
             if whole and not _is_sealed(stream, index):
                 continue
-            tile = stream[:-_SEAL_BYTES] if whole else stream
+            tile = stream[:-SEAL_BYTES] if whole else stream
             with suppress(InputError):  # damaged, though its seal fits or is cut off
                 if index < len(areas):
                     area = areas[index]
@@ -157,7 +157,7 @@ def _sealed(tile: bytes, index: int) -> bytes:
 
 
 def _is_sealed(stream: ByteArray, index: int) -> bool:
-    return zlib.crc32(stream[:-_SEAL_BYTES].tobytes(), index) & 255 == stream[-1]
+    return zlib.crc32(stream[:-SEAL_BYTES].tobytes(), index) & 255 == stream[-1]
 
 
 def _joined(parts: list[bytes]) -> bytes:

@@ -1,0 +1,34 @@
+"""The table of bytes saved and F-scores lost."""
+
+from lab.between_cameras.tables import lines
+
+
+def row(rig: str, method: str, f_score: float, share: float) -> dict[str, str | float]:
+    return {
+        "rig": rig,
+        "poses": "right",
+        "method": method,
+        "bytes": share,
+        "depth_bytes": 2 * share,
+        "tiles": share,
+        "whole_bytes": 4e5,
+        "chain_f_score_5cm": f_score,
+    }
+
+
+def test_each_rig_is_compared_with_itself_and_demo_rooms_are_apart():
+    rows = [
+        row("office", "all tiles", 0.9, 0.0),
+        row("office", "ours", 0.89, 0.3),
+        row("room-1", "all tiles", 0.8, 0.0),
+        row("room-1", "ours", 0.81, 0.1),
+        row("room-2", "all tiles", 0.5, 0.0),
+        row("room-2", "ours", 0.5, 0.2),
+    ]
+    text = list(lines(rows))
+    assert text[0] == "1 demo rooms"
+    assert "bytes saved 30.00" in text[3]
+    assert "F at 5 cm by the chain -1.00" in text[3]
+    assert text[4] == "2 random rooms"
+    assert "bytes saved 15.00 (10.00 to 20.00) %" in text[7]
+    assert "F at 5 cm by the chain +0.50 (+0.00 to +1.00), worst +0.00" in text[7]
