@@ -87,16 +87,14 @@
     return [...drawn].some(other => above(other) === above(node)) ? name : `${name}?coarse`;
   }
 
+  const typed = (bytes, {dtype}) => new ARRAYS[dtype](bytes.slice().buffer);
+
   // Put the contents into a message; false if one did not arrive.
-  async function filled(message, wanted) {
+  async function filled(found, wanted) {
     try {
-      for (const [owner, key, content] of [...contentsOf(message)]) {
-        const bytes = await load(wanted.get(content));
-        owner[key] = new ARRAYS[content.dtype](bytes.slice().buffer);
-      }
+      for (const [owner, key, content] of found) owner[key] = typed(await load(wanted.get(content)), content);
       return true;
     } catch {
-      packetmesh.notice(LOST, SHOWN_MS);
       return false;
     }
   }
@@ -178,9 +176,10 @@
     for (const name of wanted.values()) load(name).catch(() => {});
     waiting += 1;
     chain = chain.then(async () => {
-      const came = await Promise.all(messages.map((message, row) => named[row].length ? filled(message, wanted) : true));
-      waiting -= 1;
+      const came = await Promise.all(named.map(found => filled(found, wanted)));
       if (mine !== connection) return;
+      waiting -= 1;
+      if (came.includes(false)) packetmesh.notice(LOST, SHOWN_MS);
       for (const name of wanted.values()) loading.delete(name);
       send(messages.filter((_, row) => came[row]));
       messages.forEach((message, row) => came[row] && refine(message, named[row], wanted));
@@ -215,18 +214,21 @@
       if (refining.get(name) !== mine) return;
       refining.delete(name);
       if (bytes === null) return void packetmesh.notice(LOST, SHOWN_MS);
-      send([{type: "SceneNodeUpdateMessage", name, owner, updates: {[key]: new ARRAYS[content.dtype](bytes.slice().buffer)}}]);
+      send([{type: "SceneNodeUpdateMessage", name, owner, updates: {[key]: typed(bytes, content)}}]);
       if (!refining.size) packetmesh.notice("", 0);
       rest();
     }
   }
 
   function reset() {
-    connection += 1;
+    const mine = ++connection;
+    chain = Promise.resolve();
+    waiting = 0;
     for (const all of [hidden, containers, held, loading, drawn, refining]) all.clear();
     const screen = new URLSearchParams(location.search).get("screen");
     aside = screen !== null && `/${screen}` !== FIRST;
     setTimeout(() => {
+      if (mine !== connection) return;
       aside = false;
       pass(released());
     }, ASIDE_MS);

@@ -16,7 +16,6 @@ import hashlib
 import http
 import re
 import secrets
-import threading
 from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -49,12 +48,11 @@ COARSE_BYTES = 300_000
 COARSE = "coarse"
 """Query of a content's coarse copy."""
 MOST_BYTES = 64 << 20
-"""Limit of the contents that one browser may fetch; its oldest are forgotten first."""
+"""Limit of the contents that one browser may fetch."""
 REMEMBERED = 64
 """Number of contents whose names are known without computing them again."""
 _FORMAT = b"1"
 """Part of each name; another one makes browsers forget contents that were packed differently."""
-_NAME = re.compile(r"[0-9a-f]{32}")
 _NUMBER = re.compile(r"[A-Za-z0-9_-]{22}")
 
 
@@ -89,15 +87,15 @@ class Content:
 
 
 class Contents:
-    """The contents that a server offers to its browsers."""
+    """The contents that a server offers to its browsers; used on the thread of the connections only."""
 
     def __init__(self, packing: Packing) -> None:
         self._packing = packing
         self._packer = ThreadPoolExecutor(1, thread_name_prefix="contents")
-        self._lock = threading.Lock()
         self._known: dict[str, Content] = {}
-        self._offered: dict[str, OrderedDict[str, Content]] = {}
-        """Contents by name of each browser, by the number in its cookie; the oldest first."""
+        self._offered: dict[str, OrderedDict[str, bool]] = {}
+        """For each browser, by the number in its cookie: whether it has fetched each of its contents, by name,
+        the oldest first."""
         self._pages: dict[int, str] = {}
         """Number in the cookie of each page, by the number of its connection."""
         self._names: OrderedDict[int, tuple[bytes, str]] = OrderedDict()
@@ -110,17 +108,15 @@ class Contents:
         """Note a page that has opened its websocket with these cookies."""
         browser = _browser_in(cookies)
         if browser is not None:
-            with self._lock:
-                self._pages[page] = browser
-                self._offered.setdefault(browser, OrderedDict())
+            self._pages[page] = browser
+            self._offered.setdefault(browser, OrderedDict())
 
     def closed(self, page: int) -> None:
         """Forget a page, and with a browser's last page its contents."""
-        with self._lock:
-            browser = self._pages.pop(page, None)
-            if browser is not None and browser not in self._pages.values():
-                for name in self._offered.pop(browser):
-                    self._forget(name)
+        browser = self._pages.pop(page, None)
+        if browser is not None and browser not in self._pages.values():
+            for name in self._offered.pop(browser):
+                self._forget(name)
 
     def offer(self, page: int, data: Data, of_new: bool = True) -> dict[str, object] | None:
         """Return what a message to this page has in place of the data; None if it has the data itself.
@@ -132,17 +128,11 @@ class Contents:
         if browser is None or size < (FEWEST_BYTES if of_new else FEWEST_CHANGED_BYTES):
             return None
         name = self._name_of(data)
-        with self._lock:
-            offered = self._offered.get(browser)
-            if offered is None:
-                return None
-            offered[name] = self._known.setdefault(name, Content(data, size))
-            offered.move_to_end(name)
-            total = sum(one.size for one in offered.values())
-            while total > MOST_BYTES and len(offered) > 1:
-                oldest, content = offered.popitem(last=False)
-                total -= content.size
-                self._forget(oldest)
+        self._known.setdefault(name, Content(data, size))
+        offered = self._offered[browser]
+        offered[name] = False
+        offered.move_to_end(name)
+        self._limit(offered)
         kind = "" if isinstance(data, bytes) else data.dtype.str
         coarse = size >= COARSE_BYTES and self._packing.has_coarse(data)
         return {"packetmesh": name, "dtype": kind, "bytes": size, "coarse": coarse}
@@ -152,20 +142,29 @@ class Contents:
         return answering(self._answering)
 
     def _name_of(self, data: Data) -> str:
-        with self._lock:
-            known = self._names.get(id(data))
-            if known is not None and known[0] is data:
-                return known[1]
+        known = self._names.get(id(data))
+        if known is not None and known[0] is data:
+            return known[1]
         kind = b"" if isinstance(data, bytes) else repr((data.dtype.str, data.shape)).encode()
         digest = hashlib.blake2b(_FORMAT + kind, digest_size=16)
         digest.update(data if isinstance(data, bytes) else np.ascontiguousarray(data).data.cast("B"))
         name = digest.hexdigest()
         if isinstance(data, bytes):  # nobody can change it
-            with self._lock:
-                self._names[id(data)] = data, name
-                while len(self._names) > REMEMBERED:
-                    self._names.popitem(last=False)
+            self._names[id(data)] = data, name
+            while len(self._names) > REMEMBERED:
+                self._names.popitem(last=False)
         return name
+
+    def _limit(self, offered: OrderedDict[str, bool]) -> None:
+        """Forget a browser's oldest contents beyond ``MOST_BYTES``, first those that it has fetched."""
+        total = sum(self._known[name].size for name in offered)
+        newest = next(reversed(offered))
+        for name in sorted(offered, key=lambda name: not offered[name]):  # stable: the oldest stay first
+            if total <= MOST_BYTES or name == newest:
+                break
+            total -= self._known[name].size
+            del offered[name]
+            self._forget(name)
 
     def _forget(self, name: str) -> None:
         """Forget a content that no browser may fetch any more."""
@@ -180,11 +179,12 @@ class Contents:
             path, _, query = request.path.partition("?")
             if not path.startswith(FOLDER) or "Upgrade" in request.headers:
                 return answer(connection, request)
-            browser, name = _browser_in(request.headers.get("Cookie", "")), path.removeprefix(FOLDER)
-            content = self._offered.get(browser or "", {}).get(name) if _NAME.fullmatch(name) else None
-            if content is None:
+            name = path.removeprefix(FOLDER)
+            offered = self._offered.get(_browser_in(request.headers.get("Cookie", "")) or "")
+            if offered is None or name not in offered:
                 return connection.respond(http.HTTPStatus.NOT_FOUND, GONE)
-            return self._send(content, query == COARSE)
+            offered[name] |= query != COARSE
+            return self._send(self._known[name], query == COARSE)
 
         return answered
 

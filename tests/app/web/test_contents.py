@@ -208,6 +208,9 @@ def test_a_browser_keeps_its_newest_contents(monkeypatch):
     assert contents.offer(1, datas[1])["packetmesh"] == names[1]
     assert contents.offer(1, bytes(FEWEST_BYTES - 1)) is None
     assert contents.offer(2, datas[1]) is None
+    contents._offered["a" * 22][names[3]] = True  # fetched: the browser keeps it
+    contents.offer(1, datas[0])
+    assert set(contents._known) == {names[0], names[1], names[2]}
     contents.closed(1)
     assert not contents._known
     assert not contents._names
