@@ -29,7 +29,7 @@ def add_cloud(
 ) -> viser.PointCloudHandle:
     """Draw a cloud in its own colours, or in one colour shaded by its own brightness.
 
-    Points are up to 0.12 mm off, as rounded ones take half the bytes.
+    Coordinates are up to 0.12 mm off, as rounded ones take half the bytes.
     """
     handle = scene.add_point_cloud(
         name,

@@ -3,9 +3,9 @@
 All materials are unlit: the light is computed into the vertex colours beforehand. A software renderer would
 spend most of a frame on viser's lighting and its ribbon lines.
 
-Positions are 16-bit steps (``KHR_mesh_quantization``), at most 0.1 mm off; larger extents than 13 m stay
-32-bit floats. Vertices follow a curve and triangles their lowest vertex, so that ``packing.py`` finds small
-differences.
+Positions are 16-bit steps (``KHR_mesh_quantization``), at most 0.1 mm off in each coordinate; beyond extents
+of 13 m they stay 32-bit floats. Vertices and triangles follow a walk over the mesh (``ordering.py``), so that
+``packing.py`` finds small differences.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ STEP_M = 2e-4
 FEWEST_STEPS, MOST_STEPS = 1 << 14, (1 << 16) - 1
 """Steps along the longest side of the box."""
 UV_STEPS = 65535
+GENERATOR = "PacketMesh"
 _TYPES = {"<f4": 5126, "<u2": 5123, "<u4": 5125}
 _LINES, _TRIANGLES = 1, 4
 _CLAMP = 33071
@@ -106,7 +107,7 @@ class Places:
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """A binary glTF that this module wrote, taken apart."""
+    """A binary glTF, taken apart; all but ``of`` and ``is_own`` are for those that this module wrote."""
 
     head: dict[str, Any]
     body: bytes
@@ -117,6 +118,11 @@ class Parts:
         return Parts(json.loads(glb[20 : 20 + size]), glb[28 + size :])
 
     @property
+    def is_own(self) -> bool:
+        """Whether this module wrote it."""
+        return bool(self.head.get("asset", {}).get("generator") == GENERATOR)
+
+    @property
     def primitive(self) -> dict[str, Any]:
         """Its only primitive."""
         (primitive,) = self.head["meshes"][0]["primitives"]
@@ -125,7 +131,7 @@ class Parts:
     def data(self, view: int) -> bytes:
         """Return the bytes of a buffer view."""
         where = self.head["bufferViews"][view]
-        return self.body[where["byteOffset"] :][: where["byteLength"]]
+        return self.body[where["byteOffset"] : where["byteOffset"] + where["byteLength"]]
 
     def array(self, row: int) -> np.ndarray:
         """Return an accessor's numbers, (N,) or (N, columns)."""
@@ -185,7 +191,7 @@ def _glb(
         if row < len(attributes):
             views[row]["byteStride"] = array.strides[0]
     head: dict[str, Any] = {
-        "asset": {"version": "2.0"},
+        "asset": {"version": "2.0", "generator": GENERATOR},
         "extensionsUsed": [_UNLIT],
         "scene": 0,
         "scenes": [{"nodes": [0]}],

@@ -43,7 +43,7 @@ _SHADE[LINEAR] = np.arange(256)
 
 
 def rounded(points_m: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Round coordinates to the grid that packs well; they move by up to 0.12 mm."""
+    """Round coordinates to the grid that packs well; each moves by up to 0.12 mm."""
     return _of_grid(np.rint(points_m.astype(np.float64) * (1 << GRID_BITS)))
 
 
@@ -56,7 +56,7 @@ def pack(content: bytes | NDArray[Any]) -> bytes:
     """Pack an array of rows, or a file, which only gains if ``glb.py`` wrote it."""
     if isinstance(content, np.ndarray):
         parts = [_packed_array(content)]
-    elif content.startswith(b"glTF"):
+    elif content.startswith(b"glTF") and Parts.of(content).is_own:
         parts = [part for part in _packed_gltf(content) if part[1]]
     else:
         parts = [_raw(content)]

@@ -30,7 +30,7 @@ class Line:
 def line(url: str, bits_per_s: float) -> Iterator[Line]:
     """Context with a line to a server, whose browsers together get ``bits_per_s`` from it.
 
-    A token bucket (RFC 2697 with one colour): each piece waits until the line has carried those before it.
+    A token bucket: each piece waits until the line has carried those before it.
     """
     there = urlsplit(url)
     loop, ready = asyncio.new_event_loop(), threading.Event()

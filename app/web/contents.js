@@ -1,25 +1,28 @@
 // Fetches the contents that messages name (contents.py) and puts them into the messages before viser gets these.
 //
-// Messages stay in order: those after a content wait for it. On a slow line they wait for its coarse copy only, and
-// the content replaces that when it comes. A scene node or control whose content nobody would see, because it is
-// hidden or lies in something hidden, is held back with all its messages until it is shown. When a quick line is
-// idle, held contents are fetched ahead.
+// Messages stay in order: those after a content wait for it. On a slow line they wait only for the coarse copy of a
+// first large mesh, which the mesh replaces when it comes. A scene node or control whose content nobody would see,
+// because it is hidden or lies in something hidden, is held back with all its messages until it is shown. When a
+// quick line is idle, held contents are fetched ahead.
 (() => {
   const FOLDER = "contents/";
   const TRIES = 4;
   const PAUSE_MS = 1000; // before a fetch is tried again
   const IDLE_MS = 2500; // time without new contents after which held ones are fetched ahead
-  const ASIDE_MS = 8000; // longest time for which the first screen waits until the address's screen is shown
-  const MEASURED_BYTES = 30000; // least size of a content that tells the line's rate
+  const ASIDE_MS = 4000; // longest time for which the first screen waits until the address's screen is shown
+  const PATIENCE_MS = 60000; // longest fetch
+  const RETRY_MS = 300000; // least time between two connections that the page begins anew because of a lost content
+  const MEASURED_BYTES = 100000; // least size of a content that tells the line's rate
   const SHOWN_MS = 20000;
   const SLOW_B_PER_MS = 500; // rate of the last bytes below which coarse copies come first, and nothing ahead
   const COARSE = "A coarse surface, until the whole one has arrived.";
-  const LOST = "A part of the picture did not arrive: reload the page.";
+  const LOST = "A part of the page did not arrive: reload it.";
   const ARRAYS = {
     "": Uint8Array, "|u1": Uint8Array, "|i1": Int8Array, "<u2": Uint16Array, "<i2": Int16Array, "<f2": Uint16Array,
     "<u4": Uint32Array, "<i4": Int32Array, "<f4": Float32Array, "<f8": Float64Array,
   };
   const FIRST = "/scene"; // the node of the screen that a session shows before it has read the page's address
+  const SCREENS = ["calibrate", "depth", "fuse", "surface", "network", "export"]; // the others
   const VISIBILITY = "SetSceneNodeVisibilityMessage";
   const REMOVALS = ["RemoveSceneNodeMessage", "GuiRemoveMessage"];
   const UPDATES = ["SceneNodeUpdateMessage", "GuiUpdateMessage"];
@@ -27,6 +30,7 @@
   const hidden = new Set(); // nodes and controls that are not shown themselves
   const containers = new Map(); // for each control the one that holds it
   const held = new Map(); // for each held node or control its messages
+  const lost = new Set(); // names of contents that could not be fetched ahead
   const loading = new Map(); // for each name of a content, or of its coarse copy, the promise of its bytes
   const drawn = new Set(); // nodes with a content that has a coarse copy
   const refining = new Map(); // for each node that is drawn coarsely its content
@@ -36,13 +40,16 @@
   let waiting = 0; // their number
   let connection = 0; // number of the connection whose messages are valid
   let idle = 0; // timer of the fetches ahead
-  let bytesPerMs = pageRate();
+  let bytesPerMs = Infinity; // rate of the line
+  let worker = null; // holds the websocket
+  let retriedMs = -Infinity; // when the page last began a connection anew
 
-  // The rate at which the page itself came; unknown from the browser's cache.
-  function pageRate() {
-    const {transferSize, requestStart, responseEnd} = performance.getEntriesByType("navigation")[0] ?? {};
-    return transferSize > 100000 ? transferSize / Math.max(responseEnd - requestStart, 1) : Infinity;
+  // Take the line's rate from a large enough response, which did not come from the browser's cache.
+  function measure({transferSize, responseStart, responseEnd} = {}) {
+    if (transferSize > MEASURED_BYTES) bytesPerMs = transferSize / Math.max(responseEnd - responseStart, 1);
   }
+  performance.setResourceTimingBufferSize(10000);
+  measure(performance.getEntriesByType("navigation")[0]);
 
   const isContent = value => value !== null && typeof value === "object" && typeof value.packetmesh === "string";
 
@@ -57,11 +64,15 @@
   async function fetched(name, ahead) {
     for (let tried = 1; ; tried++) {
       try {
-        const answer = await fetch(new URL(FOLDER + name, document.baseURI), {priority: ahead ? "low" : "high"});
+        const url = new URL(FOLDER + name, document.baseURI).href;
+        const answer = await fetch(url, {
+          priority: ahead ? "low" : "high",
+          cache: tried > 1 ? "reload" : "default", // what the browser kept may be damaged
+          signal: AbortSignal.timeout(PATIENCE_MS),
+        });
         if (answer.ok) {
-          const began = performance.now(); // the server may have packed it until now
-          const packed = await answer.arrayBuffer(), size = Number(answer.headers.get("Content-Length"));
-          if (size > MEASURED_BYTES) bytesPerMs = size / Math.max(performance.now() - began, 1);
+          const packed = await answer.arrayBuffer();
+          measure(performance.getEntriesByName(url).at(-1));
           return packetmeshUnpack(new Uint8Array(packed));
         }
         if (answer.status < 500) throw new RangeError(LOST);
@@ -87,7 +98,7 @@
     return [...drawn].some(other => above(other) === above(node)) ? name : `${name}?coarse`;
   }
 
-  const typed = (bytes, {dtype}) => new ARRAYS[dtype](bytes.slice().buffer);
+  const typed = (bytes, {dtype}) => new (ARRAYS[dtype] ?? Uint8Array)(bytes.slice().buffer);
 
   // Put the contents into a message; false if one did not arrive.
   async function filled(found, wanted) {
@@ -100,7 +111,8 @@
   }
 
   // What a message is about: a scene node's name or a control's uuid; undefined for others.
-  const subject = ({type, name, uuid}) => name?.startsWith?.("/") ? name : type.startsWith("Gui") ? uuid : undefined;
+  const subject = ({type, name, uuid, virtual}) =>
+    name?.startsWith?.("/") && !virtual ? name : type.startsWith("Gui") ? uuid : undefined;
 
   function isHidden(one) {
     if (aside) return true;
@@ -117,13 +129,15 @@
     if (props && message.container_uuid) containers.set(one, message.container_uuid);
     if (visible === false) hidden.add(one);
     else if (visible === true || props || REMOVALS.includes(type)) hidden.delete(one);
+    if (REMOVALS.includes(type)) containers.delete(one);
     if (type === VISIBILITY && visible && one.lastIndexOf("/") === 0 && one !== FIRST) aside = false;
   }
 
-  // Add a message to those of its held subject. What it replaces is not fetched.
+  // Add a message to those of its held subject, in place of what it replaces.
   function hold(messages, message) {
-    const [first] = messages;
+    const [first] = messages, known = messages.findIndex(({type}) => type === message.type);
     if (UPDATES.includes(message.type)) Object.assign(first.props ?? first.updates, message.updates);
+    else if (known > 0) messages[known] = message;
     else messages.push(message);
   }
 
@@ -133,14 +147,10 @@
     const passed = released();
     for (const message of batch) {
       const {type} = message, one = subject(message), named = !contentsOf(message).next().done;
-      const known = held.get(one);
-      if (one === undefined) passed.push(message);
-      else if (REMOVALS.includes(type) || message.props) {
-        held.delete(one);
-        if (message.props && named && isHidden(one)) held.set(one, [message]);
-        else if (message.props || !known?.[0].props) passed.push(message); // viser knows nothing of a held new one
-      } else if (known) hold(known, message);
-      else if (named && isHidden(one)) held.set(one, [message]);
+      const fresh = REMOVALS.includes(type) || message.props;
+      if (fresh) held.delete(one);
+      if (held.has(one)) hold(held.get(one), message);
+      else if (one !== undefined && named && isHidden(one)) held.set(one, [message]);
       else passed.push(message);
     }
     return passed;
@@ -163,8 +173,13 @@
     const needed = new Set([...held.values()].flatMap(found => found.flatMap(message => [...contentsOf(message)]))
       .map(([, , {packetmesh: name}]) => name));
     for (const name of loading.keys()) if (!needed.has(name)) loading.delete(name);
-    for (const name of needed)
-      if (!loading.has(name)) return void load(name, true).catch(() => loading.delete(name)).then(fetchAhead);
+    const next = [...needed].find(name => !loading.has(name) && !lost.has(name));
+    if (next === undefined) return;
+    const giveUp = () => {
+      loading.delete(next);
+      lost.add(next);
+    };
+    load(next, true).catch(giveUp).then(fetchAhead);
   }
 
   // Give viser messages once their contents are there.
@@ -179,12 +194,23 @@
       const came = await Promise.all(named.map(found => filled(found, wanted)));
       if (mine !== connection) return;
       waiting -= 1;
-      if (came.includes(false)) packetmesh.notice(LOST, SHOWN_MS);
+      if (came.includes(false) && beginAnew()) return;
       for (const name of wanted.values()) loading.delete(name);
       send(messages.filter((_, row) => came[row]));
       messages.forEach((message, row) => came[row] && refine(message, named[row], wanted));
       rest();
     });
+  }
+
+  // A content is gone: connect again, after which the server offers everything anew. False if that was just tried.
+  function beginAnew() {
+    if (performance.now() - retriedMs < RETRY_MS) {
+      packetmesh.notice(LOST, SHOWN_MS);
+      return false;
+    }
+    retriedMs = performance.now();
+    worker.postMessage({type: "retry"});
+    return true;
   }
 
   function rest() {
@@ -196,7 +222,7 @@
     if (!messages.length) return;
     for (const {type, name, props, updates} of messages) {
       if (REMOVALS.includes(type)) drawn.delete(name);
-      if (REMOVALS.includes(type) || props || updates?.[refining.get(name)?.key]) refining.delete(name);
+      if (REMOVALS.includes(type) || props || updates?.[refining.get(name)?.key]) refined(name);
     }
     deliver({data: {type: "message_batch", messages}});
   }
@@ -212,21 +238,24 @@
       const bytes = await load(content.packetmesh).catch(() => null);
       loading.delete(content.packetmesh);
       if (refining.get(name) !== mine) return;
-      refining.delete(name);
-      if (bytes === null) return void packetmesh.notice(LOST, SHOWN_MS);
+      refined(name);
+      if (bytes === null) return void beginAnew();
       send([{type: "SceneNodeUpdateMessage", name, owner, updates: {[key]: typed(bytes, content)}}]);
-      if (!refining.size) packetmesh.notice("", 0);
       rest();
     }
+  }
+
+  function refined(name) {
+    if (refining.delete(name) && !refining.size) packetmesh.notice("", 0);
   }
 
   function reset() {
     const mine = ++connection;
     chain = Promise.resolve();
     waiting = 0;
-    for (const all of [hidden, containers, held, loading, drawn, refining]) all.clear();
+    for (const all of [hidden, containers, held, lost, loading, drawn, refining]) all.clear();
     const screen = new URLSearchParams(location.search).get("screen");
-    aside = screen !== null && `/${screen}` !== FIRST;
+    aside = SCREENS.includes(screen);
     setTimeout(() => {
       if (mine !== connection) return;
       aside = false;
@@ -239,7 +268,7 @@
     set onmessage(listener) {
       super.onmessage = listener && (event => {
         if (event.data?.type === "message_batch") {
-          deliver = listener;
+          [deliver, worker] = [listener, this];
           pass(sorted(event.data.messages));
           return;
         }

@@ -14,6 +14,7 @@ import asyncio
 import gzip
 import hashlib
 import http
+import logging
 import re
 import secrets
 from collections import OrderedDict
@@ -21,7 +22,6 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from http.cookies import CookieError, SimpleCookie
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -47,13 +47,18 @@ COARSE_BYTES = 300_000
 """Size from which a content may have a coarse copy."""
 COARSE = "coarse"
 """Query of a content's coarse copy."""
-MOST_BYTES = 64 << 20
-"""Limit of the contents that one browser may fetch."""
+MOST_BYTES, FETCHED_BYTES = 64 << 20, 8 << 20
+"""Limits of a browser's contents, and of those of them that it has fetched: the oldest are forgotten."""
+MOST_OF_ALL_BYTES = 512 << 20
+"""Limit of all browsers' contents; beyond it, data stay in their messages."""
+SLOWEST_S = 60.0
+"""Time in which a browser must have received a content."""
 REMEMBERED = 64
 """Number of contents whose names are known without computing them again."""
-_FORMAT = b"1"
-"""Part of each name; another one makes browsers forget contents that were packed differently."""
-_NUMBER = re.compile(r"[A-Za-z0-9_-]{22}")
+_FORMAT = b"2"
+"""Part of each name, to be changed with the packing: browsers keep contents by their names."""
+_HELD = re.compile(rf"(?:^|[;,]\s*){COOKIE}=([A-Za-z0-9_-]{{22}})\s*(?:[;,]|$)")
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,19 +76,22 @@ class Packing:
 class Content:
     """A content that browsers may fetch; it and its coarse copy are packed when the first one does."""
 
-    def __init__(self, data: Data, size: int) -> None:
-        self.data, self.size = data, size
+    def __init__(self, data: Data, size: int, has_coarse: bool) -> None:
+        self.size, self.has_coarse = size, has_coarse
+        self._data = data if isinstance(data, bytes) else data.copy()  # an array may change later
         self._packed: dict[bool, Future[bytes]] = {}
 
     def packed(self, packer: ThreadPoolExecutor, packing: Packing, coarse: bool) -> Future[bytes]:
-        """Return the compressed content, which is being made; to be called on the connections' thread."""
+        """Return a future of the compressed content or of its coarse copy; one that failed is made again."""
 
         def made() -> bytes:
-            return gzip.compress(packing.pack(packing.coarse(self.data) if coarse else self.data), 6, mtime=0)
+            content = packing.coarse(self._data) if coarse else self._data
+            return gzip.compress(packing.pack(content), 6, mtime=0)
 
-        if coarse not in self._packed:
-            self._packed[coarse] = packer.submit(made)
-        return self._packed[coarse]
+        known = self._packed.get(coarse)
+        if known is None or (known.done() and (known.cancelled() or known.exception() is not None)):
+            self._packed[coarse] = known = packer.submit(made)
+        return known
 
 
 class Contents:
@@ -94,8 +102,8 @@ class Contents:
         self._packer = ThreadPoolExecutor(1, thread_name_prefix="contents")
         self._known: dict[str, Content] = {}
         self._offered: dict[str, OrderedDict[str, bool]] = {}
-        """For each browser, by the number in its cookie: whether it has fetched each of its contents, by name,
-        the oldest first."""
+        """For each browser, by the number in its cookie, the names of its contents, the oldest first, and
+        whether it has fetched each."""
         self._pages: dict[int, str] = {}
         """Number in the cookie of each page, by the number of its connection."""
         self._names: OrderedDict[int, tuple[bytes, str]] = OrderedDict()
@@ -128,25 +136,28 @@ class Contents:
         if browser is None or size < (FEWEST_BYTES if of_new else FEWEST_CHANGED_BYTES):
             return None
         name = self._name_of(data)
-        self._known.setdefault(name, Content(data, size))
+        if name not in self._known:
+            if sum(one.size for one in self._known.values()) + size > MOST_OF_ALL_BYTES:
+                return None
+            has_coarse = size >= COARSE_BYTES and self._packing.has_coarse(data)
+            self._known[name] = Content(data, size, has_coarse)
         offered = self._offered[browser]
         offered[name] = False
         offered.move_to_end(name)
         self._limit(offered)
         kind = "" if isinstance(data, bytes) else data.dtype.str
-        coarse = size >= COARSE_BYTES and self._packing.has_coarse(data)
-        return {"packetmesh": name, "dtype": kind, "bytes": size, "coarse": coarse}
+        return {"packetmesh": name, "dtype": kind, "coarse": self._known[name].has_coarse}
 
     def served(self) -> AbstractContextManager[None]:
-        """Return a context. A server started in it sends the contents."""
-        return answering(self._answering)
+        """Return a context. A server started in it sends the contents, and waits longer for slow browsers."""
+        return answering(self._answering, open_timeout=SLOWEST_S, close_timeout=SLOWEST_S)
 
     def _name_of(self, data: Data) -> str:
         known = self._names.get(id(data))
         if known is not None and known[0] is data:
             return known[1]
         kind = b"" if isinstance(data, bytes) else repr((data.dtype.str, data.shape)).encode()
-        digest = hashlib.blake2b(_FORMAT + kind, digest_size=16)
+        digest = hashlib.blake2b(b"%s %d %s" % (_FORMAT, len(kind), kind), digest_size=16)
         digest.update(data if isinstance(data, bytes) else np.ascontiguousarray(data).data.cast("B"))
         name = digest.hexdigest()
         if isinstance(data, bytes):  # nobody can change it
@@ -156,14 +167,15 @@ class Contents:
         return name
 
     def _limit(self, offered: OrderedDict[str, bool]) -> None:
-        """Forget a browser's oldest contents beyond ``MOST_BYTES``, first those that it has fetched."""
+        """Forget a browser's oldest contents beyond the limits, first those that it has fetched."""
         total = sum(self._known[name].size for name in offered)
+        fetched = sum(self._known[name].size for name, is_fetched in offered.items() if is_fetched)
         newest = next(reversed(offered))
         for name in sorted(offered, key=lambda name: not offered[name]):  # stable: the oldest stay first
-            if total <= MOST_BYTES or name == newest:
-                break
+            if name == newest or (total <= MOST_BYTES and (fetched <= FETCHED_BYTES or not offered[name])):
+                continue
             total -= self._known[name].size
-            del offered[name]
+            fetched -= self._known[name].size if offered.pop(name) else 0
             self._forget(name)
 
     def _forget(self, name: str) -> None:
@@ -183,13 +195,21 @@ class Contents:
             offered = self._offered.get(_browser_in(request.headers.get("Cookie", "")) or "")
             if offered is None or name not in offered:
                 return connection.respond(http.HTTPStatus.NOT_FOUND, GONE)
-            offered[name] |= query != COARSE
-            return self._send(self._known[name], query == COARSE)
+            content, coarse = self._known[name], query == COARSE
+            if coarse and not content.has_coarse:
+                return connection.respond(http.HTTPStatus.NOT_FOUND, GONE)
+            offered[name] |= not coarse
+            return self._send(content, coarse)
 
         return answered
 
     async def _send(self, content: Content, coarse: bool) -> Response:
-        body = await asyncio.wrap_future(content.packed(self._packer, self._packing, coarse))
+        packed = asyncio.wrap_future(content.packed(self._packer, self._packing, coarse))
+        try:
+            body = await asyncio.shield(packed)  # if this browser goes, others still wait for it
+        except Exception:
+            logger.exception("a content could not be packed")
+            raise
         headers = Headers()
         headers["Content-Type"] = "application/octet-stream"
         headers["Content-Encoding"] = "gzip"
@@ -212,13 +232,10 @@ def page_cookie(cookies: str) -> str:
     """
     if _browser_in(cookies) is not None:
         return ""
-    return f"{COOKIE}={secrets.token_urlsafe(16)}; Path=/; HttpOnly; SameSite=Strict"
+    return f"{COOKIE}={secrets.token_urlsafe(16)}; Path=/; HttpOnly; SameSite=Lax"
 
 
 def _browser_in(cookies: str) -> str | None:
     """Return the browser's number in a ``Cookie`` header; None without a proper one."""
-    try:
-        held = SimpleCookie(cookies).get(COOKIE)
-    except CookieError:
-        return None
-    return held.value if held is not None and _NUMBER.fullmatch(held.value) else None
+    held = _HELD.search(cookies)
+    return None if held is None else held[1]

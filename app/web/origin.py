@@ -149,16 +149,16 @@ def only_own_page(allowed: frozenset[str] = _NOBODY) -> AbstractContextManager[N
 
 
 @contextlib.contextmanager
-def answering(change: Callable[[Answer], Answer]) -> Iterator[None]:
+def answering(change: Callable[[Answer], Answer], **settings: float) -> Iterator[None]:
     """Open a context. A server started in it answers requests with ``change`` applied to its own answer.
 
-    Viser has no option for this.
+    Viser has no option for this, nor for ``settings`` of websockets' ``serve``.
     """
     serve = websockets_server.serve
 
     @functools.wraps(serve)
     def changed(*arguments: Any, process_request: Answer, **options: Any) -> Any:
-        return serve(*arguments, process_request=change(process_request), **options)
+        return serve(*arguments, process_request=change(process_request), **(options | settings))
 
     setattr(websockets_server, "serve", changed)  # noqa: B010
     try:

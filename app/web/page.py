@@ -57,25 +57,25 @@ class File:
 
     @cached_property
     def mark(self) -> str:
-        """The content's entity tag."""
-        return f'"{hashlib.sha256(self.content).hexdigest()[:24]}"'
+        """The content's entity tag, weak as it is the same for the content packed and as it is."""
+        return f'W/"{hashlib.sha256(self.content).hexdigest()[:24]}"'
 
     def response(self, request: Mapping[str, str]) -> Response:
         """Return the response to a request with these headers; without the content if the browser has it."""
         headers = Headers()
         headers["ETag"] = self.mark
-        headers["Cache-Control"] = "public, max-age=31536000, immutable" if self.kept else "no-cache"
+        headers["Vary"] = "Accept-Encoding"
+        headers["Cache-Control"] = "public, max-age=31536000, immutable" if self.kept else "private, no-cache"
         cookie = "" if self.kept else page_cookie(request.get("Cookie", ""))
         if cookie:
             headers["Set-Cookie"] = cookie
-        if request.get("If-None-Match", "").removeprefix("W/") == self.mark:
+        if request.get("If-None-Match", "") == self.mark:
             return Response(http.HTTPStatus.NOT_MODIFIED, "Not Modified", headers, b"")
         packed = "gzip" in request.get("Accept-Encoding", "")
         body = self.packed if packed else self.content
         headers["Content-Type"] = self.kind
         headers["Content-Length"] = str(len(body))
         headers["Content-Encoding"] = "gzip" if packed else "identity"
-        headers["Vary"] = "Accept-Encoding"
         return Response(http.HTTPStatus.OK, "OK", headers, body)
 
 

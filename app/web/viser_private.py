@@ -92,7 +92,8 @@ def replace_data(server: viser.ViserServer, replacement: Callable[[int, Any, boo
 
 
 _replacement = ContextVar[Callable[[Any, bool], object | None] | None]("replacement", default=None)
-_of_new = ContextVar[bool]("of_new", default=False)
+_of_new = ContextVar[bool | None]("of_new", default=None)
+"""Whether what is prepared belongs to something new; None outside the properties of nodes and controls."""
 _prepare = infra_messages._prepare_for_serialization
 
 
@@ -101,12 +102,16 @@ def _prepared(value: Any, annotation: object, binary_buffers: list[memoryview] |
     replace = _replacement.get()
     if replace is None or binary_buffers is None:
         return _prepare(value, annotation, binary_buffers)
+    of_new = _of_new.get()
     if isinstance(value, bytes | np.ndarray):
-        replaced = replace(value, _of_new.get())
+        replaced = None if of_new is None else replace(value, of_new)  # parts of files are sent as they are
         return _prepare(value, annotation, binary_buffers) if replaced is None else replaced
-    if not dataclasses.is_dataclass(value):
+    new = dataclasses.is_dataclass(
+        value
+    )  # only messages that add something have their properties in a record
+    if of_new is not None or not (new or isinstance(value, dict)):
         return _prepare(value, annotation, binary_buffers)
-    token = _of_new.set(True)  # only messages that add something have their properties in a record
+    token = _of_new.set(new)
     try:
         return _prepare(value, annotation, binary_buffers)
     finally:

@@ -44,14 +44,15 @@ def _grid(rows, columns, bits):
 
 def _triangles(rows, size):
     def write(data):
-        triangles = []
+        triangles, greatest = [], -1
         for first, second, third in zip(*_columns(data, rows, 3, size), strict=True):
             above = triangles[-1] if triangles else None
             a = ((above[0] if above else 0) + first) % 256**size
-            following = 1 + max([a, *(value for triangle in triangles for value in triangle)])
+            following = 1 + max(a, greatest)
             b = ((above[2] if above and above[0] == a else following) - second) % 256**size
             c = (max(following, b + 1) - third) % 256**size
             triangles.append((a, b, c))
+            greatest = max(greatest, a, b, c)
         return b"".join(value.to_bytes(size, "little") for triangle in triangles for value in triangle)
 
     return 3 * rows * size, write

@@ -59,7 +59,8 @@ class Line:
             return route.fulfill(status=status)
         if name not in CONTENT:
             return route.fulfill(status=404)
-        return route.fulfill(body=pack(CONTENT[name]))
+        content = CONTENT[name]
+        return route.fulfill(body=b'\x0d\0\0\0[["other",1]]x' if content is None else pack(content))
 
 
 @pytest.fixture
@@ -155,12 +156,13 @@ def test_what_is_replaced_or_removed_while_hidden_is_never_fetched(page):
     send(page, {"type": "RemoveSceneNodeMessage", "name": "/fuse/old"})
     send(page, {"type": "SceneNodeUpdateMessage", "name": "/fuse/new", "updates": {"glb_data": named("b")}})
     send(page, visible("/fuse", True))
-    found = seen(page, 3)
-    assert found[1] == ["GlbMessage", "/fuse/new", {"glb_data": "second", "scale": 1}]
+    found = seen(page, 4)
+    assert found[1] == ["RemoveSceneNodeMessage", "/fuse/old", None]  # which viser ignores
+    assert found[2] == ["GlbMessage", "/fuse/new", {"glb_data": "second", "scale": 1}]
     assert page.line.asked == ["b"]
 
 
-def test_a_known_node_that_changes_while_hidden_is_removed_properly(page):
+def test_a_known_node_that_changes_while_hidden_is_removed(page):
     send(page, create("/fuse/mesh", "a"))
     send(page, visible("/fuse", False))
     update = {"type": "SceneNodeUpdateMessage", "name": "/fuse/mesh"}
@@ -188,11 +190,67 @@ def test_pictures_of_a_hidden_folder_wait_for_it(page):
     ]
 
 
-def test_a_content_that_is_gone_is_told_and_the_rest_goes_on(page):
+def test_for_a_content_that_is_gone_the_page_connects_anew_and_the_second_time_says_so(page):
+    send(page, create("/mesh", "gone"), DONE)
+    assert seen(page, 1) == [["retry", None, None]]
+    connect(page)
     send(page, create("/mesh", "gone"))
     send(page, create("/other", "a"), DONE)
     assert [row[:2] for row in seen(page, 2)] == [["GlbMessage", "/other"], ["ReplayDoneMessage", None]]
-    assert page.evaluate("notices") == ["A part of the picture did not arrive: reload the page."]
+    assert page.evaluate("notices") == ["A part of the page did not arrive: reload it."]
+
+
+def test_a_hidden_content_that_is_gone_is_asked_for_once(page):
+    send(
+        page, visible("/fuse", False), create("/fuse/x", "gone"), create("/fuse/y", "a"), create("/mesh", "b")
+    )
+    seen(page, 2)
+    page.wait_for_timeout(4500)
+    assert page.line.asked == ["b", "gone", "a"]
+
+
+def test_a_content_of_another_packing_is_asked_for_anew_and_then_given_up(page, monkeypatch):
+    """Such as one that the browser has kept since another version of the program."""
+    monkeypatch.setitem(CONTENT, "old", None)
+    send(page, create("/mesh", "old"))
+    page.wait_for_function("() => got.some(one => one.type === 'retry')")
+    assert page.line.asked == ["old"] * 4
+
+
+def test_what_replaces_a_known_node_while_hidden_goes_with_it(page):
+    send(page, create("/fuse/mesh", "a"))
+    seen(page, 1)
+    send(page, visible("/fuse", False), create("/fuse/mesh", "b"))
+    send(page, {"type": "RemoveSceneNodeMessage", "name": "/fuse/mesh"})
+    send(page, visible("/fuse", True))
+    assert [row[0] for row in seen(page, 4)[1:]] == [
+        "SetSceneNodeVisibilityMessage",
+        "RemoveSceneNodeMessage",
+        "SetSceneNodeVisibilityMessage",
+    ]
+    assert page.line.asked == ["a"]
+
+
+def test_of_equal_messages_to_a_held_node_the_last_counts(page):
+    send(page, visible("/fuse", False), create("/fuse/mesh", "a"))
+    for x in range(50):
+        send(page, {"type": "SetPositionMessage", "name": "/fuse/mesh", "position": [x, 0, 0]})
+    send(page, visible("/fuse", True))
+    assert [row[0] for row in seen(page, 4)[1:]] == [
+        "GlbMessage",
+        "SetPositionMessage",
+        "SetSceneNodeVisibilityMessage",
+    ]
+    assert page.evaluate("got[3].position") == [49, 0, 0]
+
+
+def test_a_browsers_own_anchor_of_a_shared_node_changes_nothing(page):
+    send(page, visible("/fuse", False), create("/fuse/mesh", "a"))
+    anchor = {"type": "FrameMessage", "props": {}, "virtual": True, "owner": "7"}
+    send(page, {**anchor, "name": "/fuse"}, {**anchor, "name": "/fuse/mesh"})
+    seen(page, 3)
+    send(page, visible("/fuse", True))
+    assert seen(page, 5)[3][2] == {"glb_data": "first", "scale": 1}
 
 
 def test_a_busy_server_is_asked_again(page):
@@ -239,7 +297,7 @@ def test_the_first_screen_waits_for_the_one_that_the_address_names(page):
 SLOW = """() => {
   const found = performance.getEntriesByType;
   performance.getEntriesByType = kind => kind === "navigation"
-    ? [{transferSize: 600000, requestStart: 0, responseEnd: 6000}] : found.call(performance, kind);
+    ? [{transferSize: 600000, responseStart: 0, responseEnd: 6000}] : found.call(performance, kind);
 }"""
 
 

@@ -63,8 +63,15 @@ def test_any_size_is_thinned(scale):
     assert 100 < len(read["indices"]) < 0.3 * len(FACES)
 
 
+def test_where_nothing_is_left_the_mesh_itself_is_its_coarse_copy():
+    far = np.vstack([VERTICES, [[1e4, 0, 0]]])
+    glb = mesh_glb(far, FACES, np.vstack([SIDES, SIDES[:1]]))
+    assert coarse_glb(glb) == glb
+
+
 def test_only_meshes_have_one():
     assert is_mesh(mesh_glb(VERTICES, FACES, SIDES))
     assert not is_mesh(lines_glb(np.zeros((3, 2, 3)), (0, 0, 0)))
     assert not is_mesh(b"\xff\xd8")
     assert not is_mesh(VERTICES)
+    assert not is_mesh(trimesh.Scene([SPHERE, SPHERE.copy()]).export(file_type="glb"))

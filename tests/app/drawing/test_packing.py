@@ -14,6 +14,7 @@ from hypothesis.extra.numpy import arrays as any_array
 from app.drawing.glb import Parts, lines_glb, mesh_glb, textured_glb
 from app.drawing.ordering import curve_order, lowest_first, reordered
 from app.drawing.packing import GRID_BITS, pack, rounded
+from tests.app.gltf import arrays as gltf_arrays
 from tests.app.packed import unpacked
 
 SPHERE = trimesh.creation.icosphere(subdivisions=3)
@@ -100,6 +101,23 @@ FILES = {
     "many": indexed([[70000, 4, 60000], [1 << 31, 1, 0], [(1 << 32) - 1, 65533, 2]], 70000),
     "lines": lines_glb(np.random.default_rng(0).uniform(-1, 1, (77, 2, 3)), (213, 40, 30)),
 }
+
+
+def test_a_gltf_of_another_program_comes_out_as_it_was():
+    for scene in (SPHERE, trimesh.Scene([SPHERE, SPHERE.copy()])):
+        glb = scene.export(file_type="glb")
+        assert unpacked(pack(glb)) == glb
+
+
+@pytest.mark.parametrize("vertices", [65534, 65535, 65536])
+def test_indices_are_wide_enough(vertices):
+    places = np.random.default_rng(0).uniform(0, 1, (vertices, 3))
+    triangles = np.arange(vertices - vertices % 3).reshape(-1, 3)
+    glb = mesh_glb(places, triangles, np.zeros((vertices, 3), np.uint8))
+    found = gltf_arrays(glb)[1]["indices"]
+    assert found.dtype == ("<u2" if vertices < 65535 else "<u4")
+    assert len(np.unique(found)) == found.size
+    assert found.max() < vertices
 
 
 @pytest.mark.parametrize("name", FILES)

@@ -4,12 +4,14 @@ import contextlib
 import gzip
 import http.client
 import re
+import socket
 import threading
 
 import numpy as np
 import pytest
 import trimesh
 import viser
+from websockets.asyncio import server as websockets_server
 
 from app.drawing.coarse import coarse_glb, is_mesh
 from app.drawing.glb import lines_glb, mesh_glb
@@ -22,6 +24,7 @@ from app.web.contents import (
     FEWEST_CHANGED_BYTES,
     FOLDER,
     GONE,
+    SLOWEST_S,
     Contents,
     Packing,
     offer_contents,
@@ -44,9 +47,15 @@ class Counting:
     """Packs as the app does, and counts."""
 
     def __init__(self):
-        self.packed = 0
+        self.packed, self.began, self.fails = 0, False, False
+        self.may_go_on = threading.Event()
+        self.may_go_on.set()
 
     def __call__(self, data):
+        self.began = True
+        assert self.may_go_on.wait(20.0)
+        if self.fails:
+            raise ValueError("not now")
         self.packed += 1
         return pack(data)
 
@@ -73,10 +82,12 @@ class Listener(Connection):
     """Keeps the messages."""
 
     def __init__(self, *arguments):
-        self.named = {}
+        self.named, self.parts = {}, []
         super().__init__(*arguments)
 
     def _take_message(self, message):
+        if message["type"] == "FileTransferPart":
+            self.parts.append(message["content"])
         for key, value in (message.get("props") or message.get("updates") or {}).items():
             if key in ("glb_data", "points"):
                 self.named[message["name"], key] = value
@@ -107,7 +118,7 @@ def test_a_page_with_the_cookie_gets_names_and_fetches_the_same_bytes(served):
             (("/cloud", "points"), POINTS.tobytes(), "<f4"),
         ):
             told = one.named[key]
-            assert (told["dtype"], told["bytes"]) == (kind, len(data))
+            assert told["dtype"] == kind
             status, headers, body = get(server, FOLDER + told["packetmesh"], HERS)
             assert status == 200
             assert "immutable" in headers["Cache-Control"]
@@ -131,8 +142,58 @@ def test_a_large_mesh_has_a_coarse_copy(served):
         assert unpacked(whole) == MESH
         assert unpacked(coarse) == coarse_glb(MESH)
         assert len(coarse) < 0.7 * len(whole)
+        assert len(gzip.compress(coarse)) < len(gzip.compress(whole))
         assert get(server, path + "?coarse", HIS)[0] == 404
+        lines = FOLDER + one.named["/lines", "glb_data"]["packetmesh"]
+        assert get(server, lines + "?coarse", HERS)[0] == 404  # it has none
     assert packing.packed == 2
+
+
+def test_a_browser_that_goes_while_its_content_is_packed_takes_it_from_no_other(served):
+    server, packing = served
+    packing.may_go_on.clear()
+    draw(server)
+    with page(server, HERS) as one:
+        wait_for(lambda: len(one.named) == 3)
+        path = FOLDER + one.named["/mesh", "glb_data"]["packetmesh"]
+        with socket.create_connection(("127.0.0.1", server.get_port())) as gone:
+            gone.sendall(f"GET {path} HTTP/1.1\r\nHost: x\r\nCookie: {HERS}\r\n\r\n".encode())
+            wait_for(lambda: packing.began)
+        threading.Timer(0.5, packing.may_go_on.set).start()
+        assert get(server, path, HERS)[0] == 200
+    assert packing.packed == 1
+
+
+def test_a_content_that_could_not_be_packed_is_packed_when_it_is_asked_for_again(served):
+    server, packing = served
+    draw(server)
+    with page(server, HERS) as one:
+        wait_for(lambda: len(one.named) == 3)
+        path = FOLDER + one.named["/mesh", "glb_data"]["packetmesh"]
+        packing.fails = True
+        assert get(server, path, HERS)[0] == 500
+        packing.fails = False
+        assert get(server, path, HERS)[0] == 200
+
+
+def test_parts_of_downloads_are_sent_as_they_are(served):
+    server, packing = served
+    with page(server, HERS) as one:
+        wait_for(lambda: bool(server.get_clients()))
+        (client,) = server.get_clients().values()
+        client.send_file_download("run.zip", bytes(3_000_000))
+        wait_for(lambda: sum(map(len, one.parts)) == 3_000_000)
+    assert packing.packed == 0
+
+
+def test_a_slow_browser_has_its_time():
+    """Websockets would give it ten seconds for all of its request."""
+    given = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(websockets_server, "serve", lambda *_, **options: given.append(options))
+        with Contents(PACKING).served():
+            websockets_server.serve(process_request=None, open_timeout=10.0)
+    assert (given[0]["open_timeout"], given[0]["close_timeout"]) == (SLOWEST_S, SLOWEST_S)
 
 
 def test_a_page_without_the_cookie_gets_the_data_themselves(served):
@@ -190,12 +251,6 @@ def test_a_content_of_another_browser_is_refused_like_one_that_is_gone(served):
     wait_for(lambda: get(server, FOLDER + name, owner)[0] == 404)  # nobody shows it any more
 
 
-def test_other_paths_and_websockets_are_not_answered(served):
-    server, _ = served
-    assert get(server, "/")[0] == 200
-    assert get(server, "/contents")[0] != 200 or b"html" in get(server, "/contents")[2]
-
-
 def test_a_browser_keeps_its_newest_contents(monkeypatch):
     monkeypatch.setattr(module, "MOST_BYTES", 3 * FEWEST_BYTES)
     contents = Contents(PACKING)
@@ -247,20 +302,49 @@ def test_equal_bytes_of_another_kind_have_another_name():
     assert len({contents.offer(1, one)["packetmesh"] for one in others}) == 4
 
 
-def test_an_array_that_changes_gets_another_name():
+def test_an_array_that_changes_gets_another_name_and_the_first_stays():
     contents = Contents(PACKING)
     contents.opened(1, HERS)
     array = np.zeros((FEWEST_BYTES, 3), np.uint8)
     before = contents.offer(1, array)["packetmesh"]
     array[0] = 1
     assert contents.offer(1, array)["packetmesh"] != before
+    packed = contents._known[before].packed(contents._packer, PACKING, coarse=False).result()
+    assert unpacked(gzip.decompress(packed)) == bytes(3 * FEWEST_BYTES)
+
+
+def test_beyond_the_limit_of_all_data_stay_in_their_messages(monkeypatch):
+    monkeypatch.setattr(module, "MOST_OF_ALL_BYTES", 2 * FEWEST_BYTES)
+    contents = Contents(PACKING)
+    for number in range(3):
+        contents.opened(number, f"{COOKIE}={number:022}")
+    datas = [bytes([number]) * FEWEST_BYTES for number in range(3)]
+    assert [contents.offer(number, data) is None for number, data in enumerate(datas)] == [False, False, True]
+    assert contents.offer(2, datas[0]) is not None  # which is there
+    contents.closed(1)
+    assert contents.offer(2, datas[2]) is not None
+
+
+def test_of_fetched_contents_only_few_are_kept(monkeypatch):
+    monkeypatch.setattr(module, "FETCHED_BYTES", 2 * FEWEST_BYTES)
+    contents = Contents(PACKING)
+    contents.opened(1, HERS)
+    names = [contents.offer(1, bytes([number]) * FEWEST_BYTES)["packetmesh"] for number in range(4)]
+    (offered,) = contents._offered.values()
+    for name in names:
+        offered[name] = True
+    newest = contents.offer(1, bytes([9]) * FEWEST_BYTES)["packetmesh"]
+    assert list(offered) == [*names[2:], newest]
 
 
 def test_the_page_gives_each_browser_a_cookie_of_its_own_once():
     given = [page_cookie("") for _ in range(2)]
     assert len(set(given)) == 2
     for one in given:
-        assert re.fullmatch(rf"{COOKIE}=[A-Za-z0-9_-]{{22}}; Path=/; HttpOnly; SameSite=Strict", one)
+        assert re.fullmatch(rf"{COOKIE}=[A-Za-z0-9_-]{{22}}; Path=/; HttpOnly; SameSite=Lax", one)
         assert page_cookie(one.partition(";")[0]) == ""
+    one = page_cookie("").partition(";")[0]
+    for others in ("a=1; {}", 'a={{"x": 1}}; {}; b=2', "{}; x=<"):
+        assert page_cookie(others.format(one)) == ""
     for broken in (f"{COOKIE}=short", f"{COOKIE}={'<' * 22}", 'x="', f"{COOKIE}="):
         assert page_cookie(broken) != ""
