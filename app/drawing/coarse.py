@@ -1,4 +1,4 @@
-"""A coarse copy of a mesh, of a sixth of a room's bytes: a page on a slow line shows it until all is there."""
+"""A coarse copy of a mesh, a sixth of a room's bytes: a page on a slow line shows it until all is there."""
 
 from __future__ import annotations
 
