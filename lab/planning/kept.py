@@ -1,0 +1,53 @@
+"""One promise and what came of it: a suggested camera, rendered and added to its rig."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lab.worlds.render import Renderer
+from lab.worlds.scene import Scene
+from lab.worlds.sensor import sense_depth
+from pipeline.planning.promise import measured_share
+from pipeline.reconstruct import Reconstruction, reconstruct
+from pipeline.stages import cameras_of
+from pipeline.types import DepthMap, FloatArray, RgbdFrame, Rig
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a camera added to the surface after it was rendered and registered."""
+
+    gain_share: float
+    """Share of the earlier cameras' rays that meet measured surface now and did not before."""
+    placed: bool
+    """Whether registration found the camera's pose."""
+
+
+def rendered_frame(
+    scene: Scene, renderer: Renderer, name: str, T_world_camera: FloatArray, seed: int
+) -> RgbdFrame:
+    """Return what a Kinect at this pose would send of a scene, its depth in whole millimetres."""
+    rng = np.random.default_rng([seed, 4242])
+    view = renderer.view(scene.intrinsics, T_world_camera, "fast", rng)
+    sensed = sense_depth(view, scene.intrinsics, rng)
+    depth = DepthMap((np.rint(1000.0 * sensed.z_m) / 1000.0).astype(np.float32))
+    return RgbdFrame(name, view.rgb, depth, scene.intrinsics, T_world_camera)
+
+
+def outcome(
+    scene: Scene, renderer: Renderer, base: Reconstruction, T_world_camera: FloatArray, seed: int
+) -> Outcome:
+    """Add a rendered camera to a rig, reconstruct again, and compare on the rays of the earlier cameras."""
+    rig = base.rig
+    frame = rendered_frame(scene, renderer, f"node_{len(rig.frames):02d}", T_world_camera, seed)
+    larger = Rig(rig.name, (*rig.frames, frame))
+    after = reconstruct(larger)
+    before_share = measured_share(base, cameras_of(base.rig, base.placement))
+    earlier = [
+        k for k in range(len(rig.frames)) if after.placement.placed(range(len(larger.frames))).count(k)
+    ]
+    cameras = cameras_of(larger, after.placement)[: len(earlier)]
+    placed = len(rig.frames) in after.placement.placed(range(len(larger.frames)))
+    return Outcome(measured_share(after, cameras) - before_share, placed)

@@ -1,0 +1,117 @@
+"""The chance that a camera measures what the present ones do not, ray by ray (SPEC 12)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.kernels.geometry import apply, inverse, pixel_rays, project, scaled
+from pipeline.kernels.open3d_runtime import o3d
+from pipeline.kernels.rays import Camera, camera_hits, tensor
+from pipeline.planning.seen import SeenPlace, depth_at, unknown_lengths_m
+from pipeline.planning.sensors import FADE_SHARE, Sensor
+from pipeline.types import BoolArray, FloatArray
+
+SLACK_M = 0.05
+"""Surface this close to an estimated point along a ray is the point itself."""
+BEHIND_GUESS = 0.4
+"""Chance that a ray passes where guessed surface stands in its way."""
+UNKNOWN_M = 1.5
+"""Way through unknown space after which a ray is still free with a chance of 1/e."""
+DARK_RATIO = 5.0
+"""Ratio of the infrared returns between which a dark surface changes from never to always measured."""
+PREVIEW_WIDTH_PX = 48
+"""Width of the image with which overlap is estimated."""
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What a candidate would add."""
+
+    chance: FloatArray
+    """(T,) float32 chance that it measures each of the targets."""
+    overlap_share: float
+    """Share of its image on measured surface that one present camera, the best one, sees as well."""
+
+
+def judge(seen: SeenPlace, T_world_camera: FloatArray, sensor: Sensor) -> Judged:
+    """Estimate what a camera at this pose would measure of the targets.
+
+    The chance of a target is the product of the chances that its way is free, that its angle, distance and
+    darkness return light, and that the sensor's projector or second camera sees it, too.
+    """
+    camera = Camera(sensor.intrinsics, T_world_camera)
+    targets = seen.targets
+    chance = np.zeros(len(targets.points_m), np.float32)
+    in_camera_m = apply(inverse(T_world_camera), targets.points_m)
+    rows = np.flatnonzero((in_camera_m[:, 2] > sensor.near_m) & (in_camera_m[:, 2] < sensor.far_m))
+    pixels = project(sensor.intrinsics, in_camera_m[rows])
+    size_px = sensor.intrinsics.width_px, sensor.intrinsics.height_px
+    rows = rows[np.all((pixels >= 0.0) & (pixels < size_px), axis=1)]
+    if len(rows):
+        eye_m = T_world_camera[:3, 3]
+        likely = _returned(seen, rows, in_camera_m[rows, 2], eye_m, sensor)
+        some = likely > 0.0
+        rows, likely = rows[some], likely[some]
+        points_m = targets.points_m[rows]
+        likely *= _open_way(seen, points_m, eye_m)
+        if sensor.baseline_m:
+            other_m = eye_m + sensor.baseline_m * T_world_camera[:3, 0]
+            likely *= ~_blocked(seen.measured, points_m, other_m)
+        chance[rows] = likely
+    return Judged(chance, overlap_share(seen, camera))
+
+
+def _returned(
+    seen: SeenPlace, rows: np.ndarray, z_m: FloatArray, eye_m: FloatArray, sensor: Sensor
+) -> FloatArray:
+    """Return (R,) chances that enough light returns: by angle, distance, and darkness seen before."""
+    targets = seen.targets
+    ways_m = targets.points_m[rows] - eye_m
+    facing = -np.sum(ways_m * targets.normals[rows], axis=1) / np.linalg.norm(ways_m, axis=1)
+    cosine = np.abs(facing)
+    low_deg, high_deg = sensor.grazing_deg
+    angle_deg = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
+    chance = np.clip((high_deg - angle_deg) / (high_deg - low_deg), 0.0, 1.0)
+    chance *= np.clip((sensor.far_m - z_m) / (FADE_SHARE * sensor.far_m), 0.0, 1.0)
+    lost = targets.lost_return[rows]
+    ratio = np.divide(cosine / z_m**2, lost, out=np.full(len(rows), DARK_RATIO), where=lost > 0.0)
+    return chance * np.clip(np.log(np.maximum(ratio, 1e-9)) / np.log(DARK_RATIO), 0.0, 1.0)
+
+
+def _open_way(seen: SeenPlace, points_m: FloatArray, eye_m: FloatArray) -> FloatArray:
+    """Return (R,) chances that nothing stands between a camera and the points."""
+    chance = np.where(_blocked(seen.whole, points_m, eye_m), BEHIND_GUESS, 1.0)
+    chance[_blocked(seen.measured, points_m, eye_m)] = 0.0
+    space = seen.space
+    unknown_m = unknown_lengths_m(space.low_m, space.free, eye_m, points_m, 0.15)
+    return chance * np.exp(-unknown_m / UNKNOWN_M)
+
+
+def _blocked(scene: o3d.t.geometry.RaycastingScene, points_m: FloatArray, eye_m: FloatArray) -> BoolArray:
+    """Return (R,) True where a triangle stands between a place and the points."""
+    ways_m = points_m - eye_m
+    lengths_m = np.linalg.norm(ways_m, axis=1, keepdims=True)
+    ways_m *= 1.0 - SLACK_M / np.maximum(lengths_m, 2.0 * SLACK_M)
+    rays = np.concatenate([np.broadcast_to(eye_m, ways_m.shape), ways_m], axis=1)
+    return scene.test_occlusions(tensor(rays, np.float32), 0.0, 1.0).numpy()
+
+
+def overlap_share(seen: SeenPlace, camera: Camera) -> float:
+    """Return the share of a camera's image that shows measured surface which one present camera sees, too.
+
+    It is the share for the present camera that shares most: that of the pair by which it is registered.
+    """
+    small = Camera(
+        scaled(camera.intrinsics, PREVIEW_WIDTH_PX / camera.intrinsics.width_px), camera.T_world_camera
+    )
+    hits = camera_hits(seen.measured, small)
+    z_m = hits["t_hit"].numpy().astype(float)
+    met = np.isfinite(z_m)
+    points_m = apply(camera.T_world_camera, pixel_rays(small.intrinsics)[met] * z_m[met][:, None])
+    shares = [0.0]
+    for present, there_m in zip(seen.cameras, seen.depths_m, strict=True):
+        depth_m, image_m = depth_at(points_m, present, there_m)
+        shares.append(float(np.sum(np.abs(depth_m - image_m) < 0.03 * depth_m + SLACK_M)) / z_m.size)
+    return max(shares)

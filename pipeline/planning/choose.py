@@ -1,0 +1,107 @@
+"""The choice of a few cameras out of many: greedy with exchanges, and how far from the best it can be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.types import BoolArray, FloatArray
+
+MOST_EXCHANGES = 20
+"""Most cameras that are exchanged after the greedy choice."""
+WORTH = 1e-9
+"""Relative gain below which an exchange changes nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """Chosen candidates, the most useful first."""
+
+    rows: tuple[int, ...]
+    gains: tuple[float, ...]
+    """Number of targets that each adds to those before it."""
+    best_at_most: float
+    """No choice of as many candidates gains more than this."""
+
+    @property
+    def gain(self) -> float:
+        """Expected number of targets that are measured by at least one of them."""
+        return float(sum(self.gains))
+
+
+def choose(chance: FloatArray, allowed: BoolArray, count: int) -> Choice:
+    """Choose candidates that together measure as many targets as possible.
+
+    The expected number of targets that at least one candidate measures is monotone and submodular, so the
+    greedy choice has at least 1 - 1/e of the best (Nemhauser, Wolsey and Fisher 1978). After it, single
+    candidates are exchanged while that gains. The bound on the best is the smaller of gain / (1 - 1/e) and
+    of the gain plus the ``count`` largest further gains (Minoux 1978).
+
+    Args:
+        chance: (C, T) chance of each candidate to measure each target.
+        allowed: (C,) True for candidates that may be chosen.
+        count: number of candidates; fewer are chosen if no other adds anything.
+    """
+    rows: list[int] = []
+    for _ in range(count):
+        row, gain = _best(chance, allowed, rows)
+        if gain <= 0.0:
+            break
+        rows.append(row)
+    greedy = _total(chance, rows)
+    for _ in range(MOST_EXCHANGES):
+        exchanged = _exchanged(chance, allowed, rows)
+        if exchanged is None:
+            break
+        rows = exchanged
+    ordered = _ordered(chance, rows)
+    further = np.sort(np.where(allowed, chance @ _missed(chance, rows), 0.0))[::-1][:count]
+    best_at_most = min(greedy / (1.0 - 1.0 / np.e), _total(chance, rows) + float(further.sum()))
+    return Choice(tuple(ordered), tuple(_steps(chance, ordered)), best_at_most)
+
+
+def _missed(chance: FloatArray, rows: list[int]) -> FloatArray:
+    """Return (T,) chances that none of the candidates measures each target."""
+    return np.prod(1.0 - chance[rows], axis=0, dtype=float)
+
+
+def _total(chance: FloatArray, rows: list[int]) -> float:
+    return float(chance.shape[1] - _missed(chance, rows).sum())
+
+
+def _best(chance: FloatArray, allowed: BoolArray, rows: list[int]) -> tuple[int, float]:
+    """Return the candidate that adds most to the chosen ones, and how much."""
+    gains = np.where(allowed, chance @ _missed(chance, rows), 0.0)
+    gains[rows] = 0.0
+    row = int(np.argmax(gains))
+    return row, float(gains[row])
+
+
+def _exchanged(chance: FloatArray, allowed: BoolArray, rows: list[int]) -> list[int] | None:
+    """Return the choice after the best exchange of one candidate; None if no exchange gains."""
+    best, most = None, _total(chance, rows) * (1.0 + WORTH)
+    for place in range(len(rows)):
+        others = rows[:place] + rows[place + 1 :]
+        row, gain = _best(chance, allowed, others)
+        total = _total(chance, others) + gain
+        if total > most:
+            best, most = [*others, row], total
+    return best
+
+
+def _ordered(chance: FloatArray, rows: list[int]) -> list[int]:
+    """Return the chosen candidates, each the one that adds most to those before it."""
+    left = np.zeros(len(chance), bool)
+    ordered: list[int] = []
+    left[rows] = True
+    for _ in rows:
+        row, _ = _best(chance, left, ordered)
+        ordered.append(row)
+        left[row] = False
+    return ordered
+
+
+def _steps(chance: FloatArray, ordered: list[int]) -> list[float]:
+    totals = [0.0, *(_total(chance, ordered[: k + 1]) for k in range(len(ordered)))]
+    return np.diff(totals).tolist()

@@ -1,0 +1,156 @@
+"""A plan: the next cameras of a rig, what they promise to add, and how sure that is (SPEC 12)."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from packetmesh.checks import at_least
+from packetmesh.errors import InputError
+from packetmesh.progress import Progress
+from pipeline.planning.chances import Judged, judge
+from pipeline.planning.choose import Choice, choose
+from pipeline.planning.places import WHERES, Candidate, Where, candidates
+from pipeline.planning.promise import Promise, promise
+from pipeline.planning.seen import SeenPlace
+from pipeline.planning.sensors import AS_PRESENT, Sensor
+from pipeline.types import BoolArray, FloatArray
+
+LEAST_OVERLAP = 0.25
+"""Share of a candidate's image that one present camera must see, too, so that registration finds its pose."""
+MOST_CAMERAS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class PlanConfig:
+    """What may be planned."""
+
+    cameras: int = 1
+    """Cameras to be added."""
+    sensor: str = AS_PRESENT
+    """Name of their depth camera."""
+    where: tuple[Where, ...] = field(default=WHERES)
+    """Where they may stand."""
+
+    def __post_init__(self) -> None:
+        at_least("cameras", self.cameras, 1)
+        if self.cameras > MOST_CAMERAS:
+            raise InputError(f"cameras is {self.cameras}; plan at most {MOST_CAMERAS} at a time")
+        unknown = [kind for kind in self.where if kind not in WHERES]
+        if unknown:
+            raise InputError(f"No camera can stand on {unknown[0]!r}; try one of {', '.join(WHERES)}")
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedCamera:
+    """One camera of a plan."""
+
+    T_world_camera: FloatArray
+    where: Where
+    promise: Promise
+    """What it adds to the present cameras and to those before it in the plan."""
+    overlap_share: float
+    """Share of its image on measured surface that one present camera sees, too."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The next cameras, the most useful first."""
+
+    config: PlanConfig
+    sensor: Sensor
+    cameras: tuple[PlannedCamera, ...]
+    total: Promise
+    """What all of them add together."""
+    at_least_of_best: float
+    """Share of the expected gain that the best choice among all candidates could have, at least."""
+    candidates: int
+    """Number of candidates that were judged."""
+    measured_share: float
+    """Share of the present cameras' rays on measured surface, before."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidates:
+    """All candidates, judged; plans of any size are chosen from them."""
+
+    candidates: tuple[Candidate, ...]
+    chance: FloatArray
+    """(C, T) float32 chance of each candidate to measure each target."""
+    overlap_shares: FloatArray
+    """(C,)"""
+    allowed: BoolArray
+    """(C,) True for candidates with enough overlap."""
+
+
+def iterate_candidates(
+    seen: SeenPlace, sensor: Sensor, where: Sequence[Where] = WHERES
+) -> Generator[Progress, None, Candidates]:
+    """Judge all candidates of a place.
+
+    Raises:
+        InputError: no place is allowed, or none is free.
+    """
+    found = candidates(seen, where)
+    judged: list[Judged] = []
+    for index, candidate in enumerate(found):
+        if not index % 25:
+            yield Progress(f"judging camera {index} of {len(found)}", index / len(found))
+        judged.append(judge(seen, candidate.T_world_camera, sensor))
+    overlap_shares = np.array([one.overlap_share for one in judged])
+    return Candidates(
+        found, np.stack([one.chance for one in judged]), overlap_shares, overlap_shares >= LEAST_OVERLAP
+    )
+
+
+def plan_of(
+    seen: SeenPlace, judged: Candidates, sensor: Sensor, config: PlanConfig, barred: Sequence[int] = ()
+) -> Plan:
+    """Choose the cameras of a plan.
+
+    Args:
+        seen: the place.
+        judged: its candidates, judged for the sensor.
+        sensor: the cameras' sensor.
+        config: how many cameras.
+        barred: rows of candidates that are not chosen, for example because no radio reaches them.
+
+    Raises:
+        InputError: no candidate overlaps with the present cameras, or none adds anything.
+    """
+    allowed = judged.allowed.copy()
+    allowed[list(barred)] = False
+    if not allowed.any():
+        raise InputError(
+            f"None of the {len(allowed)} possible places shows enough of what a present camera measures "
+            f"(at least {LEAST_OVERLAP:.0%} of its image), so no new camera could be registered; allow more "
+            "kinds of places, or a sensor with a wider lens"
+        )
+    choice = choose(judged.chance, allowed, config.cameras)
+    if not choice.rows:
+        raise InputError(
+            "No camera on these places would measure anything that is missing; allow more kinds of places"
+        )
+    return Plan(
+        config,
+        sensor,
+        tuple(_cameras(seen, judged, choice)),
+        promise(choice.gain, seen.targets.share),
+        min(1.0, choice.gain / choice.best_at_most),
+        len(judged.candidates),
+        seen.measured_share,
+    )
+
+
+def _cameras(seen: SeenPlace, judged: Candidates, choice: Choice) -> list[PlannedCamera]:
+    return [
+        PlannedCamera(
+            judged.candidates[row].T_world_camera,
+            judged.candidates[row].where,
+            promise(gain, seen.targets.share),
+            float(judged.overlap_shares[row]),
+        )
+        for row, gain in zip(choice.rows, choice.gains, strict=True)
+    ]
