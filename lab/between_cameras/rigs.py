@@ -71,6 +71,18 @@ def room_rig(seed: int) -> Rig:
     )
 
 
+def room_scene(seed: int) -> Scene:
+    """Return the room of ``room_rig``.
+
+    Raises:
+        PacketMeshError: no three cameras fit.
+    """
+    found = _poses(seed)
+    if found is None:
+        raise PacketMeshError(f"No three cameras fit into room {seed}; try another seed")
+    return found[0]
+
+
 def wrong_poses(rig: Rig, turn_deg: float, shift_m: float, seed: int = 0) -> list[FloatArray]:
     """Return the poses with an error of every camera but the first, in random directions."""
     rng = np.random.default_rng([seed, *rig.name.encode()])

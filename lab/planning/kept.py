@@ -12,7 +12,7 @@ from lab.worlds.sensor import sense_depth
 from pipeline.planning.promise import measured_share
 from pipeline.reconstruct import Reconstruction, reconstruct
 from pipeline.stages import cameras_of
-from pipeline.types import DepthMap, FloatArray, RgbdFrame, Rig
+from pipeline.types import CameraIntrinsics, DepthMap, FloatArray, RgbdFrame, Rig
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,15 +25,20 @@ class Outcome:
     """Whether registration found the camera's pose."""
 
 
-def rendered_frame(
-    scene: Scene, renderer: Renderer, name: str, T_world_camera: FloatArray, seed: int
+def frame_at(
+    scene: Scene,
+    renderer: Renderer,
+    camera: CameraIntrinsics,
+    name: str,
+    T_world_camera: FloatArray,
+    seed: int,
 ) -> RgbdFrame:
     """Return what a Kinect at this pose would send of a scene, its depth in whole millimetres."""
     rng = np.random.default_rng([seed, 4242])
-    view = renderer.view(scene.intrinsics, T_world_camera, "fast", rng)
-    sensed = sense_depth(view, scene.intrinsics, rng)
+    view = renderer.view(camera, T_world_camera, "fast", rng)
+    sensed = sense_depth(view, camera, rng)
     depth = DepthMap((np.rint(1000.0 * sensed.z_m) / 1000.0).astype(np.float32))
-    return RgbdFrame(name, view.rgb, depth, scene.intrinsics, T_world_camera)
+    return RgbdFrame(name, view.rgb, depth, camera, T_world_camera)
 
 
 def outcome(
@@ -41,7 +46,8 @@ def outcome(
 ) -> Outcome:
     """Add a rendered camera to a rig, reconstruct again, and compare on the rays of the earlier cameras."""
     rig = base.rig
-    frame = rendered_frame(scene, renderer, f"node_{len(rig.frames):02d}", T_world_camera, seed)
+    name = f"node_{len(rig.frames):02d}"
+    frame = frame_at(scene, renderer, scene.intrinsics, name, T_world_camera, seed)
     larger = Rig(rig.name, (*rig.frames, frame))
     after = reconstruct(larger)
     before_share = measured_share(base, cameras_of(base.rig, base.placement))

@@ -19,15 +19,15 @@ class Choice:
     """Chosen candidates, the most useful first."""
 
     rows: tuple[int, ...]
-    gains: tuple[float, ...]
-    """Number of targets that each adds to those before it."""
+    gains: FloatArray
+    """(k, T) chance of each to be the first of them that measures each target."""
     best_at_most: float
     """No choice of as many candidates gains more than this."""
 
     @property
     def gain(self) -> float:
         """Expected number of targets that are measured by at least one of them."""
-        return float(sum(self.gains))
+        return float(self.gains.sum())
 
 
 def choose(chance: FloatArray, allowed: BoolArray, count: int) -> Choice:
@@ -58,7 +58,7 @@ def choose(chance: FloatArray, allowed: BoolArray, count: int) -> Choice:
     ordered = _ordered(chance, rows)
     further = np.sort(np.where(allowed, chance @ _missed(chance, rows), 0.0))[::-1][:count]
     best_at_most = min(greedy / (1.0 - 1.0 / np.e), _total(chance, rows) + float(further.sum()))
-    return Choice(tuple(ordered), tuple(_steps(chance, ordered)), best_at_most)
+    return Choice(tuple(ordered), _steps(chance, ordered), best_at_most)
 
 
 def _missed(chance: FloatArray, rows: list[int]) -> FloatArray:
@@ -102,6 +102,6 @@ def _ordered(chance: FloatArray, rows: list[int]) -> list[int]:
     return ordered
 
 
-def _steps(chance: FloatArray, ordered: list[int]) -> list[float]:
-    totals = [0.0, *(_total(chance, ordered[: k + 1]) for k in range(len(ordered)))]
-    return np.diff(totals).tolist()
+def _steps(chance: FloatArray, ordered: list[int]) -> FloatArray:
+    missed = [_missed(chance, ordered[:k]) for k in range(len(ordered) + 1)]
+    return -np.diff(missed, axis=0)

@@ -137,7 +137,7 @@ def plan_of(
         config,
         sensor,
         tuple(_cameras(seen, judged, choice)),
-        promise(choice.gain, seen.targets.share),
+        promise(choice.gains.sum(axis=0), seen.targets),
         min(1.0, choice.gain / choice.best_at_most),
         len(judged.candidates),
         seen.measured_share,
@@ -149,7 +149,7 @@ def _cameras(seen: SeenPlace, judged: Candidates, choice: Choice) -> list[Planne
         PlannedCamera(
             judged.candidates[row].T_world_camera,
             judged.candidates[row].where,
-            promise(gain, seen.targets.share),
+            promise(gain, seen.targets),
             float(judged.overlap_shares[row]),
         )
         for row, gain in zip(choice.rows, choice.gains, strict=True)

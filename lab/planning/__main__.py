@@ -1,0 +1,32 @@
+"""Judge the planner's promises: ``python -m lab.planning [--rooms 20] [--out FOLDER]``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from functools import partial
+from pathlib import Path
+
+from lab.between_cameras.rigs import room_seeds
+from lab.planning.judging import judged_room
+from lab.planning.tables import lines
+from lab.trials import iterate_trials
+from packetmesh.progress import drain
+
+
+def main() -> None:
+    """Print the table of held-out rooms; about two minutes a room on one core."""
+    parser = argparse.ArgumentParser(prog="python -m lab.planning", description=__doc__)
+    parser.add_argument("--rooms", type=int, default=20, help="number of rooms")
+    parser.add_argument("--split", default="test", choices=("validation", "test"), help="split of the rooms")
+    parser.add_argument("--out", type=Path, default=Path("runs/planning"), help="folder of the trials")
+    parser.add_argument("--processes", type=int, default=1, help="rooms that are computed in parallel")
+    options = parser.parse_args()
+    run = partial(iterate_trials, folder=options.out, processes=options.processes)
+    found = drain(run("planning", judged_room, room_seeds(options.split, options.rooms)))
+    for line in lines([row for rows in found for row in rows]):
+        sys.stdout.write(f"{line}\n")
+
+
+if __name__ == "__main__":
+    main()
