@@ -35,9 +35,9 @@ def choose(chance: FloatArray, allowed: BoolArray, count: int) -> Choice:
 
     The expected number of targets that at least one candidate measures is monotone and submodular, so the
     greedy choice has at least 1 - 1/e of the best (Nemhauser, Wolsey and Fisher 1978). After it, single
-    candidates are exchanged while that gains. The bound on the best is the smallest of the greedy
-    gain / (1 - 1/e), of the ``count`` largest single gains, and of the gain plus the ``count`` largest further
-    gains (Minoux 1978).
+    candidates are exchanged while that gains. The bound on the best is the smallest of the greedy gain /
+    (1 - 1/e), of the ``count`` largest single gains, and of the gain plus the ``count`` largest further gains
+    (Minoux 1978).
 
     Args:
         chance: (C, T) chance of each candidate to measure each target.
