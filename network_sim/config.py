@@ -111,7 +111,8 @@ class MacConfig:
     link_bps: float = 250e3
     """Rate of the ideal link or the serial line."""
     trace: str | None = None
-    """File of the recorded link: columns of time in s, rate in Mbit/s, round trip in ms, share lost."""
+    """File of the recorded link: columns of time in s, rate in Mbit/s, round trip in ms, share lost; or a
+    mahimahi trace, or the output of iperf3 --json."""
 
     def __post_init__(self) -> None:
         above("mac.link_bps", self.link_bps, 0.0)

@@ -39,7 +39,8 @@ def deliver(
         coding: How images are encoded: raw, raw-color-first, raw-rows, raw-tiles, png, jpeg, rvl, tiles,
             layered or exact.
         moments: Number of times at which the scene is rebuilt, after equal shares of the bytes.
-        link_trace: A recorded link (s, Mbit/s, round trip ms, loss share) over which every node sends.
+        link_trace: A recorded link over which every node sends: columns (s, Mbit/s, round trip ms, loss
+            share), a mahimahi trace, or the output of iperf3 --json.
         down: Names of nodes that have failed and send nothing, for example node_02.
         chain: Settings of the reconstruction to start from.
         set: Settings of the network or the reconstruction, for example

@@ -24,6 +24,8 @@ def simulate(
     replications: int = 1,
     sweep: str | None = None,
     scheduler: str | None = None,
+    pcap: bool = False,
+    netem: bool = False,
     describe: bool = False,
     json: bool = False,
 ) -> None:
@@ -39,6 +41,8 @@ def simulate(
         sweep: One setting and its values, for example `scheme.k=3,5,10,none`; every value gets all
             replications.
         scheduler: Address of a Dask scheduler that does the runs; without it, this machine's cores do.
+        pcap: Also write trace.pcap: the frames of the first run, for Wireshark and tshark.
+        netem: Also write link.sh: a shell script that gives a Linux device a node's link, by tc netem.
         describe: List every setting with its value, unit and meaning, and run nothing.
         json: Print the metrics as one JSON object.
     """
@@ -50,12 +54,18 @@ def simulate(
     if describe:
         _describe(config, json)
         return
+    files = tuple(name for name, wanted in (("pcap", pcap), ("netem", netem)) if wanted)
+    if files and (out is None or sweep is not None):
+        where = (
+            "--sweep keeps no trace" if out is not None else "there is no folder to write to; try --out DIR"
+        )
+        wrong_use(f"--{files[0]} writes a file, but {where}")
     kept = set if sweep is None else _without_swept(set, sweep)
     say_network_notes(config, before, preset, kept)
     if sweep is not None:
         _sweep(config, preset, sweep, replications, scheduler, out, json)
     else:
-        _run(config, preset, replications, scheduler, out, json)
+        _run(config, preset, replications, scheduler, out, files, json)
 
 
 def say_network_notes(
@@ -102,8 +112,16 @@ def _describe(config: NetworkConfig, json: bool) -> None:
 
 
 def _run(
-    config: NetworkConfig, preset: str, count: int, scheduler: str | None, out: Path | None, json: bool
+    config: NetworkConfig,
+    preset: str,
+    count: int,
+    scheduler: str | None,
+    out: Path | None,
+    files: tuple[str, ...],
+    json: bool,
 ) -> None:
+    from network_sim.export.capture import check_capture, write_capture
+    from network_sim.export.netem import check_netem_script, write_netem_script
     from network_sim.metrics.metrics import metrics
     from network_sim.replicate import estimates_of, iterate_runs, replications
     from network_sim.simulate import iterate_simulation
@@ -112,6 +130,10 @@ def _run(
     from packetmesh.settings import settings
 
     first, *others = replications(config, count)
+    if "pcap" in files:
+        check_capture(first)
+    if "netem" in files:
+        check_netem_script(first)
     if out is not None:
         writable_folder(out)
     _say_disconnected(config)
@@ -121,6 +143,10 @@ def _run(
         runs += _run_with_progress(iterate_runs(others, scheduler))
     estimates = estimates_of(runs)
     if out is not None:
+        if "netem" in files:
+            write_netem_script(trace, out / "link.sh")
+        if "pcap" in files:
+            write_capture(trace, out / "trace.pcap")
         write_trace(trace, out)
         write_json(out / "config.json", {"preset": preset, "settings": settings(config)})
         write_json(out / "metrics.json", _record(estimates))

@@ -1,4 +1,4 @@
-"""Files of recorded links: text with a column each for time, rate, round trip and loss."""
+"""Files of recorded links: text with a column each for time, rate, round trip and loss, or of others."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from network_sim.radio.link_columns import (
     column_named,
     units_of,
 )
+from network_sim.radio.link_formats import other_link, refuse_capture
 from network_sim.radio.link_trace import LinkTrace
 from packetmesh.errors import InputError
 from packetmesh.files import read_text
@@ -75,19 +76,20 @@ class Form:
 
 
 def read_link_trace(path: str | Path) -> LinkTrace:
-    """Read a recorded link: a text file with columns of time, rate, round trip and share lost.
+    """Read a recorded link: columns of time, rate, round trip and share lost, or another program's file.
 
-    Without a header they are in s, Mbit/s, ms and 0 to 1; a header names quantities and units in any order.
-    If a loss is above 2, all are in per cent; times since 1970 are in the unit that their size shows. Columns
-    are separated by white space, commas, semicolons or tabs; decimal commas are recognised. Times rise from
-    row to row and count from the first one. Lines may be blank. Text after a # is a comment, but the last
-    comment above the rows is a header if it names the four quantities. A share between -1 and 0 counts as 0:
-    more packets arrived during the row than were sent in it.
+    A column of whole numbers is a mahimahi trace, JSON the output of iperf3 (``link_formats``). Else the
+    columns are in s, Mbit/s, ms and 0 to 1 without a header; a header names quantities and units in any
+    order. If a loss is above 2, all are in per cent; times since 1970 are in the unit that their size shows.
+    Columns are separated by white space, commas, semicolons or tabs; decimal commas are recognised. Times
+    rise from row to row and count from the first one. Lines may be blank. Text after a # is a comment, but
+    the last comment above the rows is a header if it names the four quantities. A share between -1 and 0
+    counts as 0: more packets arrived during the row than were sent in it.
 
     Raises:
-        InputError: the file cannot be read, has no rows, or a row has the wrong number of columns, a field
-            that is no number, or a number out of range; a unit is in doubt; times do not rise; a hole in time
-            leaves the link's state unknown; or all rates are 0.
+        InputError: the file cannot be read or is a packet capture, has no rows, or a row has the wrong number
+            of columns, a field that is no number, or a number out of range; a unit is in doubt; times do not
+            rise; a hole in time leaves the link's state unknown; or all rates are 0.
     """
     return _read(path)[0]
 
@@ -106,7 +108,12 @@ def link_notes(config: NetworkConfig) -> list[str]:
 
 def _read(path: str | Path) -> tuple[LinkTrace, str]:
     """Return the recording, and a sentence about its form if that is not the usual one."""
-    lines = list(_lines(read_text(path, "recorded link", MOST_BYTES)))
+    refuse_capture(path, MOST_BYTES)
+    text = read_text(path, "recorded link", MOST_BYTES)
+    other = other_link(text, str(path))
+    if other is not None:
+        return other
+    lines = list(_lines(text))
     rows = [line for line in lines if not line.is_comment]
     if not rows:
         raise InputError(f"The recorded link {path} has no rows; try columns of {', '.join(_wanted())}")

@@ -197,6 +197,17 @@ def container(write: Callable[[Path, Rig], Path]) -> bytes:
         return write(Path(folder) / "a", rig).read_bytes()
 
 
+def iperf3() -> bytes:
+    """A test over TCP, as iperf 3.12 writes it."""
+    times = {"start": 0, "end": 1.000129, "seconds": 1.000128984451294, "bytes": 2621440}
+    rate = {"bits_per_second": 20968815.348857943, "retransmits": 0, "omitted": False, "sender": True}
+    streams = [times | {"socket": 5, "rtt": 100} | rate]
+    second = {"start": 1.000129, "end": 2.000124, "seconds": 0.999994993209839, "bytes": 2490368}
+    start = {"version": "iperf 3.12", "test_start": {"protocol": "TCP", "num_streams": 1, "blksize": 131072}}
+    intervals = [{"streams": streams, "sum": times | rate}, {"streams": [], "sum": second | rate}]
+    return json.dumps({"start": start, "intervals": intervals, "end": {}}, indent=1).encode()
+
+
 def links() -> str:
     return "".join(f"{0.5 * k:.1f} 1.5 20.0 0.01\n" for k in range(40))
 
@@ -332,6 +343,8 @@ def samples() -> tuple[Sample, ...]:
         Sample("board.json", _board(), read_board, BOARD),
         Sample("config.json", written("a", _config), _read_config, CONFIG),
         Sample("link.txt", links().encode(), read_link_trace, LINK, True),
+        Sample("mahimahi.up", b"".join(b"%d\n" % (7 * k) for k in range(60)), read_link_trace, LINK, True),
+        Sample("iperf3.json", iperf3(), read_link_trace, LINK),
         Sample("a.bag", bag("ros1"), _read_bag, IMPORT),
         Sample("a.db3", bag("ros2"), _read_bag, IMPORT),
         Sample("a.mcap", bag("mcap"), _read_bag, IMPORT),

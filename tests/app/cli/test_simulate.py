@@ -83,6 +83,29 @@ def test_a_sweep_has_one_record_for_each_value(capsys, tmp_path):
     assert json.loads((tmp_path / "config.json").read_text())["sweep"] == "uplink.rate_bps=100000,none"
 
 
+def test_files_for_other_programs_are_written_when_asked_for(capsys, tmp_path):
+    code, _, _ = run(capsys, "--out", tmp_path / "plain", "--set", *TINY)
+    assert code == 0
+    code, _, _ = run(capsys, "--out", tmp_path / "more", "--pcap", "--netem", "--set", *TINY)
+    assert code == 0
+    plain, more = ({path.name for path in (tmp_path / name).iterdir()} for name in ("plain", "more"))
+    assert more - plain == {"trace.pcap", "link.sh"}
+    assert (tmp_path / "more" / "trace.pcap").read_bytes()[:4] == b"\x4d\x3c\xb2\xa1"
+    assert (tmp_path / "more" / "link.sh").read_text().startswith("#!/bin/sh\n")
+
+
+def test_a_network_without_links_gets_no_script_and_no_trace(capsys, tmp_path):
+    far = ("nodes.spacing_m=900", "run.horizon_s=1")
+    code, _, err = run(capsys, "--netem", "--out", tmp_path, "--set", *far)
+    assert (code, list(tmp_path.iterdir())) == (1, [])
+    assert err.splitlines()[-1].startswith("packetmesh: No node delivered a packet")
+
+
+def test_files_for_other_programs_need_a_folder(capsys):
+    got = run(capsys, "--pcap", "--set", *TINY)
+    commands.check_one_sentence(got, 2, "--pcap writes a file, but there is no folder")
+
+
 def test_a_node_without_a_way_to_the_sink_is_named_and_the_run_ends(capsys):
     far = ("nodes.layout=line", "nodes.spacing_m=150", "nodes.images=0", "nodes.interval_s=1")
     code, out, err = run(capsys, "--json", "--set", *TINY, *far)
@@ -105,6 +128,8 @@ def test_a_node_without_a_way_to_the_sink_is_named_and_the_run_ends(capsys):
         (["--set", "mac.kind=aloha"], 1, "ieee802154"),
         (["--replications", "0"], 1, "replications is 0"),
         (["--sweep", "scheme.k"], 2, "--sweep scheme.k"),
+        (["--netem", "--sweep", "scheme.k=1,2"], 2, "--netem writes a file, but --sweep keeps no trace"),
+        (["--pcap", "--set", "run.keep=images"], 1, "try run.keep=all"),
         (["--sweep", "scheme.kk=1,2"], 1, "scheme.k"),
         (["--sweep", "scheme.k=1,many"], 1, "many"),
     ],

@@ -242,7 +242,7 @@ def test_real_recordings_are_in_the_usual_form(shared_data, name):
         ("0 1_0 20 0\n", "has '1_0' as rate"),
         ("time,DL_bitrate,UL_bitrate\n0,1,2\n", "(not found: rate, round trip, loss)"),
         ("time,rate,rtt,loss\n0,1,2\n", "(the rows have 3 columns)"),
-        ("0\n1\n3\n", "line 1 has 1 column; try 4"),
+        ("0.5\n1\n3\n", "line 1 has 1 column; try 4"),
         ("1700000001 1 2 0\n1700000000 1 2 0\n", "line 2 is 1 s before the row above; try rows in order"),
         ("0 1 2 0\n1e-12 1 2 0\n", "line 2 comes 1e-12 s after the row above; try to check the unit of time"),
         ("t_s rate_bps rtt_ms loss\n0 1e300 2 0\n", "line 2 has a rate of 1e+294 Mbit/s, read in bit/s"),
