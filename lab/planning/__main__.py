@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from functools import partial
 from pathlib import Path
 
 from lab.between_cameras.rigs import room_seeds
 from lab.planning.judging import judged_room
-from lab.planning.tables import lines
+from lab.planning.measures import measures
 from lab.trials import iterate_trials
 from packetmesh.progress import drain
 
 
 def main() -> None:
-    """Print the table of held-out rooms; about two minutes a room on one core."""
+    """Print the measures of held-out rooms as JSON; about two minutes a room on one core."""
     parser = argparse.ArgumentParser(prog="python -m lab.planning", description=__doc__)
     parser.add_argument("--rooms", type=int, default=20, help="number of rooms")
     parser.add_argument("--split", default="test", choices=("validation", "test"), help="split of the rooms")
@@ -24,8 +25,7 @@ def main() -> None:
     options = parser.parse_args()
     run = partial(iterate_trials, folder=options.out, processes=options.processes)
     found = drain(run("planning", judged_room, room_seeds(options.split, options.rooms)))
-    for line in lines([row for rows in found for row in rows]):
-        sys.stdout.write(f"{line}\n")
+    sys.stdout.write(f"{json.dumps(measures([row for rows in found for row in rows]), indent=1)}\n")
 
 
 if __name__ == "__main__":

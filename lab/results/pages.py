@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from lab.benchmarks.filling import FLAT, OURS
 from lab.claims.claim import VERDICTS, is_beyond
 from lab.claims.registry import CLAIMS
-from lab.results import codings, completion, measuring, places, recordings, tables, verdicts
+from lab.results import codings, completion, measuring, places, planning, recordings, tables, verdicts
 from lab.results.markdown import Row, listed, percent
 from lab.results.record import ROOT, Record, Records, read_records
 from lab.walks.ours import OURS as WALKER
@@ -49,6 +49,7 @@ SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "surface_claims": ("Ball pivoting: the thesis's claims", tables.claims),
     "bench_surface": ("Ball pivoting: speed", tables.rolling_speed),
     "bench_measuring": ("Measuring on the surface", measuring.measuring),
+    "planning": ("Where the next camera stands", planning.planning),
     "network_claims": ("The camera network: the thesis's claims", tables.claims),
     "bench_network": ("The camera network: speed", tables.network_speed),
     "delivery_claims": ("What a lost packet costs: ours, beyond the thesis", tables.our_claims),
