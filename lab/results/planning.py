@@ -10,11 +10,11 @@ def planning(numbers: Row) -> str:
     text = (
         f"In each of {numbers['rooms']:.0f} rendered rooms on which nothing was fitted, three cameras stand, "
         "and the planner judges up to 500 places for a fourth with the same sensor. The best, and nine "
-        "others evenly down its ranking, are rendered there and the whole chain is run again. The gain is the "
-        "share of the first three cameras' rays that meet measured surface now and did not before, in points. The "
-        "constants of the promise and of its interval come from twelve other rooms, whose furniture is drawn "
-        "from the same stock. The exhaustive search renders the depth of every allowed place, and counts the "
-        "missing rays whose true points it measures."
+        "others evenly down its ranking, are rendered there, and the whole chain is run again. The gain is "
+        "the share of the first three cameras' rays that meet measured surface now and did not before, in "
+        "points. The constants of the promise and of its interval come from twelve other rooms, whose "
+        "furniture is drawn from the same stock. The exhaustive search renders the depth of every allowed "
+        "place, and counts the missing rays whose true points it measures."
     )
     rows = [
         ("suggestions", f"{numbers['suggestions']:.0f}", ""),
