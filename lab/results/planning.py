@@ -12,7 +12,7 @@ def planning(numbers: Row) -> str:
         "and the planner judges up to 500 places for a fourth with the same sensor. The best, and nine "
         "others evenly down its ranking, are rendered there, and the whole chain is run again. The gain is "
         "the share of the first three cameras' rays that meet measured surface now and did not before, in "
-        "points. The constants of the promise and of its interval come from twelve other rooms, whose "
+        "points. The constants of chances, promise and interval come from other rooms, whose "
         "furniture is drawn from the same stock. The exhaustive search renders the depth of every allowed "
         "place, and counts the missing rays whose true points it measures."
     )

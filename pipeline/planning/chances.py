@@ -16,9 +16,12 @@ from pipeline.types import BoolArray, FloatArray
 
 SLACK_M = 0.05
 """Surface this close to an estimated point along a ray is the point itself."""
-DARK_RATIO = 1000.0
-"""Where a present sensor got no return for darkness, one that gets this many times as much light is sure to
-get one; the chance of less is its logarithm's share."""
+ASKEW, FACING = 0.1, 0.6
+"""Cosines between ray and normal at which a guessed surface is never and always measured: its normal is
+uncertain, and the rays along it are those that miss it."""
+DARK_CHANCE, DARK_RATIO = 0.4, 4.0
+"""Largest chance of surface from which a present sensor got no return for darkness, and how many times as
+much light a camera must get for that."""
 MARGIN = 0.02
 """Border of an image, as a share of its size, that registered depth does not reach."""
 PREVIEW_WIDTH_PX = 48
@@ -39,8 +42,7 @@ def judge(seen: SeenPlace, T_world_camera: FloatArray, sensor: Sensor) -> Judged
     """Estimate what a camera at this pose would measure of the targets.
 
     A target counts if no surface stands between it and the camera, nor between it and the sensor's projector
-    or second camera. Its chance is then the product of those by angle, distance and darkness; by angle it is
-    the cosine, because the normal is that of a guess.
+    or second camera. Its chance is then the product of those by angle, distance and darkness.
     """
     camera = Camera(sensor.intrinsics, T_world_camera)
     targets = seen.targets
@@ -72,11 +74,13 @@ def _returned(
     ways_m = targets.points_m[rows] - eye_m
     cosine = -np.sum(ways_m * targets.normals[rows], axis=1) / np.linalg.norm(ways_m, axis=1)
     cosine = np.clip(cosine, 0.0, 1.0)  # from behind, a solid hides its own surface
-    chance = np.where(cosine > np.cos(np.radians(sensor.steepest_deg)), cosine, 0.0)
+    chance = np.clip((cosine - ASKEW) / (FACING - ASKEW), 0.0, 1.0)
     chance *= np.clip((sensor.far_m - z_m) / (FADE_SHARE * sensor.far_m), 0.0, 1.0)
     dark = targets.dark_return[rows]
-    ratio = np.divide(cosine / z_m**2, dark, out=np.full(len(rows), DARK_RATIO), where=dark > 0.0)
-    return chance * np.clip(np.log(np.maximum(ratio, 1e-9)) / np.log(DARK_RATIO), 0.0, 1.0)
+    some = dark > 0.0
+    ratio = (cosine[some] / z_m[some] ** 2) / dark[some]
+    chance[some] *= DARK_CHANCE * np.clip(np.log(np.maximum(ratio, 1.0)) / np.log(DARK_RATIO), 0.0, 1.0)
+    return chance
 
 
 def _blocked(scene: o3d.t.geometry.RaycastingScene, points_m: FloatArray, eye_m: FloatArray) -> BoolArray:

@@ -28,8 +28,6 @@ class Sensor:
     baseline_m: float
     """Distance from the camera to its projector or second camera, on its right: what only one of
     both sees has no depth. 0 for time of flight."""
-    steepest_deg: float = 86.0
-    """Angle between ray and normal from which no light returns."""
 
 
 def _lens(width_px: int, height_px: int, focal_px: float) -> CameraIntrinsics:
@@ -70,7 +68,7 @@ SENSORS = {
 """Cameras by name. Lens and range from the makers' data sheets: Kinect v1 (Khoshelham and Elberink 2012),
 Kinect v2, Azure Kinect in NFOV unbinned, RealSense D435 at 848 x 480. Noise: Kinect v1 Nguyen et al. (2012);
 Kinect v2 and Azure Kinect about their published repeatability at 1 to 3 m (Tölgyessy et al. 2021); D435 by
-its disparity's standard deviation of .08 px. The steepest angle is a Kinect v1's for all."""
+its disparity's standard deviation of .08 px."""
 
 AS_PRESENT = "as-present"
 """Name of the sensor that the rig has already."""
@@ -91,7 +89,6 @@ def sensor_named(name: str, rig: Rig) -> Sensor:
             kinect.far_m,
             first.noise or kinect.noise,
             kinect.baseline_m,
-            kinect.steepest_deg,
         )
     if name not in SENSORS:
         raise InputError(f"There is no sensor {name!r}; try one of {', '.join(sensor_names())}")
