@@ -72,8 +72,8 @@ SENSORS = {
 }
 """Cameras by name. Lens and range from the makers' data sheets: Kinect v1 (Khoshelham and Elberink 2012),
 Kinect v2, Azure Kinect in NFOV unbinned, RealSense D435 at 848 x 480. Noise: Kinect v1 Nguyen et al. (2012);
-Kinect v2 and Azure Kinect about their published repeatability at 1 to 3 m (Tölgyessy et al. 2021); D435 by its
-disparity's standard deviation of .08 px. Angles as of the Kinect v1 for all."""
+Kinect v2 and Azure Kinect about their published repeatability at 1 to 3 m (Tölgyessy et al. 2021); D435 by
+its disparity's standard deviation of .08 px. Angles as of the Kinect v1 for all."""
 
 AS_PRESENT = "as-present"
 """Name of the sensor that the rig has already."""
@@ -96,9 +96,18 @@ def sensor_named(name: str, rig: Rig) -> Sensor:
             kinect.baseline_m,
             kinect.grazing_deg,
         )
-    if name not in SENSORS:
-        raise InputError(f"There is no sensor {name!r}; try one of {', '.join(sensor_names())}")
+    check_sensor(name)
     return SENSORS[name]
+
+
+def check_sensor(name: str) -> None:
+    """Check the name of a sensor.
+
+    Raises:
+        InputError: there is no sensor of that name.
+    """
+    if name not in sensor_names():
+        raise InputError(f"There is no sensor {name!r}; try one of {', '.join(sensor_names())}")
 
 
 def sensor_names() -> Sequence[str]:
