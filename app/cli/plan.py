@@ -20,6 +20,11 @@ HEADINGS = (
     *("camera", "x m", "y m", "height m", "pan", "tilt", "on", "promise points (95 %)", "overlap"),
     *("90 % after s", "99 % after s", "J", "battery days"),
 )
+REPLACED = {
+    "radio.walls_m": "the walls are found in the surface",
+    "radio.wall_db": "--walls names their material",
+}
+"""Settings of the network that a plan replaces, with the reason."""
 DONE = 0.7
 """Share of the progress at which the reconstruction is finished."""
 
@@ -79,7 +84,7 @@ def plan(
     from app.cli.reconstruct import imported_notes, say_places
     from app.cli.runs import iterate_imported
     from app.reports.plan import write_plan_report
-    from packetmesh.files import write_json
+    from packetmesh.files import writable_folder, write_json
     from pipeline.folders.plan import (
         PAGE,
         PRINT,
@@ -96,13 +101,16 @@ def plan(
     from pipeline.planning.calls import iterate_plan
     from pipeline.reconstruct import iterate_reconstruction
     from pipeline.spec import Spec
-    from pipeline.stages import dressed
+    from pipeline.stages import RunCache, compute, dressed
 
     check_plan_folder(out, named)
     source, imported = drain(iterate_imported(named, out), say_progress)
-    say_network(network, before, preset, of_network)
-    spec = Spec(source, chain, config)
-    done = drain(part(iterate_reconstruction(spec), "reconstruction", 0.0, DONE, detail=True), say_progress)
+    say_network(network, before, preset, of_network, REPLACED)
+    spec, cache = Spec(source, chain, config), RunCache()
+    drain(compute(spec, "rig", cache), say_progress)
+    writable_folder(out)
+    steps = iterate_reconstruction(spec, cache)
+    done = drain(part(steps, "reconstruction", 0.0, DONE, detail=True), say_progress)
     planned = drain(part(iterate_plan(done, wanted, radio), "plan", DONE, 1.0, detail=True), say_progress)
     report = None if imported is None else asdict(imported)
     notes = [*imported_notes(report), *done.rig.notes]

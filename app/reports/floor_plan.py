@@ -230,7 +230,8 @@ def _sink(sink_m: FloatArray, near: bool, frame: Frame, labels: Labels) -> Itera
     yield Line(np.array([tail_mm, back_mm]), LOSS, 0.8)
     yield Area((np.array([tip_mm, back_mm + 1.7 * across, back_mm - 1.7 * across]),), LOSS)
     away_m = float(np.linalg.norm(sink_m - edge_m))
-    yield from labels.beside(*tail_mm, 2.0, f"to the sink, {away_m:.1f} m beyond the frame", 3.0, LOSS)
+    x_mm, y_mm = tail_mm
+    yield from labels.beside(x_mm, y_mm, 2.0, f"to the sink, {away_m:.1f} m beyond the frame", 3.0, LOSS)
 
 
 def _marks(cameras: Sequence[Standing], frame: Frame, labels: Labels) -> Iterator[Shape]:

@@ -16,7 +16,7 @@ MOST_PRESENT = 6
 LONGEST_BAR_MM = 60.0
 INK, SOFT = (20, 24, 28), (90, 100, 110)
 HEADINGS = ("camera", "x", "y", "height", "pan", "tilt", "on")
-ENDS_MM = (0.0, 30.0, 41.0, 53.0, 64.0, 75.0, 77.0)
+ENDS_MM = (0.0, 28.0, 39.0, 53.0, 64.0, 75.0, 77.5)
 """Left ends of the first and last column, right ends of those with numbers."""
 NOTES = (
     "x, y and height of the lens in metres, height above the floor. Pan: from the",

@@ -59,17 +59,18 @@ def _known(seen: SeenPlace, painter: MeshPainter, camera: Camera, texture: Textu
 def _new_share(seen: SeenPlace, camera: Camera, chance: FloatArray) -> FloatArray:
     """Return (H, W) chances that a pixel shows one of the targets and measures it.
 
-    Each target is a disc as large as the ray's share of a present camera's image would be from here.
+    Each target is a disc as large as its part of the present camera's image is from here.
     """
     targets, lens = seen.targets, camera.intrinsics
     in_camera_m = apply(inverse(camera.T_world_camera), targets.points_m)
     rows = np.flatnonzero((chance > 0.0) & (in_camera_m[:, 2] > 0.0))
     rows = rows[np.argsort(chance[rows])]  # the likeliest last
     pixels = project(lens, in_camera_m[rows])
-    eyes_m = np.array([present.T_world_camera[:3, 3] for present in seen.cameras])
-    away_m = np.linalg.norm(targets.points_m[rows, None] - eyes_m, axis=2).mean(axis=1)
-    step_px = np.sqrt(targets.share * sum(depth_m.size for depth_m in seen.depths_m))
-    radii_m = 0.6 * step_px * away_m / seen.cameras[0].intrinsics.fx_px
+    present = [view.camera for view in seen.views]
+    eyes_m = np.array([one.T_world_camera[:3, 3] for one in present])[targets.view[rows]]
+    step_px = np.sqrt(targets.share * sum(view.meets.size for view in seen.views))
+    side = step_px / np.array([one.intrinsics.fx_px for one in present])[targets.view[rows]]
+    radii_m = 0.6 * side * np.linalg.norm(targets.points_m[rows] - eyes_m, axis=1)
     radii_px = np.maximum(1, np.rint(radii_m * lens.fx_px / in_camera_m[rows, 2]).astype(int))
     share = np.zeros((lens.height_px, lens.width_px), np.float32)
     for pixel, radius_px, row in zip(pixels, radii_px.tolist(), rows.tolist(), strict=True):

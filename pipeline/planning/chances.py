@@ -9,18 +9,18 @@ import numpy as np
 from pipeline.kernels.geometry import apply, inverse, pixel_rays, project, scaled
 from pipeline.kernels.open3d_runtime import o3d
 from pipeline.kernels.rays import Camera, camera_hits, tensor
-from pipeline.planning.seen import SeenPlace, depth_at, unknown_lengths_m
+from pipeline.planning.seen import SeenPlace
 from pipeline.planning.sensors import FADE_SHARE, Sensor
+from pipeline.planning.views import depth_at
 from pipeline.types import BoolArray, FloatArray
 
 SLACK_M = 0.05
 """Surface this close to an estimated point along a ray is the point itself."""
-BEHIND_GUESS = 0.4
-"""Chance that a ray passes where guessed surface stands in its way."""
-UNKNOWN_M = 1.5
-"""Way through unknown space after which a ray is still free with a chance of 1/e."""
-DARK_RATIO = 5.0
-"""Ratio of the infrared returns between which a dark surface changes from never to always measured."""
+DARK_RATIO = 1000.0
+"""Where a present sensor got no return for darkness, one that gets this many times as much light is sure to
+get one; the chance of less is its logarithm's share."""
+MARGIN = 0.02
+"""Border of an image, as a share of its size, that registered depth does not reach."""
 PREVIEW_WIDTH_PX = 48
 """Width of the image with which overlap is estimated."""
 
@@ -38,8 +38,9 @@ class Judged:
 def judge(seen: SeenPlace, T_world_camera: FloatArray, sensor: Sensor) -> Judged:
     """Estimate what a camera at this pose would measure of the targets.
 
-    The chance of a target is the product of the chances that its way is free, that its angle, distance and
-    darkness return light, and that the sensor's projector or second camera sees it, too.
+    A target counts if no surface stands between it and the camera, nor between it and the sensor's projector
+    or second camera. Its chance is then the product of those by angle, distance and darkness; by angle it is
+    the cosine, because the normal is that of a guess.
     """
     camera = Camera(sensor.intrinsics, T_world_camera)
     targets = seen.targets
@@ -47,18 +48,18 @@ def judge(seen: SeenPlace, T_world_camera: FloatArray, sensor: Sensor) -> Judged
     in_camera_m = apply(inverse(T_world_camera), targets.points_m)
     rows = np.flatnonzero((in_camera_m[:, 2] > sensor.near_m) & (in_camera_m[:, 2] < sensor.far_m))
     pixels = project(sensor.intrinsics, in_camera_m[rows])
-    size_px = sensor.intrinsics.width_px, sensor.intrinsics.height_px
-    rows = rows[np.all((pixels >= 0.0) & (pixels < size_px), axis=1)]
+    size_px = np.array([sensor.intrinsics.width_px, sensor.intrinsics.height_px])
+    rows = rows[np.all((pixels >= MARGIN * size_px) & (pixels < (1.0 - MARGIN) * size_px), axis=1)]
     if len(rows):
         eye_m = T_world_camera[:3, 3]
         likely = _returned(seen, rows, in_camera_m[rows, 2], eye_m, sensor)
         some = likely > 0.0
         rows, likely = rows[some], likely[some]
         points_m = targets.points_m[rows]
-        likely *= _open_way(seen, points_m, eye_m)
+        likely *= ~_blocked(seen.whole, points_m, eye_m)
         if sensor.baseline_m:
             other_m = eye_m + sensor.baseline_m * T_world_camera[:3, 0]
-            likely *= ~_blocked(seen.measured, points_m, other_m)
+            likely *= ~_blocked(seen.whole, points_m, other_m)
         chance[rows] = likely
     return Judged(chance, overlap_share(seen, camera))
 
@@ -69,24 +70,13 @@ def _returned(
     """Return (R,) chances that enough light returns: by angle, distance, and darkness seen before."""
     targets = seen.targets
     ways_m = targets.points_m[rows] - eye_m
-    facing = -np.sum(ways_m * targets.normals[rows], axis=1) / np.linalg.norm(ways_m, axis=1)
-    cosine = np.abs(facing)
-    low_deg, high_deg = sensor.grazing_deg
-    angle_deg = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
-    chance = np.clip((high_deg - angle_deg) / (high_deg - low_deg), 0.0, 1.0)
+    cosine = -np.sum(ways_m * targets.normals[rows], axis=1) / np.linalg.norm(ways_m, axis=1)
+    cosine = np.clip(cosine, 0.0, 1.0)  # from behind, a solid hides its own surface
+    chance = np.where(cosine > np.cos(np.radians(sensor.steepest_deg)), cosine, 0.0)
     chance *= np.clip((sensor.far_m - z_m) / (FADE_SHARE * sensor.far_m), 0.0, 1.0)
-    lost = targets.lost_return[rows]
-    ratio = np.divide(cosine / z_m**2, lost, out=np.full(len(rows), DARK_RATIO), where=lost > 0.0)
+    dark = targets.dark_return[rows]
+    ratio = np.divide(cosine / z_m**2, dark, out=np.full(len(rows), DARK_RATIO), where=dark > 0.0)
     return chance * np.clip(np.log(np.maximum(ratio, 1e-9)) / np.log(DARK_RATIO), 0.0, 1.0)
-
-
-def _open_way(seen: SeenPlace, points_m: FloatArray, eye_m: FloatArray) -> FloatArray:
-    """Return (R,) chances that nothing stands between a camera and the points."""
-    chance = np.where(_blocked(seen.whole, points_m, eye_m), BEHIND_GUESS, 1.0)
-    chance[_blocked(seen.measured, points_m, eye_m)] = 0.0
-    space = seen.space
-    unknown_m = unknown_lengths_m(space.low_m, space.free, eye_m, points_m, 0.15)
-    return chance * np.exp(-unknown_m / UNKNOWN_M)
 
 
 def _blocked(scene: o3d.t.geometry.RaycastingScene, points_m: FloatArray, eye_m: FloatArray) -> BoolArray:
@@ -111,7 +101,7 @@ def overlap_share(seen: SeenPlace, camera: Camera) -> float:
     met = np.isfinite(z_m)
     points_m = apply(camera.T_world_camera, pixel_rays(small.intrinsics)[met] * z_m[met][:, None])
     shares = [0.0]
-    for present, there_m in zip(seen.cameras, seen.depths_m, strict=True):
-        depth_m, image_m = depth_at(points_m, present, there_m)
+    for view in seen.views:
+        depth_m, image_m = depth_at(points_m, view.camera, view.z_m)
         shares.append(float(np.sum(np.abs(depth_m - image_m) < 0.03 * depth_m + SLACK_M)) / z_m.size)
     return max(shares)

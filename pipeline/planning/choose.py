@@ -19,15 +19,15 @@ class Choice:
     """Chosen candidates, the most useful first."""
 
     rows: tuple[int, ...]
-    gains: tuple[float, ...]
-    """Number of targets that each adds to those before it."""
+    gains: FloatArray
+    """(k, T) chance of each to be the first of them that measures each target."""
     best_at_most: float
     """No choice of as many candidates gains more than this."""
 
     @property
     def gain(self) -> float:
         """Expected number of targets that are measured by at least one of them."""
-        return float(sum(self.gains))
+        return float(self.gains.sum())
 
 
 def choose(chance: FloatArray, allowed: BoolArray, count: int) -> Choice:
@@ -35,8 +35,9 @@ def choose(chance: FloatArray, allowed: BoolArray, count: int) -> Choice:
 
     The expected number of targets that at least one candidate measures is monotone and submodular, so the
     greedy choice has at least 1 - 1/e of the best (Nemhauser, Wolsey and Fisher 1978). After it, single
-    candidates are exchanged while that gains. The bound on the best is the smaller of gain / (1 - 1/e) and
-    of the gain plus the ``count`` largest further gains (Minoux 1978).
+    candidates are exchanged while that gains. The bound on the best is the smallest of the greedy gain /
+    (1 - 1/e), of the ``count`` largest single gains, and of the gain plus the ``count`` largest further gains
+    (Minoux 1978).
 
     Args:
         chance: (C, T) chance of each candidate to measure each target.
@@ -56,9 +57,12 @@ def choose(chance: FloatArray, allowed: BoolArray, count: int) -> Choice:
             break
         rows = exchanged
     ordered = _ordered(chance, rows)
-    further = np.sort(np.where(allowed, chance @ _missed(chance, rows), 0.0))[::-1][:count]
-    best_at_most = min(greedy / (1.0 - 1.0 / np.e), _total(chance, rows) + float(further.sum()))
-    return Choice(tuple(ordered), tuple(_steps(chance, ordered)), best_at_most)
+    best_at_most = min(
+        greedy / (1.0 - 1.0 / np.e),
+        _largest(chance, allowed, [], count),
+        _total(chance, rows) + _largest(chance, allowed, rows, count),
+    )
+    return Choice(tuple(ordered), _steps(chance, ordered), best_at_most)
 
 
 def _missed(chance: FloatArray, rows: list[int]) -> FloatArray:
@@ -68,6 +72,12 @@ def _missed(chance: FloatArray, rows: list[int]) -> FloatArray:
 
 def _total(chance: FloatArray, rows: list[int]) -> float:
     return float(chance.shape[1] - _missed(chance, rows).sum())
+
+
+def _largest(chance: FloatArray, allowed: BoolArray, rows: list[int], count: int) -> float:
+    """Return the sum of the ``count`` largest gains that single candidates add to the chosen ones."""
+    gains = np.where(allowed, chance @ _missed(chance, rows), 0.0)
+    return float(np.sort(gains)[::-1][:count].sum())
 
 
 def _best(chance: FloatArray, allowed: BoolArray, rows: list[int]) -> tuple[int, float]:
@@ -102,6 +112,6 @@ def _ordered(chance: FloatArray, rows: list[int]) -> list[int]:
     return ordered
 
 
-def _steps(chance: FloatArray, ordered: list[int]) -> list[float]:
-    totals = [0.0, *(_total(chance, ordered[: k + 1]) for k in range(len(ordered)))]
-    return np.diff(totals).tolist()
+def _steps(chance: FloatArray, ordered: list[int]) -> FloatArray:
+    missed = [_missed(chance, ordered[:k]) for k in range(len(ordered) + 1)]
+    return -np.diff(missed, axis=0)

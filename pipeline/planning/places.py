@@ -12,7 +12,7 @@ from scipy.cluster.vq import kmeans2
 from packetmesh.errors import InputError
 from pipeline.kernels.geometry import look_at
 from pipeline.kernels.rays import tensor, triangle_areas_m2
-from pipeline.planning.seen import CELL_M, SeenPlace
+from pipeline.planning.seen import SeenPlace
 from pipeline.types import BoolArray, FloatArray
 
 Where = Literal["walls", "ceiling", "furniture", "tripods"]
@@ -147,8 +147,8 @@ def _tripods(seen: SeenPlace) -> FloatArray:
     on_floor_m = _apart(on_floor_m)
     above_m = [on_floor_m + np.array([0.0, 0.0, height_m]) for height_m in TRIPOD_M]
     beside_m = [
-        camera.T_world_camera[:3, 3] + side * away_m * camera.T_world_camera[:3, 0]
-        for camera in seen.cameras
+        view.camera.T_world_camera[:3, 3] + side * away_m * view.camera.T_world_camera[:3, 0]
+        for view in seen.views
         for away_m in BESIDE_M
         for side in (-1.0, 1.0)
     ]
@@ -166,10 +166,5 @@ def _apart(places_m: FloatArray) -> FloatArray:
 
 def is_free(seen: SeenPlace, places_m: FloatArray, clear_m: float) -> BoolArray:
     """Return (N,) True for (N, 3) places in free cells and at least ``clear_m`` from any surface."""
-    space = seen.space
-    cells = np.floor((places_m - space.low_m) / CELL_M).astype(int)
-    inside = np.all((cells >= 0) & (cells < space.free.shape), axis=1)
-    free = np.zeros(len(places_m), bool)
-    free[inside] = space.free[tuple(cells[inside].T)]
     distance_m = seen.whole.compute_distance(tensor(places_m, np.float32)).numpy()
-    return free & (distance_m >= clear_m)
+    return seen.space.is_free(places_m) & (distance_m >= clear_m)

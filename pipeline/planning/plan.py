@@ -39,6 +39,8 @@ class PlanConfig:
         if self.cameras > MOST_CAMERAS:
             raise InputError(f"cameras is {self.cameras}; plan at most {MOST_CAMERAS} at a time")
         check_sensor(self.sensor)
+        if not self.where:
+            raise InputError(f"No camera may stand anywhere; allow one or more of {', '.join(WHERES)}")
         unknown = [kind for kind in self.where if kind not in WHERES]
         if unknown:
             raise InputError(f"No camera can stand on {unknown[0]!r}; try one of {', '.join(WHERES)}")
@@ -138,7 +140,7 @@ def plan_of(
         config,
         sensor,
         tuple(_cameras(seen, judged, choice)),
-        promise(choice.gain, seen.targets.share),
+        promise(choice.gains.sum(axis=0), seen.targets),
         min(1.0, choice.gain / choice.best_at_most),
         len(judged.candidates),
         seen.measured_share,
@@ -150,7 +152,7 @@ def _cameras(seen: SeenPlace, judged: Candidates, choice: Choice) -> list[Planne
         PlannedCamera(
             judged.candidates[row].T_world_camera,
             judged.candidates[row].where,
-            promise(gain, seen.targets.share),
+            promise(gain, seen.targets),
             float(judged.overlap_shares[row]),
         )
         for row, gain in zip(choice.rows, choice.gains, strict=True)

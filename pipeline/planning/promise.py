@@ -8,15 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.kernels.rays import Camera
+from pipeline.planning.targets import Targets
 from pipeline.reconstruct import Reconstruction
 from pipeline.surface.quality import guessed_share, missed_share, seen_by
+from pipeline.types import FloatArray
 
-KEPT = 0.75
-"""Share of an expected gain that was real on average, in the rooms of ``lab.planning``'s tuning."""
-SPREAD = 0.5
-"""Half of the 95 % interval as a share of the promise, and"""
-LEAST_SPREAD = 0.003
-"""its least, a share of all rays; both hold 95 % of the real gains in those rooms."""
+KEPT = 1.3
+"""Real gain, on average, for one of the sum of chances: a hole's last points close it around them, too."""
+LEAST_HALF = 0.008
+"""Least half of the 95 % interval, a share of all rays."""
+HALF = 0.37
+"""Half of the interval as a share of the promise; the three halves are added as squares."""
+DARK_HALF = 1.2
+"""Half of the interval as a share of what is promised of dark surface, which is lost or won together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,10 +31,14 @@ class Promise:
     ci95_share: tuple[float, float]
 
 
-def promise(expected_targets: float, target_share: float) -> Promise:
-    """Return the promise for an expected number of targets, each of which is a share of all rays."""
-    gain = KEPT * expected_targets * target_share
-    half = max(LEAST_SPREAD, SPREAD * gain)
+def promise(chance: FloatArray, targets: Targets) -> Promise:
+    """Return what (T,) chances of the targets promise together.
+
+    The constants of this module come from 144 cameras in twelve validation rooms of ``lab.planning``.
+    """
+    gain = KEPT * targets.share * float(np.sum(chance))
+    dark = KEPT * targets.share * float(np.sum(chance[targets.dark_return > 0.0]))
+    half = float(np.sqrt(LEAST_HALF**2 + (HALF * gain) ** 2 + (DARK_HALF * dark) ** 2))
     return Promise(gain, (max(0.0, gain - half), gain + half))
 
 

@@ -28,8 +28,8 @@ class Sensor:
     baseline_m: float
     """Distance from the camera to its projector or second camera, on its right: what only one of
     both sees has no depth. 0 for time of flight."""
-    grazing_deg: tuple[float, float]
-    """Angles between ray and normal: up to the first no return is lost, from the second on every one."""
+    steepest_deg: float = 86.0
+    """Angle between ray and normal from which no light returns."""
 
 
 def _lens(width_px: int, height_px: int, focal_px: float) -> CameraIntrinsics:
@@ -40,7 +40,7 @@ def _lens(width_px: int, height_px: int, focal_px: float) -> CameraIntrinsics:
 SENSORS = {
     sensor.name: sensor
     for sensor in (
-        Sensor("kinect-v1", _lens(640, 480, 525.0), 0.4, 4.5, KINECT_NOISE, 0.075, (70.0, 86.0)),
+        Sensor("kinect-v1", _lens(640, 480, 525.0), 0.4, 4.5, KINECT_NOISE, 0.075),
         Sensor(
             "kinect-v2",
             _lens(512, 424, 365.0),
@@ -48,7 +48,6 @@ SENSORS = {
             4.5,
             DepthNoise(s0_m=0.0015, s1_m=0.0004, p=2.0, q=1.0),
             0.0,
-            (70.0, 86.0),
         ),
         Sensor(
             "azure-kinect",
@@ -57,7 +56,6 @@ SENSORS = {
             3.86,
             DepthNoise(s0_m=0.001, s1_m=0.0003, p=2.0, q=1.0),
             0.0,
-            (70.0, 86.0),
         ),
         Sensor(
             "realsense-d435",
@@ -66,14 +64,13 @@ SENSORS = {
             6.0,
             DepthNoise(s0_m=0.001, s1_m=0.0038, p=2.0, q=1.0),
             0.05,
-            (70.0, 86.0),
         ),
     )
 }
 """Cameras by name. Lens and range from the makers' data sheets: Kinect v1 (Khoshelham and Elberink 2012),
 Kinect v2, Azure Kinect in NFOV unbinned, RealSense D435 at 848 x 480. Noise: Kinect v1 Nguyen et al. (2012);
 Kinect v2 and Azure Kinect about their published repeatability at 1 to 3 m (Tölgyessy et al. 2021); D435 by
-its disparity's standard deviation of .08 px. Angles as of the Kinect v1 for all."""
+its disparity's standard deviation of .08 px. The steepest angle is a Kinect v1's for all."""
 
 AS_PRESENT = "as-present"
 """Name of the sensor that the rig has already."""
@@ -94,7 +91,7 @@ def sensor_named(name: str, rig: Rig) -> Sensor:
             kinect.far_m,
             first.noise or kinect.noise,
             kinect.baseline_m,
-            kinect.grazing_deg,
+            kinect.steepest_deg,
         )
     check_sensor(name)
     return SENSORS[name]
