@@ -18,6 +18,7 @@ from app.cli.infer_depth import infer_depth
 from app.cli.lesson import lesson
 from app.cli.measure import measure
 from app.cli.mesh import mesh
+from app.cli.plan import plan
 from app.cli.reconstruct import reconstruct
 from app.cli.register import register
 from app.cli.repeated import joined, with_negative_places
@@ -39,6 +40,7 @@ COMMANDS: dict[str, Any] = {
     "register": register,
     "mesh": mesh,
     "measure": measure,
+    "plan": plan,
     "infer-depth": infer_depth,
     "simulate": simulate,
     "deliver": deliver,

@@ -48,7 +48,7 @@ def deliver(
         json: Print the moments as one JSON object.
     """
     named = images.source()
-    before, network, config, of_network = _settings(preset, chain, set)
+    before, network, config, of_network = settings_of(preset, chain, set)
 
     from app.cli.reconstruct import imported_notes
     from app.cli.runs import iterate_imported
@@ -65,7 +65,7 @@ def deliver(
     source, imported = drain(iterate_imported(named, out), say_progress)
     if link_trace is not None:
         network = _with_link(network, link_trace, of_network)
-    _say_notes(network, before, preset, of_network)
+    say_network(network, before, preset, of_network, {})
     delivery_spec = DeliverySpec(Spec(source, chain, config), network, coding, moments, down)
     cache = RunCache()
     drain(compute(delivery_spec.spec, "rig", cache), say_progress)
@@ -86,7 +86,7 @@ def deliver(
         print_json(metrics)
 
 
-def _settings(
+def settings_of(
     preset: str, chain: str, changes: tuple[str, ...]
 ) -> tuple[NetworkConfig, NetworkConfig, PipelineConfig, list[str]]:
     """Return the network before and after its changes, the chain's settings, and the network's changes.
@@ -113,12 +113,26 @@ def _with_link(network: NetworkConfig, link_trace: Path, changes: list[str]) -> 
     return replayed
 
 
-def _say_notes(network: NetworkConfig, before: NetworkConfig, preset: str, changes: list[str]) -> None:
-    """Print which of the network's settings change nothing, and how recorded links were read."""
+def say_network(
+    network: NetworkConfig,
+    before: NetworkConfig,
+    preset: str,
+    changes: list[str],
+    replacing: dict[str, str],
+) -> None:
+    """Print which of the network's settings change nothing, and how recorded links were read.
+
+    Args:
+        network: the network, with the changes.
+        before: the preset without them.
+        preset: name of the preset, or of its file.
+        changes: settings as ``key=value``.
+        replacing: further settings that the command replaces, with the reason.
+    """
     from app.cli.simulate import say_network_notes
     from pipeline.delivery.plan import replaced_settings
 
-    replaced = replaced_settings(network)
+    replaced = replaced_settings(network) | replacing
     for key in dict.fromkeys(map(key_of, changes)):
         if key in replaced:
             say(f"{key} changes nothing here: {replaced[key]}")

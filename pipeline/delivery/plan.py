@@ -21,6 +21,19 @@ def poses_known(rig: Rig) -> bool:
     return len(places_m) == 1 or bool(np.ptp(places_m, axis=0).max() > SAME_PLACE_M)
 
 
+def check_collects(network: NetworkConfig) -> None:
+    """Check that a network's nodes stand still.
+
+    Raises:
+        InputError: they are vehicles.
+    """
+    if network.scenario != "collection":
+        raise InputError(
+            f"A network of the scenario {network.scenario} has no cameras that stand still; try a preset "
+            "such as office, thesis-link or greenhouse"
+        )
+
+
 def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> NetworkConfig:
     """Configure a network with the rig's cameras as nodes, each with one image to send.
 
@@ -36,11 +49,7 @@ def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> 
     Raises:
         InputError: the network's nodes are vehicles.
     """
-    if network.scenario != "collection":
-        raise InputError(
-            f"A network of the scenario {network.scenario} has no cameras that stand still; try a preset "
-            "such as office, thesis-link or greenhouse"
-        )
+    check_collects(network)
     believed_places_m = places_of(rig, network.nodes.spacing_m) if poses_known(rig) else ()
     nodes = replace(
         network.nodes,

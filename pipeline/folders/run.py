@@ -64,13 +64,22 @@ def check_run_folder(folder: Path, source: FileSource) -> None:
     Raises:
         InputError: the folder is a rig or a recording, or the source is in a part of it that is cleared.
     """
+    check_no_images(folder)
+    cleared = (*FILES, *OTHER_FILES, KEYFRAMES, *([IMPORTED] if is_imported(source) else []))
+    check_inputs_stay([folder / name for name in cleared], source.paths)
+
+
+def check_no_images(folder: Path) -> None:
+    """Check that a folder for results is not one of images.
+
+    Raises:
+        InputError: it is a rig or a recording.
+    """
     if is_rig(folder) or is_recording(folder):
         raise InputError(
             f"{folder} is a rig or a recording, and the results would replace some of its files; try another "
             "place for --out"
         )
-    cleared = (*FILES, *OTHER_FILES, KEYFRAMES, *([IMPORTED] if is_imported(source) else []))
-    check_inputs_stay([folder / name for name in cleared], source.paths)
 
 
 def clear_run_folder(folder: Path) -> None:

@@ -15,7 +15,7 @@ from pipeline.planning.choose import Choice, choose
 from pipeline.planning.places import WHERES, Candidate, Where, candidates
 from pipeline.planning.promise import Promise, promise
 from pipeline.planning.seen import SeenPlace
-from pipeline.planning.sensors import AS_PRESENT, Sensor
+from pipeline.planning.sensors import AS_PRESENT, Sensor, check_sensor
 from pipeline.types import BoolArray, FloatArray
 
 LEAST_OVERLAP = 0.25
@@ -38,6 +38,9 @@ class PlanConfig:
         at_least("cameras", self.cameras, 1)
         if self.cameras > MOST_CAMERAS:
             raise InputError(f"cameras is {self.cameras}; plan at most {MOST_CAMERAS} at a time")
+        check_sensor(self.sensor)
+        if not self.where:
+            raise InputError(f"No camera may stand anywhere; allow one or more of {', '.join(WHERES)}")
         unknown = [kind for kind in self.where if kind not in WHERES]
         if unknown:
             raise InputError(f"No camera can stand on {unknown[0]!r}; try one of {', '.join(WHERES)}")

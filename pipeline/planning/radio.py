@@ -15,7 +15,7 @@ from network_sim.types import NS_PER_S
 from packetmesh.checks import above
 from packetmesh.errors import InputError
 from pipeline.delivery import coding_named
-from pipeline.delivery.plan import network_of
+from pipeline.delivery.plan import check_collects, network_of, placed
 from pipeline.delivery.sending import packet_bytes_of
 from pipeline.delivery.sink import images_of
 from pipeline.planning.plan import Candidates, Plan, PlanConfig, plan_of
@@ -53,6 +53,8 @@ class PlanRadio:
     def __post_init__(self) -> None:
         for key in ("every_s", "budget_j", "deadline_s"):
             above(key, getattr(self, key), 0.0)
+        coding_named(self.coding)
+        check_collects(self.network)
         if self.walls not in DAMPING_DB:
             raise InputError(f"There is no wall of {self.walls!r}; try one of {', '.join(DAMPING_DB)}")
 
@@ -87,41 +89,61 @@ class PlanDelivery:
         return sum(camera.joules for camera in self.cameras)
 
 
+@dataclass(frozen=True, slots=True)
+class _Sending:
+    """What is the same for all plans of a rig."""
+
+    rig: Rig
+    present_bytes: tuple[int, ...]
+    """Bytes of each present camera's image."""
+    walls_m: FloatArray
+
+
 def deliver_plan(rig: Rig, seen: SeenPlace, plan: Plan, radio: PlanRadio) -> PlanDelivery:
     """Send one image of every present and every new camera through the network model.
 
     The room's walls damp the links. A new camera's image has as many bytes as the present ones have on
     average; its content, and so its surface, is not known yet.
 
+    Args:
+        rig: the registered cameras, at the poses that registration found (``registered``).
+        seen: the place.
+        plan: the new cameras.
+        radio: how images travel.
+
     Raises:
-        InputError: the network has no cameras that stand still, or the coding does not exist.
+        InputError: the network places another number of cameras than the rig has.
     """
+    return _delivered(_sending(rig, seen, radio), plan, radio)
+
+
+def _sending(rig: Rig, seen: SeenPlace, radio: PlanRadio) -> _Sending:
     coding, packet_bytes = coding_named(radio.coding), packet_bytes_of(radio.network)
-    present = [len(coding.encode(images_of(frame), packet_bytes)) for frame in rig.frames]
-    image_bytes = round(float(np.mean(present)))
-    first = rig.frames[0]
-    added = [replace(first, T_world_camera=camera.T_world_camera) for camera in plan.cameras]
-    larger = Rig(rig.name, (*rig.frames, *added))
-    walls_m = walls_of(seen)
+    present_bytes = tuple(len(coding.encode(images_of(frame), packet_bytes)) for frame in rig.frames)
+    return _Sending(rig, present_bytes, walls_of(seen))
+
+
+def _delivered(sending: _Sending, plan: Plan, radio: PlanRadio) -> PlanDelivery:
+    rig, walls_m, present = sending.rig, sending.walls_m, len(sending.rig.frames)
+    image_bytes = round(float(np.mean(sending.present_bytes)))
     damped = replace(
         radio.network.radio, walls_m=tuple(walls_m.ravel().tolist()), wall_db=DAMPING_DB[radio.walls]
     )
-    network = network_of(rig, present, replace(radio.network, radio=damped))
-    old_m = np.reshape(network.nodes.places_m, (-1, 2))
+    network = network_of(rig, sending.present_bytes, replace(radio.network, radio=damped))
+    old_m = np.reshape(placed(rig, network, range(present)).nodes.places_m, (-1, 2))
     sink_m = old_m[-1] if radio.sink_m is None else np.asarray(radio.sink_m)
     new_m = [camera.T_world_camera[:2, 3] for camera in plan.cameras]
     places_m = np.vstack([old_m[:-1], *new_m, sink_m])
     nodes = replace(
         network.nodes,
-        count=len(larger.frames),
+        count=present + len(new_m),
         places_m=tuple(places_m.ravel().tolist()),
-        bytes_by_node=(*present, *len(added) * [image_bytes]),
+        bytes_by_node=(*sending.present_bytes, *len(new_m) * [image_bytes]),
     )
     trace = simulate(replace(network, nodes=nodes))
     came = arrivals(trace)
     times_s = [
-        [_seconds(came, len(present) + k, share * image_bytes) for share in (0.9, 0.99)]
-        for k in range(len(added))
+        [_seconds(came, present + k, share * image_bytes) for share in (0.9, 0.99)] for k in range(len(new_m))
     ]
     ends_ns = [
         min(round(last_s * NS_PER_S), trace.horizon_ns) if np.isfinite(last_s) else trace.horizon_ns
@@ -129,7 +151,7 @@ def deliver_plan(rig: Rig, seen: SeenPlace, plan: Plan, radio: PlanRadio) -> Pla
     ]
     spent_j = energy_by_node_j(trace, ends_ns)
     cameras = [
-        CameraDelivery(both_s[0], both_s[1], float(spent_j[k, len(present) + k]), 0.0)
+        CameraDelivery(both_s[0], both_s[1], float(spent_j[k, present + k]), 0.0)
         for k, both_s in enumerate(times_s)
     ]
     lasting = [replace(one, battery_days=_battery_days(one, radio)) for one in cameras]
@@ -164,10 +186,11 @@ def plan_within(
     Raises:
         InputError: no plan meets both, or no radio reaches; the message says what the last one tried needs.
     """
+    sending = _sending(rig, seen, radio)
     barred: list[int] = []
     for _ in range(ROUNDS):
         plan = plan_of(seen, judged, sensor, config, barred)
-        delivery = deliver_plan(rig, seen, plan, radio)
+        delivery = _delivered(sending, plan, radio)
         late = [
             camera
             for camera, sent in zip(plan.cameras, delivery.cameras, strict=True)

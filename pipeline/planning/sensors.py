@@ -90,9 +90,18 @@ def sensor_named(name: str, rig: Rig) -> Sensor:
             first.noise or kinect.noise,
             kinect.baseline_m,
         )
-    if name not in SENSORS:
-        raise InputError(f"There is no sensor {name!r}; try one of {', '.join(sensor_names())}")
+    check_sensor(name)
     return SENSORS[name]
+
+
+def check_sensor(name: str) -> None:
+    """Check the name of a sensor.
+
+    Raises:
+        InputError: there is no sensor of that name.
+    """
+    if name not in sensor_names():
+        raise InputError(f"There is no sensor {name!r}; try one of {', '.join(sensor_names())}")
 
 
 def sensor_names() -> Sequence[str]:

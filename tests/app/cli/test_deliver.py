@@ -168,11 +168,11 @@ def test_network_settings_that_change_nothing_and_the_form_of_a_recorded_link_ar
 
 
 def test_a_layout_counts_only_for_a_rig_without_poses_and_that_is_said(capsys):
-    from app.cli.deliver import _say_notes
+    from app.cli.deliver import say_network
     from network_sim.presets import PRESETS
     from packetmesh.settings import with_settings
 
     office = PRESETS["office"]
     for changes, said in ((["nodes.layout=line"], 1), (["nodes.layout=line", "mac.kind=serial"], 1), ([], 0)):
-        _say_notes(with_settings(office, changes), office, "office", changes)
+        say_network(with_settings(office, changes), office, "office", changes)
         assert capsys.readouterr().err.count("nodes.layout changes nothing here") == said

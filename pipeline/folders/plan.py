@@ -1,0 +1,159 @@
+"""Output folder of a plan: its record, report and floor plan; and the plan in sentences."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from packetmesh.errors import InputError
+from packetmesh.files import delete_unfinished, file_trouble
+from packetmesh.settings import settings
+from pipeline.folders.inputs import check_inputs_stay
+from pipeline.folders.run import IMPORTED, check_no_images, is_imported
+from pipeline.planning.calls import RigPlan
+from pipeline.planning.floor import aim_deg
+from pipeline.planning.places import floor_m
+from pipeline.planning.promise import Promise
+from pipeline.sources import FileSource
+from pipeline.spec import Spec
+
+RECORD, PAGE, DRAWING, PRINT = "plan.json", "plan.html", "floor_plan.svg", "floor_plan.pdf"
+FILES = (RECORD, PAGE, DRAWING, PRINT)
+"""All files of a plan; the record is deleted first and written last."""
+
+
+def check_plan_folder(folder: Path, source: FileSource) -> None:
+    """Check that a plan in a folder would replace no images.
+
+    Raises:
+        InputError: the folder is a rig or a recording, or a file of the source would be replaced.
+    """
+    check_no_images(folder)
+    replaced = (*FILES, *([IMPORTED] if is_imported(source) else []))
+    check_inputs_stay([folder / name for name in replaced], source.paths)
+
+
+def clear_plan_folder(folder: Path) -> None:
+    """Delete the files of an earlier plan, complete or interrupted; a run of ``reconstruct`` there stays.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    try:
+        for name in FILES:
+            (folder / name).unlink(missing_ok=True)
+        delete_unfinished(folder)
+    except OSError as error:
+        raise InputError(file_trouble(error)) from None
+
+
+def plan_record(planned: RigPlan, scene: str, preset: str) -> dict[str, Any]:
+    """Return the record of a plan: metres, seconds, joules, shares from 0 to 1; infinite means never.
+
+    Args:
+        planned: the plan.
+        scene: title of the images.
+        preset: name of the network's preset, or of its file.
+    """
+    plan, delivery = planned.plan, planned.delivery
+    ground_m = floor_m(planned.seen)
+    cameras = []
+    for camera, sent in zip(plan.cameras, delivery.cameras, strict=True):
+        pan_deg, tilt_deg = aim_deg(camera.T_world_camera)
+        cameras.append(
+            {
+                "T_world_camera": camera.T_world_camera,
+                "height_m": camera.T_world_camera[2, 3] - ground_m,
+                "pan_deg": pan_deg,
+                "tilt_deg": tilt_deg,
+                "where": camera.where,
+                **_promise(camera.promise),
+                "overlap": camera.overlap_share,
+                "seconds_to_90": sent.seconds_to_90_s,
+                "seconds_to_99": sent.seconds_to_99_s,
+                "joules": sent.joules,
+                "battery_days": sent.battery_days,
+            }
+        )
+    return {
+        "scene": scene,
+        "sensor": plan.sensor.name,
+        "where": list(plan.config.where),
+        "cameras": cameras,
+        "total": _promise(plan.total) | {"joules": delivery.joules},
+        "measured_rays": plan.measured_share,
+        "at_least_of_best": plan.at_least_of_best,
+        "candidates": plan.candidates,
+        "floor_m": ground_m,
+        "network": {
+            "preset": preset,
+            "coding": planned.radio.coding,
+            "walls": planned.radio.walls,
+            "walls_m": delivery.walls_m,
+            "sink_m": list(delivery.sink_m),
+            "image_bytes": delivery.image_bytes,
+            "every_s": planned.radio.every_s,
+            "budget_j": planned.radio.budget_j,
+            "deadline_s": planned.radio.deadline_s,
+        },
+    }
+
+
+def _promise(one: Promise) -> dict[str, Any]:
+    return {"gain_rays": one.gain_share, "ci95": list(one.ci95_share)}
+
+
+def settings_record(spec: Spec, planned: RigPlan) -> dict[str, Any]:
+    """Return all settings of the reconstruction and of the network."""
+    return {
+        "chain": {"preset": spec.preset, "settings": settings(spec.config)},
+        "network_settings": settings(planned.radio.network),
+    }
+
+
+def points(promise: Promise) -> str:
+    """Return a promise in points of rays (hundredths of all rays) with its 95 % interval."""
+    low, high = promise.ci95_share
+    return f"{100.0 * promise.gain_share:.1f} ({100.0 * low:.1f} to {100.0 * high:.1f})"
+
+
+def promise_sentence(planned: RigPlan) -> str:
+    """Say what all cameras of a plan promise together."""
+    plan, count = planned.plan, len(planned.plan.cameras)
+    who = "The camera promises" if count == 1 else f"The {count} cameras together promise"
+    return (
+        f"{who} {points(plan.total)} points: {plan.measured_share:.1%} of the present cameras' rays meet "
+        f"measured surface now, about {plan.measured_share + plan.total.gain_share:.1%} would then; in "
+        "brackets the 95 % interval"
+    )
+
+
+def best_sentence(planned: RigPlan) -> str:
+    """Say how far a plan can be from the best choice."""
+    plan = planned.plan
+    return (
+        f"It promises at least {plan.at_least_of_best:.0%} of what the best choice among the "
+        f"{plan.candidates} cameras that were judged could"
+    )
+
+
+def times_sentence(planned: RigPlan) -> str:
+    """Say of what the times are, and where the sink and the walls are from."""
+    delivery, radio = planned.delivery, planned.radio
+    x_m, y_m = delivery.sink_m
+    return (
+        f"Times and joules are for one image from each present and new camera at once, coded by "
+        f"{radio.coding}, to a sink at {x_m:.2f}, {y_m:.2f} (x, y in metres); a new image counts as "
+        f"{delivery.image_bytes:,} bytes, the present ones' mean, because its content is not known, and so "
+        f"not its surface either"
+    )
+
+
+def fewer_sentence(planned: RigPlan, asked: int) -> str:
+    """Say that a plan has fewer cameras than were asked for; empty if it has all."""
+    found, radio = len(planned.plan.cameras), planned.radio
+    if found >= asked:
+        return ""
+    if planned.plan.config.cameras < asked:
+        return f"The budget of {radio.budget_j:g} J allows {found} of the {asked} cameras"
+    return f"Only {found} of the {asked} cameras would add anything; allow more kinds of places for more"
