@@ -8,36 +8,41 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from app.drawing.glb import LINEAR, Parts, in_this_order
+from app.drawing.glb import LINEAR, Parts, Places, in_this_order
 from app.drawing.ordering import curve_order, lowest_first
 from pipeline.types import ByteArray
 
-CELLS = 48
+CELLS = 40
 """Cells along the longest side of the box; all vertices in one become one."""
+STEPS = 8
+"""Steps of a position in a cell."""
 
 
 def coarse_glb(glb: Any) -> bytes:
     """Return a mesh that ``glb.py`` wrote with few vertices; they take the colours of its picture.
 
-    Each cell's vertex is its first one; triangles within fewer than three cells vanish (Rossignac and Borrel
-    1993).
+    Each cell's vertex is its first one, moved by at most half of a ``STEPS``-th of the cell in each
+    coordinate; triangles within fewer than three cells vanish (Rossignac and Borrel 1993).
     """
     parts = Parts.of(glb)
     attributes = parts.primitive["attributes"]
     places = parts.array(attributes["POSITION"]).astype(np.float64)
-    triangles = parts.array(parts.primitive["indices"]).reshape(-1, 3)
-    side = max(float(np.ptp(places, axis=0).max()), 1e-12)
-    cells = np.floor((places - places.min(axis=0)) * (CELLS / side)).astype(np.int64)
+    low = places.min(axis=0)
+    cell_side = max(float(np.ptp(places, axis=0).max()), 1e-12) / CELLS
+    cells = np.floor((places - low) / cell_side).astype(np.int64)
     _, first, cell = np.unique(cells @ (CELLS + 1) ** np.arange(3), return_index=True, return_inverse=True)
-    corners = cell.reshape(-1)[triangles]
+    corners = cell.reshape(-1)[parts.triangles]
     whole = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
     if not len(whole):  # a far vertex leaves too few cells for the others
         return bytes(glb)
-    node = parts.head["nodes"][0]
-    vertices_m = places[first] * np.array(node.get("scale", [1.0] * 3)) + node.get("translation", [0.0] * 3)
-    order = curve_order(vertices_m)
+    order = curve_order(places[first])
     faces = np.unique(lowest_first(np.argsort(order)[whole]), axis=0)
-    return in_this_order(vertices_m[order], faces, _colors(parts)[first[order]])
+    node = parts.head["nodes"][0]
+    scale_m, origin_m = node.get("scale", [1.0])[0], np.array(node.get("translation", [0.0] * 3))
+    steps = np.zeros((len(order), 4), "<u2")
+    steps[:, :3] = np.rint((places[first[order]] - low) * (STEPS / cell_side))
+    coarse = Places(steps, (origin_m + scale_m * low).tolist(), scale_m * cell_side / STEPS)
+    return in_this_order(coarse, faces, _colors(parts)[first[order]])
 
 
 def is_mesh(data: object) -> bool:
@@ -45,7 +50,7 @@ def is_mesh(data: object) -> bool:
     if not isinstance(data, bytes) or not data.startswith(b"glTF"):
         return False
     parts = Parts.of(data)
-    return parts.is_own and "indices" in parts.primitive
+    return parts.is_own and parts.triangles is not None
 
 
 def _colors(parts: Parts) -> ByteArray:

@@ -17,14 +17,15 @@ from typing import Any
 
 import numpy as np
 
-from app.drawing.ordering import curve_order, reordered
+from app.drawing.ordering import reordered
 from pipeline.types import ByteArray, FloatArray, IntArray
 
 STEP_M = 2e-4
 """Step of the positions; finer for objects whose sides are shorter than ``FEWEST_STEPS`` of them."""
 FEWEST_STEPS, MOST_STEPS = 1 << 14, (1 << 16) - 1
 """Steps along the longest side of the box."""
-UV_STEPS = 65535
+UV_STEPS, UV_STEP_PX = 65535, 0.2
+"""Steps of texture coordinates along a picture, of which only multiples of this length are used."""
 GENERATOR = "PacketMesh"
 _TYPES = {"<f4": 5126, "<u2": 5123, "<u4": 5125}
 _LINES, _TRIANGLES = 1, 4
@@ -38,19 +39,26 @@ def mesh_glb(vertices_m: FloatArray, triangles: IntArray, colors: ByteArray) -> 
     if not len(triangles):
         return b""
     order, faces = reordered(vertices_m, triangles)
-    return in_this_order(vertices_m[order], faces, colors[order])
+    return in_this_order(Places.of(vertices_m[order]), faces, colors[order])
 
 
-def in_this_order(vertices_m: FloatArray, triangles: IntArray, colors: ByteArray) -> bytes:
+def in_this_order(places: Places, triangles: IntArray, colors: ByteArray) -> bytes:
     """Return what ``mesh_glb`` returns, with vertices and triangles in their order; F is at least 1."""
-    indices = _indices(triangles, len(vertices_m))
-    return _glb(_TRIANGLES, Places.of(vertices_m), {"COLOR_0": _light(colors)}, indices=indices)
+    indices = _indices(triangles, len(colors))
+    return _glb(_TRIANGLES, places, {"COLOR_0": _light(colors)}, indices=indices)
 
 
 def textured_glb(
-    vertices_m: FloatArray, triangles: IntArray, colors: ByteArray, uv: FloatArray, picture: bytes
+    vertices_m: FloatArray,
+    triangles: IntArray,
+    colors: ByteArray,
+    uv: FloatArray,
+    picture: bytes,
+    side_px: int,
 ) -> bytes:
     """Return a mesh textured with a picture times its vertex colours; empty if it has no triangle.
+
+    Texture coordinates are at most a tenth of a pixel off.
 
     Args:
         vertices_m: (V, 3) vertices.
@@ -58,23 +66,32 @@ def textured_glb(
         colors: (V, 3) sRGB by which the picture is multiplied.
         uv: (V, 2) texture coordinates, 0 to 1, from the picture's upper left corner.
         picture: a WebP file.
+        side_px: its longer side.
     """
     if not len(triangles):
         return b""
     order, faces = reordered(vertices_m, triangles)
     places = Places.of(vertices_m[order])
-    worn = np.rint(UV_STEPS * np.clip(uv[order], 0.0, 1.0)).astype("<u2")
+    unit = max(int(UV_STEP_PX * UV_STEPS / side_px), 1)
+    most = UV_STEPS // unit
+    worn = (unit * np.clip(np.rint(UV_STEPS / unit * uv[order]), 0, most)).astype("<u2")
     attributes = {"COLOR_0": _light(colors[order]), "TEXCOORD_0": worn}
     return _glb(_TRIANGLES, places, attributes, indices=_indices(faces, len(order)), picture=picture)
 
 
 def lines_glb(segments_m: FloatArray, color: tuple[int, int, int]) -> bytes:
-    """Return a glTF of (E, 2, 3) line segments in an sRGB colour, one pixel wide; empty without segments."""
+    """Return a glTF of (E, 2, 3) line segments in an sRGB colour, one pixel wide; empty without segments.
+
+    Segments that follow each other, end to start, take the fewest bytes.
+    """
     if not len(segments_m):
         return b""
     red, green, blue = (LINEAR[list(color)] / 65535.0).tolist()
-    order = curve_order(segments_m[:, 0])
-    return _glb(_LINES, Places.of(segments_m[order].reshape(-1, 3)), {}, (red, green, blue))
+    points_m = segments_m.reshape(-1, 3)
+    _, first, which = np.unique(points_m, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    indices = _indices(np.argsort(order)[which.reshape(-1)], len(first))
+    return _glb(_LINES, Places.of(points_m[first[order]]), {}, (red, green, blue), indices)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +144,13 @@ class Parts:
         """Its only primitive."""
         (primitive,) = self.head["meshes"][0]["primitives"]
         return dict(primitive)
+
+    @property
+    def triangles(self) -> IntArray | None:
+        """(F, 3) indices of its triangles; None if it is of lines."""
+        if self.primitive["mode"] != _TRIANGLES:
+            return None
+        return self.array(self.primitive["indices"]).reshape(-1, 3).astype(np.int64)
 
     def data(self, view: int) -> bytes:
         """Return the bytes of a buffer view."""

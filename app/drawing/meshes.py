@@ -12,6 +12,7 @@ from app.compute.records import MeshView
 from app.drawing.colors import LOSS, NEUTRAL
 from app.drawing.glb import lines_glb, mesh_glb, textured_glb
 from pipeline.io.textures import Texture
+from pipeline.surface.boundary import boundary_loops, loop_edges
 from pipeline.types import ByteArray, FloatArray, PointSource, Surface, SurfaceResult
 
 DARKEST = {True: 0.75, False: 0.45}
@@ -73,7 +74,12 @@ def photographed_glb(surface: Surface, texture: Texture, tinted: bool = False) -
         colors[guessed] = colors[guessed] * VIOLET
     places_m = surface.vertices_m[corners.vertices]
     return textured_glb(
-        places_m, corners.triangles, colors.astype(np.uint8), corners.uv, _picture_of(texture.image)
+        places_m,
+        corners.triangles,
+        colors.astype(np.uint8),
+        corners.uv,
+        _picture_of(texture.image),
+        max(texture.image.shape[:2]),
     )
 
 
@@ -117,9 +123,8 @@ def vertex_normals(surface: Surface) -> FloatArray:
 
 
 def rim_segments_m(surface: Surface) -> FloatArray:
-    """Return (E, 2, 3) float32: the edges that belong to one triangle only."""
-    edges = np.sort(surface.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1)
-    keys, triangles = np.unique(edges[:, 0] << 32 | edges[:, 1], return_counts=True)
-    rims = keys[triangles == 1]
-    ends = np.stack([rims >> 32, rims & 0xFFFFFFFF], axis=1)
-    return surface.vertices_m[ends].astype(np.float32)
+    """Return (E, 2, 3) float32: the edges that belong to one triangle only, loop by loop."""
+    loops = boundary_loops(surface.triangles)
+    if not loops:
+        return np.empty((0, 2, 3), np.float32)
+    return surface.vertices_m[loop_edges(loops)[0]].astype(np.float32)

@@ -42,7 +42,23 @@ window.packetmeshUnpack = (() => {
     else view.setUint32(at, value, true);
   }
 
+  // Return two places for each vertex K. They hold the corners below K of the first triangle that has corner K, and K
+  // itself where there are fewer.
+  function cornersBelow(triangles, vertices) {
+    const below = new Uint32Array(2 * vertices), met = new Uint8Array(vertices);
+    for (let vertex = 0; vertex < vertices; vertex++) below[2 * vertex] = below[2 * vertex + 1] = vertex;
+    for (let at = 0; at < triangles.length; at++) {
+      const vertex = triangles[at], first = at - at % 3;
+      if (vertex >= vertices || met[vertex]) continue;
+      met[vertex] = 1;
+      for (let corner = first, place = 2 * vertex; corner < first + 3; corner++)
+        if (triangles[corner] < vertex) below[place++] = triangles[corner];
+    }
+    return below;
+  }
+
   // For each kind of part: its packed bytes, its unpacked bytes, and how to unpack it at a place of a DataView.
+  // The corners of triangles are given to the vertices, which are unpacked last.
   const KINDS = {
     raw: count => ({
       packed: count,
@@ -56,6 +72,23 @@ window.packetmeshUnpack = (() => {
         const next = columnsOf(bytes, rows, size);
         for (let column = 0; column < columns; column++)
           summed(next()).forEach((value, row) => put(view, at + row * stride + column * size, size, value));
+      },
+    }),
+    vertices: (rows, columns, size, stride, unit) => ({
+      packed: rows * columns * size,
+      unpacked: rows * stride,
+      write(bytes, view, at, triangles) {
+        const next = columnsOf(bytes, rows, size), below = cornersBelow(triangles, rows), wrap = 2 ** (8 * size);
+        for (let column = 0; column < columns; column++) {
+          const steps = next(), values = new Float64Array(rows);
+          for (let row = 0; row < rows; row++) {
+            const one = below[2 * row], other = below[2 * row + 1];
+            const expected = other < row ? Math.floor((values[one] + values[other]) / 2)
+              : one < row ? values[one] : row > 0 ? values[row - 1] : 0;
+            values[row] = (expected + steps[row] + wrap) % wrap;
+            put(view, at + row * stride + column * size, size, unit * values[row]);
+          }
+        }
       },
     }),
     grid: (rows, columns, bits) => ({
@@ -72,7 +105,7 @@ window.packetmeshUnpack = (() => {
       unpacked: 3 * rows * size,
       write(bytes, view, at) {
         const next = columnsOf(bytes, rows, size), columns = [next(), next(), next()], wrap = 2 ** (8 * size);
-        const within = value => ((value % wrap) + wrap) % wrap;
+        const within = value => ((value % wrap) + wrap) % wrap, corners = new Uint32Array(3 * rows);
         let [a, b, c, greatest, last] = [0, 0, 0, -1, -1];
         for (let row = 0; row < rows; row++) {
           a = within(a + columns[0][row]);
@@ -81,8 +114,12 @@ window.packetmeshUnpack = (() => {
           c = within(Math.max(following, b + 1) - columns[2][row]);
           greatest = Math.max(following - 1, b, c);
           last = a;
-          [a, b, c].forEach((value, column) => put(view, at + (3 * row + column) * size, size, value));
+          corners[3 * row] = a;
+          corners[3 * row + 1] = b;
+          corners[3 * row + 2] = c;
         }
+        corners.forEach((corner, row) => put(view, at + row * size, size, corner));
+        return corners;
       },
     }),
     colors: rows => ({
@@ -108,14 +145,19 @@ window.packetmeshUnpack = (() => {
   return packed => {
     const length = new DataView(packed.buffer, packed.byteOffset).getUint32(0, true);
     const parts = JSON.parse(new TextDecoder().decode(packed.subarray(4, 4 + length)))
-      .map(([kind, ...numbers]) => KINDS[kind](...numbers));
+      .map(([kind, ...numbers]) => ({kind, ...KINDS[kind](...numbers)}));
     const view = new DataView(new ArrayBuffer(parts.reduce((sum, part) => sum + part.unpacked, 0)));
-    let from = 4 + length, to = 0;
-    for (const part of parts) {
-      part.write(packed.subarray(from, from + part.packed), view, to);
-      from += part.packed;
-      to += part.unpacked;
+    let from = 4 + length, to = 0, triangles;
+    const last = [];
+    for (const {kind, packed: size, unpacked, write} of parts) {
+      const bytes = packed.subarray(from, from + size), at = to;
+      if (kind === "vertices") last.push(() => write(bytes, view, at, triangles));
+      else if (kind === "triangles") triangles = write(bytes, view, at);
+      else write(bytes, view, at);
+      from += size;
+      to += unpacked;
     }
+    last.forEach(write => write());
     return new Uint8Array(view.buffer);
   };
 })();

@@ -6,6 +6,9 @@ part. Unpacked, the parts follow each other without a gap. A part is one of
 - ``["raw", n]``: n bytes as they are;
 - ``["rows", n, columns, bytes, stride]``: n rows of little-endian integers of 1, 2 or 4 bytes, a row every
   ``stride`` bytes (zeros fill it up), as differences to the row before;
+- ``["vertices", n, columns, bytes, stride, unit]``: the same for the vertices of the content's triangles, as
+  multiples of ``unit``. With K a vertex's number, its difference is to the mean, rounded down, of the corners
+  below K of the first triangle that has corner K; without such corners to the row before;
 - ``["grid", n, columns, bits]``: rows of 32-bit floats, each an integer over 2^bits, as differences of those;
 - ``["triangles", n, bytes]``: rows of three indices. With N one more than the greatest index above and the
   row's first: the first as difference to the one above, the second as what it is less than the last above,
@@ -30,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.drawing.glb import LINEAR, Parts
-from pipeline.types import ByteArray
+from pipeline.types import ByteArray, IntArray
 
 GRID_BITS = 12
 """Binary digits after the point of coordinates that ``rounded`` leaves: steps of 0.24 mm."""
@@ -84,35 +87,65 @@ def _packed_gltf(glb: bytes) -> Iterator[Part]:
     """Yield the parts of a binary glTF: its accessors' arrays in differences, the rest as it is."""
     parts = Parts.of(glb)
     kinds = {row: name for name, row in parts.primitive["attributes"].items()}
+    triangles = parts.triangles
     done, start = 0, len(glb) - len(parts.body)
     for row, accessor in enumerate(parts.head["accessors"]):
         view = parts.head["bufferViews"][accessor["bufferView"]]
         first = start + view["byteOffset"]
         yield _raw(glb[done:first])
-        yield _packed_accessor(parts.array(row), view.get("byteStride"), kinds.get(row, ""))
+        numbers = parts.array(row)
+        if row not in kinds:
+            yield _packed_indices(numbers, triangles)
+        elif kinds[row] == "COLOR_0":
+            yield ["light", len(numbers)], _color_planes(_SHADE[numbers[:, :3]])
+        else:
+            yield _packed_vertices(numbers.view(f"<u{numbers.itemsize}"), view["byteStride"], triangles)
         done = first + view["byteLength"]
     yield _raw(glb[done:])
 
 
-def _packed_accessor(numbers: NDArray[Any], stride: int | None, kind: str) -> Part:
-    if stride is None:
-        return ["triangles", len(numbers) // 3, numbers.itemsize], _triangle_planes(numbers.reshape(-1, 3))
-    if kind == "COLOR_0":
-        return ["light", len(numbers)], _color_planes(_SHADE[numbers[:, :3]])
-    described, planes = _rows(np.ascontiguousarray(numbers).view(f"<u{numbers.itemsize}"))
-    return [*described[:-1], stride], planes
+def _packed_indices(indices: NDArray[np.unsignedinteger], triangles: IntArray | None) -> Part:
+    if triangles is None:
+        return _rows(indices.reshape(-1, 2))
+    return ["triangles", len(triangles), indices.itemsize], _triangle_planes(triangles, indices.itemsize)
 
 
-def _triangle_planes(triangles: NDArray[np.unsignedinteger]) -> bytes:
-    a, b, c = triangles.astype(np.int64).T
-    above = np.concatenate([np.zeros((1, 3), np.int64), triangles[:-1].astype(np.int64)])[: len(triangles)]
-    greatest = np.concatenate([[-1], np.maximum.accumulate(triangles.max(axis=1).astype(np.int64))[:-1]])
+def _packed_vertices(numbers: NDArray[np.unsignedinteger], stride: int, triangles: IntArray | None) -> Part:
+    size = numbers.itemsize
+    if triangles is None:
+        return ["rows", *numbers.shape, size, stride], _planes(_differences(numbers))
+    unit = max(int(np.gcd.reduce(numbers, axis=None)), 1)
+    steps = (numbers // unit).astype(np.int64)
+    planes = _planes(_zigzag(steps - _expected(steps, triangles), size))
+    return ["vertices", *numbers.shape, size, stride, unit], planes
+
+
+def _expected(rows: NDArray[np.int64], triangles: IntArray) -> NDArray[np.int64]:
+    """Return what each vertex's row is expected to be, from those of the vertices before it."""
+    expected = np.vstack([np.zeros((1, rows.shape[1]), np.int64), rows[:-1]])
+    flat = triangles.reshape(-1)
+    named = np.flatnonzero(flat < len(rows))[::-1]
+    first = np.full(len(rows), -1)
+    first[flat[named]] = named  # of equal vertices the last assignment counts, which is the first corner
+    vertices = np.flatnonzero(first >= 0)
+    corners = triangles[first[vertices] // 3]
+    known = corners < vertices[:, None]
+    total = np.where(known[:, :, None], rows[np.where(known, corners, 0)], 0).sum(axis=1)
+    count = known.sum(axis=1)
+    expected[vertices[count > 0]] = total[count > 0] // count[count > 0, None]
+    return expected
+
+
+def _triangle_planes(triangles: IntArray, size: int) -> bytes:
+    a, b, c = triangles.T
+    above = np.concatenate([np.zeros((1, 3), np.int64), triangles[:-1]])
+    greatest = np.concatenate([[-1], np.maximum.accumulate(triangles.max(axis=1))[:-1]])
     following = np.maximum(greatest, a) + 1
     same = a == above[:, 0]
     same[:1] = False
     expected = np.where(same, above[:, 2], following)
     columns = np.column_stack([a - above[:, 0], expected - b, np.maximum(following, b + 1) - c])
-    return _planes(_zigzag(columns, triangles.itemsize))
+    return _planes(_zigzag(columns, size))
 
 
 def _raw(data: bytes) -> Part:

@@ -55,7 +55,7 @@ SLOWEST_S = 60.0
 """Time in which a browser must have received a content."""
 REMEMBERED = 64
 """Number of contents whose names are known without computing them again."""
-_FORMAT = b"2"
+_FORMAT = b"3"
 """Part of each name, to be changed with the packing: browsers keep contents by their names."""
 _HELD = re.compile(rf"(?:^|[;,]\s*){COOKIE}=([A-Za-z0-9_-]{{22}})\s*(?:[;,]|$)")
 logger = logging.getLogger(__name__)

@@ -44,7 +44,8 @@ def arrays(glb):
         assert read["POSITION"].dtype.kind == "u"
         read["POSITION"] = read["POSITION"] * np.array(node["scale"]) + node["translation"]
     if "indices" in primitive:
-        read["indices"] = array(primitive["indices"]).reshape(-1, 3)
+        corners = {1: 2, 4: 3}[primitive["mode"]]
+        read["indices"] = array(primitive["indices"]).reshape(-1, corners)
     return primitive["mode"], read
 
 

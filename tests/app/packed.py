@@ -11,13 +11,17 @@ from tests.app.gltf import srgb
 def unpacked(packed):
     """The bytes of a content."""
     (length,) = struct.unpack_from("<I", packed)
-    parts, at, out = json.loads(packed[4 : 4 + length]), 4 + length, b""
+    parts, at, pieces, triangles = json.loads(packed[4 : 4 + length]), 4 + length, [], None
     for kind, *numbers in parts:
         size, write = KINDS[kind](*numbers)
-        out += write(packed[at : at + size])
+        pieces.append((kind, write, packed[at : at + size]))
+        if kind == "triangles":
+            triangles = write(packed[at : at + size]), numbers[1]
         at += size
     assert at == len(packed)
-    return out
+    return b"".join(
+        write(data, *triangles) if kind == "vertices" else write(data) for kind, write, data in pieces
+    )
 
 
 def _raw(count):
@@ -29,6 +33,31 @@ def _rows(rows, columns, size, stride):
         found = [_summed(column, size) for column in _columns(data, rows, columns, size)]
         wide = [b"".join(one[row].to_bytes(size, "little") for one in found) for row in range(rows)]
         return b"".join(row.ljust(stride, b"\0") for row in wide)
+
+    return rows * columns * size, write
+
+
+def _vertices(rows, columns, size, stride, unit):
+    def write(data, triangles, index_size):
+        flat = np.frombuffer(triangles, f"<u{index_size}").tolist()
+        below = {}
+        for at in range(0, len(flat), 3):
+            for vertex in flat[at : at + 3]:
+                below.setdefault(vertex, [corner for corner in flat[at : at + 3] if corner < vertex])
+        found = _columns(data, rows, columns, size)
+        table = []
+        for row in range(rows):
+            known = [table[corner] for corner in below.get(row, [])] or table[-1:] or [(0,) * columns]
+            expected = [sum(values) // len(known) for values in zip(*known, strict=True)]
+            table.append(
+                tuple(
+                    (value + column[row]) % 256**size for value, column in zip(expected, found, strict=True)
+                )
+            )
+        return b"".join(
+            b"".join((unit * value).to_bytes(size, "little") for value in values).ljust(stride, b"\0")
+            for values in table
+        )
 
     return rows * columns * size, write
 
@@ -77,6 +106,7 @@ def _light(rows):
 KINDS = {
     "raw": _raw,
     "rows": _rows,
+    "vertices": _vertices,
     "grid": _grid,
     "triangles": _triangles,
     "colors": _colors,

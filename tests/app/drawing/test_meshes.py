@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from app.drawing.glb import lines_glb, mesh_glb
+from app.drawing.glb import lines_glb, mesh_glb, textured_glb
 from app.drawing.meshes import DARKEST, mesh_view, rim_segments_m, surface_glb, vertex_normals
-from app.drawing.ordering import curve_order, reordered
+from app.drawing.ordering import reordered
 from pipeline.types import SurfaceQuality, SurfaceResult
 from tests.app.gltf import arrays, srgb
 
@@ -94,8 +94,39 @@ def test_lines_survive_the_way_to_the_browser():
     segments_m = np.random.default_rng(0).uniform(-1, 1, (7, 2, 3)).astype(np.float32)
     mode, read = arrays(lines_glb(segments_m, (213, 40, 30)))
     assert mode == 1
-    order = curve_order(segments_m[:, 0])
-    assert np.abs(read["POSITION"].reshape(-1, 2, 3) - segments_m[order]).max() <= 1e-4
+    assert np.abs(read["POSITION"][read["indices"]] - segments_m).max() <= 1e-4
+
+
+def test_points_where_lines_meet_are_sent_once():
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    _, read = arrays(lines_glb(np.stack([square, np.roll(square, -1, axis=0)], axis=1), (1, 2, 3)))
+    assert np.abs(read["POSITION"] - square).max() <= 1e-4
+    assert read["indices"].tolist() == [[0, 1], [1, 2], [2, 3], [3, 0]]
+
+
+def test_rims_follow_each_other_around_each_hole():
+    sphere = trimesh.creation.icosphere(subdivisions=3)
+    kept = np.all(np.abs(sphere.vertices[sphere.faces][:, :, 2]) < 0.7, axis=1)
+    sphere.update_faces(kept)
+    rim_m = rim_segments_m(surface(sphere))
+    _, faces = np.unique(np.sort(sphere.edges, axis=1), axis=0, return_counts=True)
+    assert len(rim_m) == np.sum(faces == 1)
+    follows = np.all(rim_m[1:, 0] == rim_m[:-1, 1], axis=1)
+    assert np.sum(~follows) == 1  # from the hole above to that below
+
+
+@pytest.mark.parametrize("side_px", [64, 1280, 20_000, 400_000])
+def test_texture_coordinates_are_at_most_a_tenth_of_a_pixel_off(side_px):
+    uv = np.random.default_rng(0).uniform(0.0, 1.0, (len(SPHERE.vertices), 2))
+    uv[:2] = [[0.0, 1.0], [1.0, 0.0]]
+    colors = np.zeros((len(uv), 3), np.uint8)
+    places, faces = np.asarray(SPHERE.vertices), np.asarray(SPHERE.faces)
+    _, read = arrays(textured_glb(places, faces, colors, uv, b"picture", side_px))
+    order, _ = reordered(places, faces)
+    off_px = side_px * np.abs(read["TEXCOORD_0"] / 65535.0 - uv[order])
+    inside = np.all((uv[order] > 0.0) & (uv[order] < 0.999), axis=1)
+    assert off_px[inside].max() <= max(0.1, 0.5 * side_px / 65535) + 1e-6
+    assert off_px.max() <= max(0.2, side_px / 65535)
 
 
 def test_a_surface_without_triangles_is_empty():

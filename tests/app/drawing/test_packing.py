@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays as any_array
 
-from app.drawing.glb import Parts, lines_glb, mesh_glb, textured_glb
+from app.drawing.glb import STEP_M, Parts, Places, in_this_order, lines_glb, mesh_glb, textured_glb
 from app.drawing.ordering import curve_order, lowest_first, reordered
 from app.drawing.packing import GRID_BITS, pack, rounded
 from tests.app.gltf import arrays as gltf_arrays
@@ -87,6 +87,41 @@ def test_the_triangles_of_a_walk_take_a_byte_each():
     )
 
 
+def test_a_vertex_is_a_difference_to_the_mean_of_the_corners_below_it():
+    """Worked out on paper: vertices 0 and 1 by the row before, 2 by 0 and 1, 3 by 1 and 2, 4 by 3 alone."""
+    places_m = np.array([[0, 0, 0], [8, 0, 0], [4, 6, 2], [16, 9, 3], [18, 9, 2]]) * STEP_M
+    corners = np.array([[0, 1, 2], [2, 1, 3], [4, 3, 5]])
+    glb = in_this_order(
+        Places(np.pad(places_m / STEP_M, ((0, 0), (0, 1))).round().astype("<u2"), [0.0] * 3, STEP_M),
+        corners,
+        np.zeros((5, 3), np.uint8),
+    )
+    packed = pack(glb)
+    (length,) = struct.unpack_from("<I", packed)
+    parts = json.loads(packed[4 : 4 + length])
+    first = next(row for row, part in enumerate(parts) if part[0] == "vertices")
+    assert parts[first] == ["vertices", 5, 3, 2, 8, 1]
+    at = 4 + length + sum(count for _, count in parts[:first])
+    planes = np.frombuffer(packed, np.uint8, 30, at).reshape(3, 2, 5)
+    assert planes[:, 1].max() == 0
+    differences = [[0, 8, 0, 10, 2], [0, 0, 6, 6, 0], [0, 0, 2, 2, -1]]
+    assert planes[:, 0].tolist() == [[2 * d if d >= 0 else -2 * d - 1 for d in row] for row in differences]
+    assert unpacked(packed) == glb
+
+
+def test_numbers_that_are_multiples_are_packed_as_such():
+    uv = np.random.default_rng(1).uniform(0, 1, (len(SPHERE.vertices), 2))
+    places = np.asarray(SPHERE.vertices), np.asarray(SPHERE.faces), SPHERE_COLORS, uv, b"picture"
+    sizes = {}
+    for side_px, unit in ((100_000, 1), (640, 20)):
+        glb = textured_glb(*places, side_px)
+        packed = pack(glb)
+        assert unpacked(packed) == glb
+        assert b'["vertices",%d,2,2,4,%d]' % (len(uv), unit) in packed
+        sizes[unit] = len(gzip.compress(packed))
+    assert sizes[20] < sizes[1]
+
+
 FILES = {
     "mesh": sphere_glb(),
     "textured": textured_glb(
@@ -95,6 +130,7 @@ FILES = {
         SPHERE_COLORS,
         np.random.default_rng(1).uniform(0, 1, (len(SPHERE.vertices), 2)),
         b"\xff\xd8 a picture\xff\xd9",
+        1280,
     ),
     "large": mesh_glb(400.0 * np.asarray(SPHERE.vertices), np.asarray(SPHERE.faces), SPHERE_COLORS),
     "backwards": indexed([[9, 4, 60000], [1, 1, 0], [65534, 65533, 2], [0, 3, 3]], 60000),
