@@ -42,7 +42,7 @@ class Delivery:
 def deliver(
     rig: Rig,
     network: NetworkConfig = NETWORKS["office"],
-    coding: str = "raw",
+    coding: str = "exact",
     moments: int = 40,
     config: PipelineConfig = PRESETS["packetmesh"],
 ) -> Delivery:

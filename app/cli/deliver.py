@@ -22,7 +22,7 @@ def deliver(
     images: Images,
     out: Path,
     preset: str = "office",
-    coding: str = "raw",
+    coding: str = "exact",
     moments: int = 40,
     link_trace: Path | None = None,
     down: tuple[str, ...] = (),

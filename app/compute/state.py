@@ -34,7 +34,7 @@ class Sent:
     """How the rig's images are sent: a ``pipeline.deliver.DeliverySpec`` without the rig and its chain."""
 
     network: NetworkConfig
-    coding: str = "raw"
+    coding: str = "exact"
     moments: int = 20
     down: tuple[str, ...] = ()
     """Names of nodes that have failed."""

@@ -31,7 +31,7 @@ class DeliverySpec:
     spec: Spec
     """The rig, and the settings of its reconstruction."""
     network: NetworkConfig = field(default_factory=lambda: PRESETS["office"])
-    coding: str = "raw"
+    coding: str = "exact"
     """Name in ``pipeline.delivery.CODINGS``."""
     moments: int = MOMENTS
     down: tuple[str, ...] = ()

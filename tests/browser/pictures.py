@@ -61,12 +61,12 @@ def surface(frames: Path) -> Image.Image:
 
 
 def network(frames: Path) -> Image.Image:
-    """The Network screen two thirds of the way through."""
+    """The Network screen two thirds of the way through raw images."""
 
     def there(page: Page) -> None:
         page.locator(".packetmesh-dock-row").get_by_text(re.compile(r"^3\.9\d* s of")).wait_for()
 
-    return _screen("Network", there, address="screen=network&t=3.9")
+    return _screen("Network", there, address="screen=network&net=coding%3DRaw%2C%20depth%20first&t=3.9")
 
 
 def calibrate(frames: Path) -> Image.Image:

@@ -90,12 +90,14 @@ def test_the_command_is_that_of_the_delivery(network):
     press(network, "Copy as command")
     text = network.locator("pre").first.inner_text()
     press(network, "Close")
-    assert text.startswith("packetmesh deliver --scene box-on-table --preset office --coding raw --moments 4")
+    assert text.startswith(
+        "packetmesh deliver --scene box-on-table --preset office --coding exact --moments 4"
+    )
 
 
-def test_a_coding_that_needs_fewer_bytes_is_compared_with_the_one_before(network):
+def test_another_coding_is_compared_with_the_one_before(network):
     pick(network, "Coding", "RVL depth, JPEG colour")
-    network.get_by_text("coding jpeg instead of raw").wait_for()
+    network.get_by_text("coding jpeg instead of exact").wait_for()
     expect(network.get_by_text(re.compile("the last byte came after"))).to_be_visible()
 
 

@@ -73,7 +73,7 @@ def delivery_job(store: Store, spec: Spec) -> Steps:
 def packet_job(
     store: Store, spec: Spec, row: int, first_byte: int, byte_count: int
 ) -> Generator[Progress, None, PacketView]:
-    """Return the pixels and points that one packet of a node's images gives without the other packets.
+    """Return the pixels and points of a node's images that need one packet, when all others have arrived.
 
     Args:
         store: store of the results.
@@ -84,12 +84,20 @@ def packet_job(
     """
     sending = yield from sending_of(store, spec)
     frame, stream = sending.rig.frames[row], sending.streams[row]
-    there = np.zeros(len(stream), np.bool_)
-    there[first_byte : first_byte + byte_count] = True
-    got = sending.coding.decode(np.where(there, stream, 0), there, frame.rgb.shape[:2], sending.packet_bytes)
-    depth, color = (got.depth > 0) | (got.coarse > 0), got.rgb_known
+    there = np.ones(len(stream), np.bool_)
+    whole = _decoded(sending, row, there)
+    there[first_byte : first_byte + byte_count] = False
+    without = _decoded(sending, row, there)
+    depth = (whole.depth > 0) & (without.depth == 0)
+    color = whole.rgb_known & (~without.rgb_known | (whole.rgb != without.rgb).any(axis=2))
     cloud = cloud_of(replace(frame, depth=DepthMap(np.where(depth, frame.depth.z_m, np.nan))))
     return PacketView(row, depth, color, _lit(frame.rgb, depth | color), cloud.points_m.astype(np.float32))
+
+
+def _decoded(sending: Sending, row: int, there: BoolArray) -> Received:
+    """Decode a node's images from the bytes that are ``there`` (S,)."""
+    data, shape = np.where(there, sending.streams[row], 0), sending.rig.frames[row].rgb.shape[:2]
+    return sending.coding.decode(data, there, (shape[0], shape[1]), sending.packet_bytes)
 
 
 def sending_of(store: Store, spec: Spec) -> Generator[Progress, None, Sending]:

@@ -125,14 +125,14 @@ class DeliveryView:
 
 @dataclass(frozen=True, slots=True)
 class PacketView:
-    """The part of an image that one packet carries."""
+    """The part of an image that is lost without one packet, if all others arrive."""
 
     row: int
     """Index of the node in the rig."""
     depth: BoolArray
-    """(H, W) pixels whose depth the packet gives without other packets."""
+    """(H, W) pixels whose depth is then missing, or only coarse."""
     color: BoolArray
-    """(H, W) pixels whose colour it gives without other packets."""
+    """(H, W) pixels whose colour is then missing, or coarse."""
     picture: ByteArray
     """(h, w, 3) the node's own picture with these pixels highlighted."""
     points_m: FloatArray

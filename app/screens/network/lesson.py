@@ -43,7 +43,7 @@ class NetworkLook:
     """Title of the medium access or scheme; empty is the preset's own."""
     beside: str = ""
     """Scheme of a second run; empty is none."""
-    coding: str = "raw"
+    coding: str = "exact"
     lose_percent: float = 0.0
     burst_frames: int = 8
     again: bool = True

@@ -98,7 +98,7 @@ class Frames:
 
 
 def packet_sentence(packet: PacketView) -> str:
-    """Return a sentence on the part of an image in a packet."""
+    """Return a sentence on the part of an image that needs a packet."""
     parts = []
     for what, pixels in (("depth", packet.depth), ("colour", packet.color)):
         rows = np.flatnonzero(pixels.any(axis=1))
@@ -106,10 +106,11 @@ def packet_sentence(packet: PacketView) -> str:
             where = f"row {rows[0] + 1}" if rows[0] == rows[-1] else f"rows {rows[0] + 1} to {rows[-1] + 1}"
             parts.append(f"{what} of {int(pixels.sum()):,} pixels in {where}")
     if not parts:
-        return (
-            "This packet alone decodes to no measured pixel: its rows have none, or it needs other packets."
-        )
-    return f"This packet decodes to the {' and the '.join(parts)} (yellow in the picture and the cloud)."
+        return "No pixel needs this packet: it holds none that was measured, or other packets replace it."
+    return (
+        f"Without this packet the {' and the '.join(parts)} would be missing or coarse "
+        "(yellow in the picture and the cloud)."
+    )
 
 
 def legend_html(colors: Sequence[tuple[str, tuple[int, int, int]]]) -> Markup:

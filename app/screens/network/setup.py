@@ -145,7 +145,7 @@ class NetworkSetup:
     def reset(self) -> None:
         """Restore the first settings."""
         self._preset.value = NETWORKS[FIRST].title
-        self._coding.value = next(iter(CODING_NAMES))
+        self._coding.value = CODINGS[NetworkLook().coding]
         self._moments.value, self._burst.value = MOMENTS, BURST_FRAMES
         self.what_if.forget()
         self._load()

@@ -24,14 +24,14 @@ def rig_folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def delivered(rig_folder, tmp_path_factory):
-    """Everything arrives: the folder and the JSON."""
+    """Everything arrives, in a lossless coding: the folder and the JSON."""
     import contextlib
     import io
 
     from app.cli import main
 
     out, text = tmp_path_factory.mktemp("delivered"), io.StringIO()
-    words = ["deliver", "--rig", rig_folder, "--moments", 3, "--out", out, "--json", *FEW]
+    words = ["deliver", "--rig", rig_folder, "--coding", "raw", "--moments", 3, "--out", out, "--json", *FEW]
     with contextlib.redirect_stdout(text):
         main([*map(str, words)])
     return out, json.loads(text.getvalue())

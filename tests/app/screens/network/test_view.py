@@ -1,18 +1,21 @@
 """What the Network screen makes of a run: pieces, pictures, texts, curves, commands. The trace is by hand."""
 
+import inspect
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 import pipeline.delivery
-from app.compute.state import Spec
+from app.cli.deliver import deliver as command
+from app.compute.state import Sent, Spec
 from app.drawing.curves import polyline
 from app.screens.network.draw import Flights, ground_of
 from app.screens.network.job import network_job
 from app.screens.network.labels import ACCESS, CODINGS, NETWORKS, SCHEMES, ways
+from app.screens.network.lesson import NetworkLook
 from app.screens.network.numbers import metric_tables, runs_summary, value_text
 from app.screens.network.run_view import run_view
 from app.screens.network.view import What
@@ -24,6 +27,8 @@ from network_sim.types import Cause, EventKind, PacketKind
 from packetmesh.progress import Progress
 from packetmesh.progress import drain as end
 from packetmesh.settings import with_settings
+from pipeline.deliver import deliver
+from pipeline.delivery.sending import DeliverySpec
 from pipeline.sources import Demo
 
 MS = 1_000_000
@@ -141,6 +146,17 @@ def test_every_preset_can_be_run_in_every_way_that_is_offered(preset):
 
 def test_the_codings_offered_are_those_that_there_are():
     assert {name: coding.title for name, coding in pipeline.delivery.CODINGS.items()} == dict(CODINGS)
+
+
+def test_the_command_the_interface_the_screen_and_its_lessons_have_one_default_coding():
+    by_function = [inspect.signature(one).parameters["coding"].default for one in (command, deliver)]
+    by_record = [
+        field.default
+        for record in (DeliverySpec, Sent, NetworkLook)
+        for field in fields(record)
+        if field.name == "coding"
+    ]
+    assert [*by_function, *by_record] == 5 * ["exact"]
 
 
 def test_two_runs_are_simulated_with_progress_and_remembered(store):
