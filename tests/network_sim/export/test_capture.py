@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from struct import unpack, unpack_from
 from zlib import crc32
@@ -17,10 +18,11 @@ from network_sim.export.capture import check_capture, write_capture
 from network_sim.mac import dcf
 from network_sim.presets import PRESETS
 from network_sim.simulate import simulate
-from network_sim.trace.log import NetworkTrace
+from network_sim.trace.log import NetworkTrace, Recorder
 from network_sim.types import Cause, EventKind, PacketKind
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings
+from tests.network_sim.by_hand import trace_of
 
 WPAN = ("thesis-link", "nodes.image_bytes=20000")
 RELAYS = ("greenhouse", "nodes.images=1", "nodes.header_bytes=10", "run.horizon_s=200")
@@ -151,6 +153,28 @@ def test_ieee80211_frames_have_the_sizes_rates_and_numbers_of_the_run(case: str,
         assert kinds[0x08] - kinds[0xD4] == failed
 
 
+@pytest.mark.parametrize("kind", ["ieee802154", "ieee80211b"])
+def test_a_packet_that_its_node_sends_after_sleep_has_a_new_number(kind: str, tmp_path: Path) -> None:
+    """Packet 0, again, and after sleep; then packet 1."""
+
+    def story(recorder: Recorder) -> None:
+        for packet in (0, 1):
+            recorder.add(0, EventKind.ENQUEUE, 0, packet=packet, image=0, size_bytes=50)
+        for t_ns, packet in ((10, 0), (20, 0), (50, 0), (60, 1)):
+            recorder.add(t_ns, EventKind.AIR, 0, 2, packet, 0, size_bytes=67, duration_ns=5)
+        recorder.add(30, EventKind.DOWN, 0)
+        recorder.add(40, EventKind.UP, 0)
+
+    trace = trace_of(story, warmup_s=0.0)
+    config = with_settings(trace.config, [f"mac.kind={kind}"])
+    write_capture(replace(trace, config=config), tmp_path / "trace.pcap")
+    frames = [frame for _, frame in records(tmp_path / "trace.pcap")]
+    if kind == "ieee802154":
+        assert [frame[2] for frame in frames] == [0, 0, 1, 2]
+    else:
+        assert [(frame[32] >> 4, frame[11]) for frame in frames] == [(0, 0), (0, 8), (1, 0), (2, 0)]
+
+
 def test_reservations_end_with_the_exchange(tmp_path: Path) -> None:
     """A frame's reservation ends within 1 us after the last frame of its exchange."""
     trace, frames = written("rts", tmp_path)
@@ -173,6 +197,8 @@ def test_payloads_say_what_they_carry(tmp_path: Path) -> None:
     _, frames = written("wpan", tmp_path)
     first = next(frame for frame in frames if frame[9:].startswith(b"#node 2 image"))
     assert first[9:-2].rstrip(b"\0").endswith(b"fragment 0 bytes 0-115")
+    third = b"fragment 2 bytes 232-347"  # 116 bytes each
+    assert any(frame[9:-2].rstrip(b"\0").endswith(third) for frame in frames)
     trace, frames = written("relays", tmp_path)
     events = trace.events.of(EventKind.AIR, EventKind.ACK)
     taken = trace.events.of(EventKind.CAPTURE)
