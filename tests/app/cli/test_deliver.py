@@ -174,5 +174,5 @@ def test_a_layout_counts_only_for_a_rig_without_poses_and_that_is_said(capsys):
 
     office = PRESETS["office"]
     for changes, said in ((["nodes.layout=line"], 1), (["nodes.layout=line", "mac.kind=serial"], 1), ([], 0)):
-        say_network(with_settings(office, changes), office, "office", changes)
+        say_network(with_settings(office, changes), office, "office", changes, {})
         assert capsys.readouterr().err.count("nodes.layout changes nothing here") == said
