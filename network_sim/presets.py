@@ -1,4 +1,4 @@
-"""Named network configurations: those of the thesis, a greenhouse and an office."""
+"""Named network configurations: those of the thesis, a greenhouse, an office, and radios in a star."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from network_sim.config import (
     RunConfig,
     UplinkConfig,
 )
+from network_sim.star_presets import STAR_PRESETS
 
 WAVELAN = EnergyConfig(tx_w=1.346, rx_w=0.901, idle_w=0.739, sleep_w=0.0474)
 """Lucent's WaveLAN at 11 Mb/s: 284, 190, 156, 10 mA at 4.74 V (Feeney and Nilsson 2001, from memory)."""
@@ -62,5 +63,6 @@ PRESETS: dict[str, NetworkConfig] = {
         energy=WAVELAN,
         run=RunConfig(horizon_s=600.0),
     ),
+    **STAR_PRESETS,
 }
-"""The scenarios of SPEC 6.1 and 6.2, a lossy multi-hop network, and a fast single-hop network."""
+"""The scenarios of SPEC 6.1 and 6.2, a lossy multi-hop network, a fast single-hop network, and the stars."""
