@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from network_sim.bounds.limits import LARGEST_S, check_limits
-from network_sim.street_config import SchemeConfig, StreetConfig
+from network_sim.settings.street import SchemeConfig, StreetConfig
 from packetmesh.checks import above, at_least, finite, one_each, one_of, several, share
 from packetmesh.errors import InputError
 

@@ -13,7 +13,7 @@ from lab.claims.network.study import RUNS, SCHEMES, STREET, Case
 from lab.claims.network.tasks import TimedRun, timed_run
 from network_sim.config import MacKind
 from network_sim.replicate import replications
-from network_sim.street_config import SchemeName
+from network_sim.settings.street import SchemeName
 from packetmesh.batch import run_batch
 from packetmesh.errors import PacketMeshError
 

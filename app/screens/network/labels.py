@@ -9,8 +9,7 @@ from types import MappingProxyType
 from app.drawing.colors import INFERRED, SOURCE, TARGET
 from app.web.markup import Markdown
 from network_sim.config import STARS, EnergyConfig, NetworkConfig
-from network_sim.presets import PRESETS, WAVELAN
-from network_sim.star_presets import MODULE_23_DBM, NRF52840, SX1276
+from network_sim.presets import MODULE_23_DBM, NRF52840, PRESETS, SX1276, WAVELAN
 from network_sim.types import Cause, PacketKind
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings

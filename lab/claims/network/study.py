@@ -15,7 +15,7 @@ from lab.trials import iterate_trials
 from network_sim.config import NetworkConfig
 from network_sim.presets import PRESETS
 from network_sim.replicate import replications
-from network_sim.street_config import SchemeName
+from network_sim.settings.street import SchemeName
 from packetmesh.progress import Progress
 
 STREET = PRESETS["street-grid"]
