@@ -6,18 +6,32 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from network_sim.bounds.limits import LARGEST_S, check_limits
+from network_sim.settings.street import SchemeConfig, StreetConfig
 from packetmesh.checks import above, at_least, finite, one_each, one_of, several, share
 from packetmesh.errors import InputError
 
 Propagation = Literal["friis", "two-ray", "log-distance"]
-MacKind = Literal["ieee80211b", "ieee802154", "ideal", "serial", "replay"]
+MacKind = Literal["ieee80211b", "ieee802154", "ideal", "serial", "replay", "lora", "ble", "lte-m", "nb-iot"]
 Layout = Literal["star", "line", "grid", "random"]
-SchemeName = Literal["baseline", "greedy", "pdc", "pdc-received"]
 Keep = Literal["all", "images", "counters"]
 Scenario = Literal["collection", "street-grid"]
 
-MAX_PAYLOAD_BYTES: dict[MacKind, int] = {"ieee802154": 116, "ieee80211b": 2304}
-"""Largest payload of a frame: 127 B less 11 B of header and check sum, and the limit of IEEE 802.11."""
+MAX_PAYLOAD_BYTES: dict[MacKind, int] = {
+    "ieee802154": 116,
+    "ieee80211b": 2304,
+    "ble": 244,
+    "lte-m": 120,
+    "nb-iot": 121,
+}
+"""Largest payload of a frame: 127 B less 11 B of header and check sum; the limit of IEEE 802.11; 251 B less
+the headers of L2CAP and ATT; a transport block of 1000 bits less the headers of MAC, RLC and PDCP."""
+LORA_PAYLOAD_BYTES = {7: 222, 8: 222, 9: 115, 10: 51, 11: 51, 12: 51}
+"""Largest payload of LoRaWAN by spreading factor (Regional Parameters 1.0.3, EU863-870, N with repeaters)."""
+
+STARS: tuple[MacKind, ...] = ("lora", "ble", "lte-m", "nb-iot")
+"""Medium accesses whose nodes reach only the sink: no node forwards for another one."""
+ANY_DISTANCE: tuple[MacKind, ...] = ("serial", "replay", "lte-m", "nb-iot")
+"""Medium accesses that connect a node and the sink wherever they are; an operator's cell covers all nodes."""
 
 LEAST_CAPTURE_DB = -5.0
 """Ratio of a frame's power to noise and interference below which ns-3 does not receive it (SPEC 6.3)."""
@@ -66,12 +80,13 @@ class RadioConfig:
     nakagami_m: float | None = None
     """Shape of the fading drawn for each frame; 1 is Rayleigh, larger fades less, None is no fading."""
     range_m: float = 100.0
-    """Nominal range: the receive threshold is the mean power there (IEEE 802.11b: at 11 Mb/s)."""
+    """Nominal range: the receive threshold is the mean power there (IEEE 802.11b: at 11 Mb/s, LoRa: with
+    spreading factor 7)."""
     sense_range_m: float = 220.0
     """Distance up to which a transmission keeps others silent."""
     capture_db: float | None = None
     """Least ratio of a frame's power to the sum of overlapping ones at which it survives; None is 3 dB in
-    IEEE 802.15.4, 10 dB in IEEE 802.11b; -5 dB is IEEE 802.15.4 as ns-3 simulates it."""
+    IEEE 802.15.4, 6 dB in LoRa, 10 dB in IEEE 802.11b; -5 dB is IEEE 802.15.4 as ns-3 simulates it."""
     noise_dbm: float | None = None
     """Power of the noise; None receives everything above the threshold without bit errors."""
     walls_m: tuple[float, ...] = ()
@@ -99,17 +114,27 @@ class MacConfig:
 
     kind: MacKind = "ieee802154"
     """Unslotted IEEE 802.15.4, IEEE 802.11b DCF, a link of its own for every node (ideal), a serial line
-    with ten bits a byte, or a recorded link for every node (replay)."""
+    with ten bits a byte, a recorded link for every node (replay), LoRaWAN in the EU's 868 MHz band (lora),
+    Bluetooth LE 2M (ble), or the uplink of a cellular module (lte-m, nb-iot)."""
     rts: bool = False
     """Reserve the channel before every packet (RTS/CTS); only IEEE 802.11b can."""
     ack: bool = True
-    """Acknowledge frames and send lost ones again; IEEE 802.11b always does."""
+    """Acknowledge frames and send lost ones again; IEEE 802.11b, Bluetooth and cellular modules always do."""
     retries: int | None = None
-    """Retransmissions of an unanswered frame; None is 3 times in IEEE 802.15.4, 6 in IEEE 802.11b."""
+    """Retransmissions of an unanswered frame; None is 3 times in IEEE 802.15.4, 6 in IEEE 802.11b, 7 in
+    LoRaWAN, 4 in LTE-M and NB-IoT."""
     rate_bps: float = 11e6
     """Rate of IEEE 802.11b's data frames: 1, 2, 5.5 or 11 Mb/s. A slower one reaches farther."""
     link_bps: float = 250e3
     """Rate of the ideal link or the serial line."""
+    spreading_factor: int = 7
+    """Spreading factor of LoRa, 7 to 12: each step reaches farther and takes about twice as long."""
+    connection_interval_s: float = 0.03
+    """Time between two connection events of a Bluetooth LE node, which share it equally."""
+    full_duplex: bool = False
+    """Whether LTE-M modules send and receive at once; others send three eighths of the time."""
+    tones: int = 12
+    """Subcarriers of 15 kHz that NB-IoT grants to a node: 1, 3, 6 or 12 (all)."""
     trace: str | None = None
     """File of the recorded link: columns of time in s, rate in Mbit/s, round trip in ms, share lost; or a
     mahimahi trace, or the output of iperf3 --json."""
@@ -118,8 +143,23 @@ class MacConfig:
         above("mac.link_bps", self.link_bps, 0.0)
         at_least("mac.retries", self.retries, 0)
         one_of("mac.rate_bps", self.rate_bps, (1e6, 2e6, 5.5e6, 11e6))
+        one_of("mac.spreading_factor", self.spreading_factor, LORA_PAYLOAD_BYTES)
+        one_of("mac.tones", self.tones, (1, 3, 6, 12))
+        steps = self.connection_interval_s / 0.00125
+        if not (6 <= steps <= 3200 and abs(steps - round(steps)) < 1e-6):
+            raise InputError(
+                f"mac.connection_interval_s is {self.connection_interval_s}; try a multiple of 0.00125 from "
+                "0.0075 to 4"
+            )
         if self.kind == "replay" and not self.trace:
             raise InputError("mac.kind is replay, but of which recorded link? Try mac.trace=FILE")
+
+    @property
+    def max_payload_bytes(self) -> int | None:
+        """Largest payload of a frame; None if every size is possible."""
+        if self.kind == "lora":
+            return LORA_PAYLOAD_BYTES[self.spreading_factor]
+        return MAX_PAYLOAD_BYTES.get(self.kind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,85 +265,6 @@ class UplinkConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class SchemeConfig:
-    """Which images of passing vehicles are collected (SPEC 6.2, Table 4.7)."""
-
-    name: SchemeName = "baseline"
-    """Upload everything (baseline), ask for what adds coverage (greedy), or ask for each image with a
-    probability that falls with how many are offered (pdc) or received (pdc-received)."""
-    k: int | None = None
-    """Most images that a request of greedy asks for; None does not limit it."""
-    r_low: float = 3.0
-    """Images of a cell in a control period up to which pdc asks for all."""
-    r_high: float = 8.0
-    """Images of a cell in a control period from which pdc asks only for what covers it once."""
-    validity_s: float = 10.0
-    """Time for which an image covers its cell (T_v)."""
-    observation_s: float = 600.0
-    """Time over which pdc counts offered images (T_obs)."""
-    control_s: float = 60.0
-    """Interval at which pdc sets its probabilities (S)."""
-    sample_s: float = 2.0
-    """Time between images of a vehicle."""
-    buffer_images: int = 200
-    """Images that a vehicle keeps; a full buffer drops the oldest."""
-    image_bytes: int = 1000
-    """Size of an image."""
-    tag_bytes: int = 40
-    """Size of an image's tag in a summary."""
-    id_bytes: int = 8
-    """Size of an image's id in a request."""
-    datagram_bytes: int = 1472
-    """Most bytes of a UDP datagram."""
-    cell_m: float = 100.0
-    """Length of a cell, a piece of road."""
-    directed_cells: bool = True
-    """Whether a piece of road is another cell in the other direction; the numbers that SPEC 6.2 gives
-    without a radio are those of one cell for both."""
-    summary_interval_s: float = 10.0
-    """Least time between two summaries to the same access point."""
-    headers_bytes: int = 28
-    """IP and UDP headers of each datagram."""
-
-    def __post_init__(self) -> None:
-        for key in ("validity_s", "observation_s", "control_s", "sample_s", "cell_m", "summary_interval_s"):
-            above(f"scheme.{key}", getattr(self, key), 0.0)
-        for key in ("k", "buffer_images", "image_bytes", "tag_bytes", "id_bytes"):
-            at_least(f"scheme.{key}", getattr(self, key), 1)
-        at_least("scheme.datagram_bytes", self.datagram_bytes, max(self.tag_bytes, self.id_bytes))
-        at_least("scheme.headers_bytes", self.headers_bytes, 0)
-        at_least("scheme.r_low", self.r_low, 0.0)
-        above("scheme.r_high", self.r_high, self.r_low)
-
-
-@dataclass(frozen=True, slots=True)
-class StreetConfig:
-    """A square grid of streets with access points at the roadside (SPEC 6.2)."""
-
-    vehicles: int = 60
-    """Vehicles with a camera."""
-    blocks: int = 5
-    """Blocks along each side: one less than there are crossings."""
-    block_m: float = 200.0
-    """Side of a block."""
-    speed_mps: float = 10.0
-    """Speed of every vehicle."""
-    access_points: int = 4
-    """Access points, which are the sinks."""
-
-    def __post_init__(self) -> None:
-        for key in ("vehicles", "blocks", "access_points"):
-            at_least(f"street.{key}", getattr(self, key), 1)
-        above("street.block_m", self.block_m, 0.0)
-        above("street.speed_mps", self.speed_mps, 0.0)
-        if self.access_points > (self.blocks + 1) ** 2:
-            raise InputError(
-                f"street.access_points is {self.access_points}, more than there are crossings; "
-                f"try at most {(self.blocks + 1) ** 2}"
-            )
-
-
-@dataclass(frozen=True, slots=True)
 class EnergyConfig:
     """Power of each state: by default a CC2420 radio and a Raspberry Pi 4 (SPEC 6.3)."""
 
@@ -374,15 +335,23 @@ class NetworkConfig:
         if self.scenario == "street-grid":
             if self.mac.kind == "replay":
                 raise InputError("mac.kind is replay, but vehicles have no link to record; try ieee80211b")
+            if self.mac.kind in STARS:
+                raise InputError(
+                    f"mac.kind is {self.mac.kind}, which joins nodes to one sink, but vehicles pass several "
+                    "access points; try ieee80211b"
+                )
             key, size_bytes = "scheme.datagram_bytes", self.scheme.datagram_bytes + self.scheme.headers_bytes
         else:
             key, size_bytes = "nodes.payload_bytes", self.nodes.payload_bytes
-        most = MAX_PAYLOAD_BYTES.get(self.mac.kind)
+        most = self.mac.max_payload_bytes
         capture_db = self.radio.capture_db
-        if self.mac.kind == "ieee80211b" and capture_db is not None and capture_db < 0.0:
+        if self.mac.kind in ("ieee80211b", "lora") and capture_db is not None and capture_db < 0.0:
             raise InputError(
                 f"radio.capture_db is {capture_db}, with which {self.mac.kind} would receive two frames at "
                 "once; try at least 0"
             )
         if most is not None and size_bytes > most:
-            raise InputError(f"{key} makes packets of {size_bytes} bytes, but {self.mac.kind} carries {most}")
+            by = f" with mac.spreading_factor={self.mac.spreading_factor}" if self.mac.kind == "lora" else ""
+            raise InputError(
+                f"{key} makes packets of {size_bytes} bytes, but {self.mac.kind} carries {most}{by}"
+            )

@@ -1,9 +1,10 @@
-"""Named network configurations: those of the thesis, a greenhouse and an office."""
+"""Named network configurations: those of the thesis, a greenhouse, an office, and radios in a star."""
 
 from __future__ import annotations
 
 from network_sim.config import (
     EnergyConfig,
+    LossConfig,
     MacConfig,
     NetworkConfig,
     NodesConfig,
@@ -14,6 +15,15 @@ from network_sim.config import (
 
 WAVELAN = EnergyConfig(tx_w=1.346, rx_w=0.901, idle_w=0.739, sleep_w=0.0474)
 """Lucent's WaveLAN at 11 Mb/s: 284, 190, 156, 10 mA at 4.74 V (Feeney and Nilsson 2001, from memory)."""
+SX1276 = EnergyConfig(tx_w=0.0957, rx_w=0.03795, idle_w=6.6e-7, sleep_w=6.6e-7)
+"""Semtech's SX1276 at 3.3 V: 29 mA sending 13 dBm, 11.5 mA receiving, .2 µA asleep (data sheet Rev. 7, Table
+6, from memory). Between its frames a node of class A sleeps; its empty receive windows are not counted."""
+NRF52840 = EnergyConfig(tx_w=0.0192, rx_w=0.01878, idle_w=9.5e-6, sleep_w=9.5e-6)
+"""Nordic's nRF52840 at 3 V with DC/DC: 6.4 mA sending 0 dBm and 6.26 mA receiving at 1 Mbit/s (product
+specification, I_RADIO_TX1, I_RADIO_RX0), 3.16 µA asleep (from memory). Between its frames a node sleeps."""
+MODULE_23_DBM = EnergyConfig(tx_w=0.545, rx_w=0.09, idle_w=0.09, sleep_w=0.000015)
+"""A cellular module at 23 dBm: the figures with which 3GPP TR 45.820 judged the battery life of NB-IoT (from
+memory). It listens for grants whenever it does not send; LTE-M has the same power class."""
 
 PRESETS: dict[str, NetworkConfig] = {
     "thesis-link": NetworkConfig(),
@@ -62,5 +72,80 @@ PRESETS: dict[str, NetworkConfig] = {
         energy=WAVELAN,
         run=RunConfig(horizon_s=600.0),
     ),
+    "lora": NetworkConfig(
+        radio=RadioConfig(
+            model="log-distance",
+            frequency_hz=868.1e6,
+            tx_power_dbm=13.0,
+            range_m=3100.0,  # -123 dBm, the SX1276's sensitivity with spreading factor 7
+            sense_range_m=3100.0,
+        ),
+        mac=MacConfig(kind="lora", ack=False),
+        nodes=NodesConfig(
+            spacing_m=8.0,
+            image_bytes=69_000,
+            depth_bytes=183_000,
+            payload_bytes=222,
+            header_bytes=8,
+        ),
+        uplink=UplinkConfig(rate_bps=10e6),
+        energy=SX1276,
+        run=RunConfig(horizon_s=172_800.0),
+    ),
+    "ble": NetworkConfig(
+        radio=RadioConfig(
+            model="friis",
+            tx_power_dbm=0.0,
+            range_m=31.0,  # -70 dBm, which every receiver must reach (Bluetooth Core, Vol 6, Part A, 4.1)
+            sense_range_m=31.0,
+        ),
+        mac=MacConfig(kind="ble"),
+        nodes=NodesConfig(
+            spacing_m=8.0,
+            images=0,
+            interval_s=10.0,
+            image_bytes=69_000,
+            depth_bytes=183_000,
+            payload_bytes=244,
+            header_bytes=8,
+            deadline_s=10.0,
+        ),
+        uplink=UplinkConfig(rate_bps=10e6),
+        energy=NRF52840,
+        run=RunConfig(horizon_s=600.0),
+    ),
+    "lte-m": NetworkConfig(
+        mac=MacConfig(kind="lte-m"),
+        loss=LossConfig(share=0.1),  # the share at which a module reports a rate as usable (36.213, 7.2.3)
+        nodes=NodesConfig(
+            spacing_m=8.0,
+            images=0,
+            interval_s=10.0,
+            image_bytes=69_000,
+            depth_bytes=183_000,
+            payload_bytes=120,
+            header_bytes=11,  # 8 of the fragment, and 3 of UDP and IP as compressed by RFC 3095
+            deadline_s=10.0,
+        ),
+        energy=MODULE_23_DBM,
+        run=RunConfig(horizon_s=600.0),
+    ),
+    "nb-iot": NetworkConfig(
+        mac=MacConfig(kind="nb-iot"),
+        loss=LossConfig(share=0.1),
+        nodes=NodesConfig(
+            spacing_m=8.0,
+            images=0,
+            interval_s=60.0,
+            image_bytes=69_000,
+            depth_bytes=183_000,
+            payload_bytes=121,
+            header_bytes=11,
+            deadline_s=60.0,
+        ),
+        energy=MODULE_23_DBM,
+        run=RunConfig(horizon_s=600.0),
+    ),
 }
-"""The scenarios of SPEC 6.1 and 6.2, a lossy multi-hop network, and a fast single-hop network."""
+"""The scenarios of SPEC 6.1 and 6.2, a lossy multi-hop network, a fast single-hop network, and radios in a
+star with the images of the office: LoRa, which sends one in half a day, Bluetooth LE, LTE-M and NB-IoT."""

@@ -30,7 +30,8 @@ def simulate(config: NetworkConfig) -> NetworkTrace:
         The trace: events with times in nanoseconds, counters, and the nodes' positions in metres.
 
     Raises:
-        InputError: a recorded link cannot be read, or the streets have too many cells.
+        InputError: a recorded link cannot be read, the streets have too many cells, or Bluetooth nodes have
+            too little time for a packet.
         InternalError: the trace contradicts itself.
 
     >>> import packetmesh as pm
@@ -53,7 +54,8 @@ def iterate_simulation(config: NetworkConfig) -> Generator[Progress, None, Netwo
         as soon as every image of a collection has arrived or was given up.
 
     Raises:
-        InputError: a recorded link cannot be read, or the streets have too many cells.
+        InputError: a recorded link cannot be read, the streets have too many cells, or Bluetooth nodes have
+            too little time for a packet.
         InternalError: the trace contradicts itself.
 
     >>> import packetmesh as pm

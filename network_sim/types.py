@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 NS_PER_S = 1_000_000_000
 BEGIN_WITHIN_NS = 10_000_000
-"""Nodes begin to send at a random time within this span. An exchange of IEEE 802.15.4 takes whole backoff
-periods: nodes that began at the same instant would stay synchronised for ever."""
+"""Nodes begin to send at a random time within this span, in LoRa within the time between two packets. An
+exchange of IEEE 802.15.4 takes whole backoff periods: nodes that began at the same instant would stay
+synchronised for ever."""
 
 
 def to_ns(seconds: float) -> int:

@@ -35,7 +35,8 @@ def deliver(
     Args:
         images: Images that the nodes send; of a recording each node sends a keyframe.
         out: Folder for the final result (the files of `reconstruct`), moments.csv and delivery.html.
-        preset: The network: thesis-link, greenhouse, office, or the config.json of a finished simulation.
+        preset: The network: thesis-link, greenhouse, office, lora, ble, lte-m, nb-iot, or the config.json
+            of a finished simulation.
         coding: How images are encoded: raw, raw-color-first, raw-rows, raw-tiles, png, jpeg, rvl, tiles,
             layered or exact.
         moments: Number of times at which the scene is rebuilt, after equal shares of the bytes.
@@ -130,13 +131,14 @@ def say_network(
         replacing: further settings that the command replaces, with the reason.
     """
     from app.cli.simulate import say_network_notes
+    from network_sim.config import ANY_DISTANCE
     from pipeline.delivery.plan import replaced_settings
 
     replaced = replaced_settings(network) | replacing
     for key in dict.fromkeys(map(key_of, changes)):
         if key in replaced:
             say(f"{key} changes nothing here: {replaced[key]}")
-    placed = network.nodes.places_m or network.mac.kind in ("serial", "replay")
+    placed = network.nodes.places_m or network.mac.kind in ANY_DISTANCE
     if "nodes.layout" in map(key_of, changes) and not placed:
         say("nodes.layout changes nothing here if the rig has poses: the nodes stand where the poses are")
     others = [change for change in changes if key_of(change) not in replaced]

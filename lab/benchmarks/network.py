@@ -11,8 +11,9 @@ from lab.benchmarks.benchmark import Benchmark
 from lab.benchmarks.ns3 import Counts, Row, Run, Theirs, compare, find_python, run_ns3
 from lab.claims.network.study import RUNS, SCHEMES, STREET, Case
 from lab.claims.network.tasks import TimedRun, timed_run
-from network_sim.config import MacKind, SchemeName
+from network_sim.config import MacKind
 from network_sim.replicate import replications
+from network_sim.settings.street import SchemeName
 from packetmesh.batch import run_batch
 from packetmesh.errors import PacketMeshError
 

@@ -12,14 +12,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from network_sim.config import NetworkConfig
+from network_sim.config import ANY_DISTANCE, STARS, MacKind, NetworkConfig
 from packetmesh.settings import settings, with_settings
 
 if TYPE_CHECKING:
     from network_sim.radio.propagation import Radio
 
-CHANNELS = ("ieee802154", "ieee80211b")
+CHANNELS = ("ieee802154", "ieee80211b", "lora")
 """Medium accesses whose nodes share a channel."""
+CELLULAR = ("lte-m", "nb-iot")
+_OWN: dict[str, MacKind] = {
+    "mac.spreading_factor": "lora",
+    "mac.connection_interval_s": "ble",
+    "mac.full_duplex": "lte-m",
+    "mac.tones": "nb-iot",
+}
+"""Settings that a single medium access uses."""
 _POWER = ("radio.tx_power_dbm", "radio.antenna_gain", "radio.system_loss")
 _POWER_LAW = ("radio.path_loss_exponent", "radio.reference_m")
 _PLACES = ("nodes.layout", "nodes.spacing_m", "nodes.places_m")
@@ -69,12 +77,22 @@ def _of_medium_access(config: NetworkConfig) -> Reasons:
     kind = f"mac.kind is {mac.kind}"
     if mac.kind != "ieee80211b":
         yield ("mac.rts", "mac.rate_bps"), f"{kind}, and only ieee80211b uses it"
-    if mac.kind not in ("ieee802154", "replay"):
-        always = "always acknowledges" if mac.kind == "ieee80211b" else "needs no acknowledgements"
-        yield ("mac.ack",), f"{kind}, which {always}"
-    if mac.kind not in CHANNELS:
+    for key, only in _OWN.items():
+        if mac.kind != only:
+            yield (key,), f"{kind}, and only {only} uses it"
+    if mac.kind not in ("ieee802154", "replay", "lora"):
+        without = mac.kind in ("ideal", "serial")
+        yield (
+            ("mac.ack",),
+            f"{kind}, which {'needs no acknowledgements' if without else 'always acknowledges'}",
+        )
+    if mac.kind == "ble":
+        yield ("mac.retries",), f"{kind}, which repeats a frame until it arrives"
+    elif mac.kind not in (*CHANNELS, *CELLULAR):
         yield ("mac.retries",), f"{kind}, which sends each packet once"
-    elif mac.kind == "ieee802154" and not mac.ack:
+    elif mac.kind in CELLULAR and not loss.share:
+        yield ("mac.retries",), "loss.share is 0, so every block arrives"
+    elif mac.kind in ("ieee802154", "lora") and not mac.ack:
         yield ("mac.retries",), "mac.ack is false, so no sender learns that a frame was lost"
     if mac.kind not in ("ideal", "serial"):
         yield ("mac.link_bps",), f"{kind}, and only ideal and serial use it"
@@ -92,6 +110,16 @@ def _of_radio(config: NetworkConfig) -> Reasons:
     street, every = config.scenario == "street-grid", settings(radio, "radio.")
     if kind in ("serial", "replay") and not street:
         yield every, f"mac.kind is {kind}, which gives every node a line of its own"
+    if kind in CELLULAR:
+        yield (
+            every,
+            f"mac.kind is {kind}, whose base station covers all nodes; loss.share sets what gets lost",
+        )
+    if kind == "ble":
+        apart = "mac.kind is ble, whose connection events never overlap"
+        yield ("radio.sense_range_m", "radio.capture_db", "radio.noise_dbm"), apart
+    if kind == "lora":
+        yield ("radio.sense_range_m",), "mac.kind is lora, whose nodes listen to nobody before they send"
     if kind in ("ideal", "serial") and street:
         contact = "vehicle within radio.range_m a link of its own"
         yield (
@@ -126,7 +154,7 @@ def _of_nodes(config: NetworkConfig) -> Reasons:
     yield vehicles, "scenario is collection, which has no vehicles; try scenario=street-grid"
     if nodes.places_m:
         yield ("nodes.layout", "nodes.spacing_m"), "nodes.places_m has the nodes' places"
-    if kind in ("serial", "replay"):
+    if kind in ANY_DISTANCE:
         yield _PLACES, f"mac.kind is {kind}, which connects nodes at any distance; only drawings show it"
     if nodes.bytes_by_node:
         yield ("nodes.image_bytes", "nodes.depth_bytes"), "nodes.bytes_by_node has the size of each image"
@@ -138,10 +166,12 @@ def _of_nodes(config: NetworkConfig) -> Reasons:
         yield ("energy.sleep_w", "energy.platform_sleep_w"), "no node ever sleeps or fails"
     if nodes.deadline_s is not None and nodes.deadline_s >= config.run.horizon_s:
         yield ("nodes.deadline_s",), "the run stops at run.horizon_s, before an image can be that old"
-    if kind == "serial" and not _loses(config):
+    if kind in ("serial", "ble", *CELLULAR) and not _loses(config):
         yield ("nodes.retransmit",), "no packet gets lost"
     requests = nodes.retransmit and kind == "replay" and not config.mac.ack
-    if kind in ("serial", "replay") and not nodes.failures_per_h and not requests:
+    if kind in ANY_DISTANCE and not nodes.failures_per_h and not requests:
+        yield ("energy.rx_w",), "no camera receives anything"
+    if kind == "lora" and not config.mac.ack and not nodes.retransmit:
         yield ("energy.rx_w",), "no camera receives anything"
     if uplink.trace is not None:
         yield ("uplink.rate_bps", "uplink.latency_s", "uplink.loss"), "uplink.trace replaces it"
@@ -153,9 +183,11 @@ def _of_nodes(config: NetworkConfig) -> Reasons:
 
 
 def _loses(config: NetworkConfig) -> bool:
-    """Return whether a packet on a serial line or the uplink can get lost or late."""
+    """Return whether a packet on a link without contention or on the uplink can get lost or late."""
     nodes, uplink = config.nodes, config.uplink
-    lossy = config.loss.share > 0.0 or (uplink.exists and (uplink.loss > 0.0 or uplink.trace is not None))
+    lossy = (config.loss.share > 0.0 and config.mac.kind != "ble") or (
+        uplink.exists and (uplink.loss > 0.0 or uplink.trace is not None)
+    )
     return bool(lossy or nodes.failures_per_h or nodes.duty_cycle < 1.0 or nodes.deadline_s is not None)
 
 
@@ -205,13 +237,17 @@ def _links(config: NetworkConfig) -> list[NDArray[np.float64]]:
 
     places, radio, success = topology(config)
     kind = config.mac.kind
-    if kind not in CHANNELS:
+    if kind not in CHANNELS and not (kind == "ble" and radio.fades):
         return [success]
     count = places.count
     power_w = np.array(
         [[radio.between_w(places, a, b, 0) if a != b else 0.0 for b in range(count)] for a in range(count)]
     )
-    marks = [success, power_w >= radio.rx_threshold_w, power_w >= radio.cs_threshold_w]
+    marks = [success]
+    if kind not in STARS:  # between other nodes than the sink nothing is received or sensed
+        marks += [
+            np.asarray(power_w >= least_w, float) for least_w in (radio.rx_threshold_w, radio.cs_threshold_w)
+        ]
     return [np.asarray(one, float) for one in (*marks, *_ratios(radio, power_w, config))]
 
 

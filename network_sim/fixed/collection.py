@@ -14,7 +14,7 @@ from network_sim.fixed.images import Book
 from network_sim.fixed.nodes import Camera, Shared, Station
 from network_sim.fixed.routing import link_success, shortest_paths
 from network_sim.fixed.sink import Sink
-from network_sim.mac import make_mac
+from network_sim.mac import make_mac, pace_ns
 from network_sim.mac.context import MacContext
 from network_sim.mac.medium import Medium
 from network_sim.radio.places import FixedPlaces, place_nodes
@@ -69,8 +69,9 @@ class Collection:
         """Why each node is down: ``NODE_DOWN`` if it failed, ``NONE`` if it sleeps; None if it is up."""
         self._asleep = False
         interval_ns = to_ns(config.nodes.interval_s)
+        begin_within_ns = max(BEGIN_WITHIN_NS, self.shared.pace_ns)
         self._cameras = [  # each with its own random time of the first image
-            Camera(self.shared, station, int(self._rng.integers(interval_ns or BEGIN_WITHIN_NS)))
+            Camera(self.shared, station, int(self._rng.integers(interval_ns or begin_within_ns)))
             for station in self.stations[:-1]
         ]
         self._sink = Sink(self.shared, self.stations[-1], config.uplink, recorder, uplink_rng)
@@ -85,7 +86,7 @@ class Collection:
             env.process(self._sleep_and_wake())
 
     def _make_shared(self, rng: np.random.Generator) -> Shared:
-        nodes, count = self._config.nodes, self.places.count
+        nodes, mac, count = self._config.nodes, self._config.mac, self.places.count
         sink = count - 1
         routes = shortest_paths(self._success, sink)
         return Shared(
@@ -98,9 +99,10 @@ class Collection:
             routes=routes,
             unreachable=routes.unreachable,
             destination=sink + 1 if self._config.uplink.exists else sink,
-            acknowledged=self._config.mac.ack or self._config.mac.kind not in ("ieee802154", "replay"),
+            acknowledged=mac.ack or mac.kind not in ("ieee802154", "replay", "lora"),
             failed=[False] * count,
             up=[True] * count,
+            pace_ns=pace_ns(self._config),
         )
 
     @property

@@ -49,6 +49,8 @@ class Shared:
     up: list[bool]
     """For each node, True if it is neither failed nor asleep."""
     mac: Mac = field(init=False)
+    pace_ns: int = 0
+    """Time from one packet of a node to its next, where regulation limits how often it may send; else 0."""
     sleeps_at_ns: int | None = None
     """Time at which the nodes fall asleep next; None without a duty cycle."""
     taken: set[tuple[int, int]] = field(default_factory=set)
@@ -63,8 +65,9 @@ class Shared:
 
     @property
     def status_after_ns(self) -> int:
-        """``STATUS_AFTER_NS`` plus the time that nodes sleep in each period."""
-        return STATUS_AFTER_NS + round((1.0 - self.config.duty_cycle) * to_ns(self.config.duty_period_s))
+        """``STATUS_AFTER_NS``, the time that nodes sleep in each period, and the time of two packets."""
+        asleep_ns = round((1.0 - self.config.duty_cycle) * to_ns(self.config.duty_period_s))
+        return STATUS_AFTER_NS + asleep_ns + 2 * self.pace_ns
 
     def next_hop(self, at: int, destination: int) -> int:
         """Return the next node of a packet's route; -1 if there is none."""

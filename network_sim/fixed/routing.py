@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaincinv
 
-from network_sim.config import NetworkConfig
+from network_sim.config import ANY_DISTANCE, STARS, NetworkConfig
 from network_sim.radio.places import Places
 from network_sim.radio.propagation import Radio, modulation
 
@@ -86,7 +86,8 @@ def link_success(config: NetworkConfig, radio: Radio, places: Places) -> NDArray
     """Compute the probability that an undisturbed data frame arrives, for each link.
 
     Args:
-        config: Size and medium access of the packets. Serial lines and recorded links connect all nodes.
+        config: Size and medium access of the packets. Serial lines and recorded links connect all nodes; in a
+            star every link has the sink at one end.
         radio: Powers, threshold and noise.
         places: Positions of the nodes.
 
@@ -94,15 +95,23 @@ def link_success(config: NetworkConfig, radio: Radio, places: Places) -> NDArray
         (N, N) probabilities, averaged over fading; 0 where the mean power is below the receive threshold.
     """
     count = places.count
-    if config.mac.kind in ("serial", "replay"):
-        return 1.0 - np.eye(count)
+    if config.mac.kind in ANY_DISTANCE:
+        success = 1.0 - np.eye(count)
+        return _star(success) if config.mac.kind in STARS else success
     success = np.zeros((count, count))
     for a in range(count):
         for b in range(a):
             power_w = radio.between_w(places, a, b, 0)
             if power_w >= radio.rx_threshold_w:
                 success[a, b] = success[b, a] = _frame_success(config, radio, power_w)
-    return success
+    return _star(success) if config.mac.kind in STARS else success
+
+
+def _star(success: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the links (N, N) of the sink, which is the last node, without those between other nodes."""
+    only = np.zeros_like(success)
+    only[-1], only[:, -1] = success[-1], success[:, -1]
+    return only
 
 
 def _frame_success(config: NetworkConfig, radio: Radio, power_w: float) -> float:

@@ -7,11 +7,14 @@ from typing import Any, Protocol
 
 import simpy
 
-from network_sim.config import MacKind
-from network_sim.mac import dcf, ieee802154
+from network_sim.config import MacKind, NetworkConfig
+from network_sim.mac import ble, dcf, ieee802154, lora, lte_m, nb_iot
+from network_sim.mac.ble import Ble
+from network_sim.mac.cellular import Cellular
 from network_sim.mac.context import MacContext
 from network_sim.mac.dcf import Dcf
 from network_sim.mac.ieee802154 import Ieee802154
+from network_sim.mac.lora import Lora
 from network_sim.mac.replay import RecordedLink
 from network_sim.mac.simple import OwnLink
 from network_sim.types import Delivery, Packet
@@ -19,6 +22,10 @@ from network_sim.types import Delivery, Packet
 FRAME_HEADER_BYTES: dict[MacKind, int] = {
     "ieee80211b": dcf.HEADER_BYTES,
     "ieee802154": ieee802154.PHY_BYTES + ieee802154.HEADER_BYTES,
+    "lora": lora.HEADER_BYTES,
+    "ble": ble.HEADER_BYTES,
+    "lte-m": lte_m.HEADER_BYTES,
+    "nb-iot": nb_iot.HEADER_BYTES,
 }
 """Bytes that each medium access adds to a packet to form a frame; the others add none."""
 
@@ -29,7 +36,8 @@ class Mac(Protocol):
     def send(self, packet: Packet, sender: int, receiver: int) -> Generator[simpy.Event, Any, Delivery]:
         """Carry a packet to a neighbour: ``delivery = yield from mac.send(packet, a, b)``.
 
-        A sender calls this for one packet after the other; earlier packets may still be ``under_way``.
+        A sender calls this for one packet after the other; earlier packets may still be ``under_way``. The
+        outcome of such a packet is reported once, before or after this returns.
         ``Delivery.ok`` is what the sender knows, ``Delivery.cause`` what happened.
         """
 
@@ -41,4 +49,15 @@ def make_mac(context: MacContext) -> Mac:
         return OwnLink(context)
     if kind == "replay":
         return RecordedLink(context)
+    if kind == "lora":
+        return Lora(context)
+    if kind == "ble":
+        return Ble(context)
+    if kind in ("lte-m", "nb-iot"):
+        return Cellular(context, (lte_m if kind == "lte-m" else nb_iot).carrier(context.config.mac))
     return Ieee802154(context) if kind == "ieee802154" else Dcf(context)
+
+
+def pace_ns(config: NetworkConfig) -> int:
+    """Return the time from one full packet of a node to its next, where regulation limits it; else 0."""
+    return lora.period_ns(config) if config.mac.kind == "lora" else 0

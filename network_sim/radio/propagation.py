@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from network_sim.config import MacConfig, NetworkConfig, RadioConfig
 from network_sim.radio.places import Places
 
-Modulation = Literal["dbpsk", "dqpsk", "cck5.5", "cck11", "oqpsk"]
-"""Modulations: IEEE 802.11b at 1, 2, 5.5 and 11 Mb/s, IEEE 802.15.4 at 250 kb/s."""
+Modulation = Literal["dbpsk", "dqpsk", "cck5.5", "cck11", "oqpsk", "lora", "gfsk"]
+"""Modulations: IEEE 802.11b at 1, 2, 5.5 and 11 Mb/s, IEEE 802.15.4 at 250 kb/s, LoRa, Bluetooth LE."""
 IEEE80211B: dict[float, tuple[Modulation, float]] = {
     1e6: ("dbpsk", 9.0),
     2e6: ("dqpsk", 6.0),
@@ -27,11 +27,24 @@ IEEE80211B: dict[float, tuple[Modulation, float]] = {
 }
 """Modulation by rate in bit/s, and the decibels by which it needs less power than 11 Mb/s. The data sheet of
 Acer's MPCI-101 has -91, -88, -85 and -82 dBm, at which 8 % of frames of 1024 bytes are lost."""
+LORA: dict[int, tuple[float, float]] = {
+    7: (0.0, -7.5),
+    8: (3.0, -10.0),
+    9: (6.0, -12.5),
+    10: (9.0, -15.0),
+    11: (10.0, -17.5),
+    12: (13.0, -20.0),
+}
+"""By spreading factor at 125 kHz: the decibels by which LoRa needs less power than with 7, from the SX1276's
+sensitivities (-123, -126, -129, -132, -133, -136 dBm; data sheet Rev. 7, RFS_L125_HF), and the least ratio of
+signal to noise in dB at which it can be read (Table 13 there)."""
 OQPSK_CAPTURE_DB = 3.0
 """Capture ratio of IEEE 802.15.4 if ``radio.capture_db`` is None: the co-channel rejection of a CC2420 (SPEC
 6.3)."""
 DSSS_CAPTURE_DB = 10.0
 """The same for IEEE 802.11b (SPEC 6.3)."""
+LORA_CAPTURE_DB = 6.0
+"""The same for frames of LoRa with one spreading factor, as in LoRaSim (Bor et al. 2016)."""
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 _ROUNDING = 1e-9  # nodes exactly range_m apart hear each other, however their distance was computed
@@ -228,12 +241,16 @@ def walls_crossed(walls_m: NDArray[np.float64], a_m: tuple[float, float], b_m: t
 
 def modulation(mac: MacConfig) -> Modulation:
     """Return the modulation of a medium access's data frames."""
-    return IEEE80211B[mac.rate_bps][0] if mac.kind == "ieee80211b" else "oqpsk"
+    if mac.kind == "ieee80211b":
+        return IEEE80211B[mac.rate_bps][0]
+    return "lora" if mac.kind == "lora" else "gfsk" if mac.kind == "ble" else "oqpsk"
 
 
 def _threshold_w(config: RadioConfig, mac: MacConfig) -> float:
-    """Return the power at the nominal range, or less for the slower rates of IEEE 802.11b."""
+    """Return the power at the nominal range, or less for slower rates of IEEE 802.11b and LoRa."""
     less_db = IEEE80211B[mac.rate_bps][1] if mac.kind == "ieee80211b" else 0.0
+    if mac.kind == "lora":
+        less_db = LORA[mac.spreading_factor][0]
     return path_loss(config).power_w(config.range_m) * ratio(-less_db)
 
 
@@ -259,11 +276,14 @@ class Radio:
         """Carrier-sense threshold; never above the receive threshold."""
         capture_db = config.capture_db
         if capture_db is None:
-            capture_db = OQPSK_CAPTURE_DB if modulation(mac) == "oqpsk" else DSSS_CAPTURE_DB
+            capture_db = _CAPTURE_DB.get(modulation(mac), DSSS_CAPTURE_DB)
         self.capture_ratio = ratio(capture_db)
         """Least ratio of a frame's power to the sum of overlapping powers with which it survives."""
-        self.noise_w = None if config.noise_dbm is None else watts(config.noise_dbm)
-        """Power of the noise; None if there are no bit errors."""
+        noise_dbm = None if mac.kind == "ble" else config.noise_dbm
+        self.noise_w = None if noise_dbm is None else watts(noise_dbm)
+        """Power of the noise; None if there are no bit errors, as in Bluetooth LE, where only the receive
+        threshold counts."""
+        self._lora_sinr = ratio(LORA[mac.spreading_factor][1])
         self._shadowing_db = config.shadowing_db
         self._shadowing_seed = int(rng.integers(2**63))
         self._shadowing: dict[tuple[int, int], float] = {}
@@ -310,8 +330,11 @@ class Radio:
         Args:
             sinr: ratio of signal to noise and interference, as a factor.
             size_bytes: bytes sent with this modulation.
-            kind: modulation of these bytes.
+            kind: modulation of these bytes. A frame of LoRa is lost if it is below the least ratio of signal
+                to noise, and received above it.
         """
+        if kind == "lora":
+            return 0.0 if sinr >= self._lora_sinr else 1.0
         if kind == "cck11":
             return _one_wrong(cck11_symbol_error_rate(sinr), size_bytes)
         if kind == "cck5.5":
@@ -319,6 +342,7 @@ class Radio:
         return _one_wrong(_BIT_ERROR_RATES[kind](sinr), 8 * size_bytes)
 
 
+_CAPTURE_DB: dict[Modulation, float] = {"oqpsk": OQPSK_CAPTURE_DB, "lora": LORA_CAPTURE_DB}
 _BIT_ERROR_RATES: dict[Modulation, Callable[[float], float]] = {
     "dbpsk": dbpsk_bit_error_rate,
     "dqpsk": dqpsk_bit_error_rate,

@@ -14,6 +14,10 @@ SHORT = {
     "street-grid": ["run.horizon_s=300", "run.warmup_s=60", "street.vehicles=20", "run.keep=all"],
     "greenhouse": ["run.horizon_s=400"],
     "office": ["run.horizon_s=25"],
+    "lora": ["run.horizon_s=3600", "nodes.image_bytes=3000", "nodes.depth_bytes=0", "nodes.images=0"],
+    "ble": ["run.horizon_s=25"],
+    "lte-m": ["run.horizon_s=25"],
+    "nb-iot": ["run.horizon_s=60"],
 }
 
 
@@ -79,7 +83,7 @@ def test_what_is_kept_does_not_change_what_happens(preset):
     assert len(counters.events) == 0
 
 
-@pytest.mark.parametrize("preset", ["greenhouse", "office"])
+@pytest.mark.parametrize("preset", ["greenhouse", "office", "ble"])
 def test_most_images_of_the_other_presets_arrive(preset):
     trace = simulate(with_settings(PRESETS[preset], ["run.horizon_s=600", "run.keep=images"]))
     outcome = image_balance(trace)

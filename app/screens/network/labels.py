@@ -8,8 +8,8 @@ from types import MappingProxyType
 
 from app.drawing.colors import INFERRED, SOURCE, TARGET
 from app.web.markup import Markdown
-from network_sim.config import EnergyConfig, NetworkConfig
-from network_sim.presets import PRESETS, WAVELAN
+from network_sim.config import STARS, EnergyConfig, NetworkConfig
+from network_sim.presets import MODULE_23_DBM, NRF52840, PRESETS, SX1276, WAVELAN
 from network_sim.types import Cause, PacketKind
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings
@@ -43,6 +43,25 @@ NETWORKS: Mapping[str, Preset] = MappingProxyType(
             "Greenhouse: many hops, lossy radio",
             "IEEE 802.15.4 with fading, radios that sleep three quarters of the time; the deadline is "
             "five minutes.",
+        ),
+        "ble": Preset(
+            "Bluetooth LE: cameras in turn",
+            "Bluetooth LE at 2 Mbit/s: the sink asks one camera after the other, and none disturbs another; "
+            "the deadline is 10 seconds.",
+        ),
+        "lte-m": Preset(
+            "LTE-M: an operator's cell",
+            "A half-duplex cellular module in each camera, no sink of your own; one block in ten gets lost; "
+            "the deadline is 10 seconds.",
+        ),
+        "nb-iot": Preset(
+            "NB-IoT: a narrow carrier",
+            "A cellular module on 180 kHz, at most 62.5 kbit/s for each camera; the deadline is a minute.",
+        ),
+        "lora": Preset(
+            "LoRa: an image in half a day",
+            "LoRaWAN at 868 MHz: each camera may send one hundredth of the time, and listens to nobody "
+            "before.",
         ),
         "street-grid": Preset(
             "Street grid: vehicles and access points",
@@ -88,6 +107,7 @@ def _power(of: EnergyConfig) -> tuple[str, ...]:
 
 
 CC2420_POWER, WAVELAN_POWER = _power(EnergyConfig()), _power(WAVELAN)
+SX1276_POWER, NRF52840_POWER, MODULE_POWER = _power(SX1276), _power(NRF52840), _power(MODULE_23_DBM)
 ACCESS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "IEEE 802.15.4": ("mac.kind=ieee802154", *CC2420_POWER),
@@ -98,6 +118,17 @@ ACCESS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "a separate link for each node, 1 Mbit/s": ("mac.kind=ideal", "mac.link_bps=1000000"),
         "a separate link for each node, 10 Mbit/s": ("mac.kind=ideal", "mac.link_bps=10000000"),
         "serial line, 57,600 baud": ("mac.kind=serial", "mac.link_bps=57600"),
+        "LoRa, spreading factor 7": ("mac.kind=lora", "mac.ack=false", *SX1276_POWER),
+        "LoRa, spreading factor 7, with ACK": ("mac.kind=lora", "mac.ack=true", *SX1276_POWER),
+        "LoRa, spreading factor 12": (
+            *("mac.kind=lora", "mac.ack=false", "mac.spreading_factor=12", "nodes.payload_bytes=51"),
+            *SX1276_POWER,
+        ),
+        "Bluetooth LE 2M": ("mac.kind=ble", *NRF52840_POWER),
+        "LTE-M, half-duplex": ("mac.kind=lte-m", *MODULE_POWER),
+        "LTE-M, full-duplex": ("mac.kind=lte-m", "mac.full_duplex=true", *MODULE_POWER),
+        "NB-IoT, 12 subcarriers": ("mac.kind=nb-iot", *MODULE_POWER),
+        "NB-IoT, 1 subcarrier": ("mac.kind=nb-iot", "mac.tones=1", *MODULE_POWER),
     }
 )
 
@@ -148,11 +179,13 @@ def ways(preset: str) -> dict[str, tuple[str, ...]]:
 
 
 def _possible(config: NetworkConfig, settings: tuple[str, ...]) -> bool:
+    """Return whether settings fit the preset; radios of a star are offered only with their own carrier."""
     try:
-        with_settings(config, settings)
+        changed = with_settings(config, settings)
     except InputError:
         return False
-    return True
+    kinds = {changed.mac.kind, config.mac.kind}
+    return len(kinds) == 1 or kinds.isdisjoint(STARS)
 
 
 TEXT = Markdown(

@@ -12,9 +12,10 @@ from pathlib import Path
 from lab.claims.network.intervals import interval
 from lab.claims.network.tasks import Values, street_values
 from lab.trials import iterate_trials
-from network_sim.config import NetworkConfig, SchemeName
+from network_sim.config import NetworkConfig
 from network_sim.presets import PRESETS
 from network_sim.replicate import replications
+from network_sim.settings.street import SchemeName
 from packetmesh.progress import Progress
 
 STREET = PRESETS["street-grid"]

@@ -30,6 +30,15 @@ STREET = [
     *("run.horizon_s=24", "run.warmup_s=5", "street.vehicles=40", "street.blocks=2"),
     *("scheme.image_bytes=6000", "scheme.summary_interval_s=2"),
 ]
+STAR = [
+    *("nodes.layout=line", "nodes.spacing_m=15", "nodes.images=0", "nodes.interval_s=0.7"),
+    *("nodes.count=3", "nodes.image_bytes=12000", "nodes.depth_bytes=9000", "nodes.deadline_s=2"),
+    "run.horizon_s=4",
+]
+CROWDED = [
+    *("nodes.count=20", "nodes.image_bytes=300", "nodes.depth_bytes=100", "nodes.interval_s=100"),
+    *("nodes.deadline_s=95", "run.horizon_s=600", "nodes.spacing_m=50", "radio.shadowing_db=3"),
+]
 WALLS = ["radio.walls_m=40,-9,40,9", "radio.wall_db=1", "nodes.spacing_m=80", "radio.noise_dbm=-72"]
 OFTEN = ["scheme.control_s=4", "scheme.observation_s=12", "scheme.r_low=0.8", "scheme.r_high=1.4"]
 CASES = {
@@ -54,12 +63,24 @@ CASES = {
     "lossy": ("office", [*LARGE, "loss.share=0.3", "nodes.duty_cycle=0.5", "nodes.duty_period_s=1.5"]),
     "log-distance": ("office", [*LARGE, "radio.model=log-distance"]),
     "friis": ("office", [*LARGE, "radio.model=friis", *WALLS]),
+    "lora": ("lora", [*STAR, *CROWDED]),
+    "lora with noise and acknowledgements": (
+        "lora",
+        [*STAR, *CROWDED, "mac.ack=true", "mac.retries=1", "radio.noise_dbm=-117", "radio.nakagami_m=1"],
+    ),
+    "ble": ("ble", STAR),
+    "ble, fading": ("ble", [*STAR, "radio.nakagami_m=2", "loss.share=0.1"]),
+    "lte-m": ("lte-m", [*STAR, "loss.share=0.3", "mac.retries=1"]),
+    "nb-iot": ("nb-iot", [*STAR, "loss.share=0", "nodes.deadline_s=none"]),
     "recorded uplink": ("office", [*LARGE, "uplink.trace=LINK"]),
     "greedy": ("street-grid", [*STREET, "scheme.name=greedy"]),
     "pdc": ("street-grid", [*STREET, "scheme.name=pdc", *OFTEN]),
     "pdc-received": ("street-grid", [*STREET, "scheme.name=pdc-received", "run.keep=counters", *OFTEN]),
 }
 VALUES = {
+    "mac.spreading_factor": ["8"],
+    "mac.connection_interval_s": ["0.1"],
+    "mac.tones": ["3"],
     "mac.rate_bps": ["2e6"],
     "mac.trace": ["SLOWER"],
     "uplink.trace": ["SLOWER"],

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from scipy.sparse.csgraph import dijkstra
 
 from network_sim.config import NetworkConfig, NodesConfig, RadioConfig
-from network_sim.fixed.collection import disconnected
+from network_sim.fixed.collection import disconnected, topology
 from network_sim.fixed.routing import link_success, shortest_paths
+from network_sim.presets import PRESETS
 from network_sim.radio.places import FixedPlaces
 from network_sim.radio.propagation import Radio
 from packetmesh.settings import with_settings
@@ -99,3 +100,13 @@ def test_frames_go_round_a_wall_over_another_node():
         success = link_success(config, Radio(one, config.mac, np.random.default_rng(0)), places)
         parents.append(shortest_paths(success, 2).parents)
     assert parents == [(2, 2, -1), (1, 2, -1)]
+
+
+@pytest.mark.parametrize("preset", ["lora", "ble", "lte-m", "nb-iot"])
+def test_in_a_star_no_node_forwards_for_another(preset):
+    """In a line of nodes 7 m apart the nearer ones would be relays; links have the sink at one end."""
+    config = with_settings(PRESETS[preset], ["nodes.layout=line", "nodes.count=4", "nodes.spacing_m=7"])
+    _, _, success = topology(config)
+    assert (success[:-1, :-1] == 0.0).all()
+    np.testing.assert_array_equal(success, success.T)
+    assert shortest_paths(success, 4).parents == (4, 4, 4, 4, -1)

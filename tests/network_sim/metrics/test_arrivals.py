@@ -21,6 +21,10 @@ SHORT = {
     "street-grid": ["run.horizon_s=200", "run.warmup_s=0", "street.vehicles=15", "run.keep=all"],
     "greenhouse": ["run.horizon_s=400", "nodes.failures_per_h=30"],
     "office": ["run.horizon_s=12", "uplink.loss=0.1"],
+    "lora": ["run.horizon_s=3600", "nodes.image_bytes=3000", "nodes.depth_bytes=0"],
+    "ble": ["run.horizon_s=12", "uplink.loss=0.1"],
+    "lte-m": ["run.horizon_s=12", "nodes.failures_per_h=100"],
+    "nb-iot": ["run.horizon_s=30"],
 }
 
 

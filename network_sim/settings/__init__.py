@@ -1,0 +1,1 @@
+"""Parts of the config that fill a file of their own."""
