@@ -14,7 +14,8 @@ def planning(numbers: Row) -> str:
         "the share of the first three cameras' rays that meet measured surface now and did not before, in "
         "points. The constants of chances, promise and interval come from other rooms, whose "
         "furniture is drawn from the same stock. The exhaustive search renders the depth of every allowed "
-        "place, and counts the missing rays whose true points it measures."
+        "place, and counts the missing rays whose true points it measures. The intervals are those from the "
+        "other rooms; they were widened by two thirds after this, to hold 95 %."
     )
     rows = [
         ("suggestions", f"{numbers['suggestions']:.0f}", ""),

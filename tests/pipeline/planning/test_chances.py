@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.planning.chances import DARK_RATIO, judge
+from pipeline.planning.chances import DARK_CHANCE, DARK_RATIO, judge
 from pipeline.planning.sensors import FADE_SHARE, SENSORS
 from tests.pipeline.planning.rooms import LENS, PLAIN, at, place, sheet, targets_at
 
@@ -43,12 +43,13 @@ def test_out_of_range_or_image_gains_nothing(point):
     assert chance([point], sheets=[sheet((-3, 9, 0), (6, 0, 0), (0, 0, 2), 0.5)]) == [0.0]
 
 
-@pytest.mark.parametrize("angle_deg", [0.0, 30.0, 60.0, 85.0])
-def test_the_chance_falls_as_the_cosine_of_the_angle(angle_deg):
-    assert chance([AHEAD], turned(angle_deg)) == pytest.approx([np.cos(np.radians(angle_deg))], abs=1e-6)
+@pytest.mark.parametrize(("angle_deg", "share"), [(0.0, 1.0), (50.0, 1.0), (60.0, 0.8), (72.5424, 0.4)])
+def test_the_chance_falls_with_the_cosine_of_the_angle_from_facing_to_askew(angle_deg, share):
+    """Cosines of .5 and .3 lie .8 and .4 of the way from .1 to .6."""
+    assert chance([AHEAD], turned(angle_deg)) == pytest.approx([share], abs=1e-4)
 
 
-@pytest.mark.parametrize("angle_deg", [86.5, 89.0, 95.0, 180.0])
+@pytest.mark.parametrize("angle_deg", [84.5, 89.0, 95.0, 180.0])
 def test_a_grazing_view_and_one_from_behind_gain_nothing(angle_deg):
     assert chance([AHEAD], turned(angle_deg)) == [0.0]
 
@@ -85,10 +86,12 @@ def test_what_the_projector_does_not_see_has_no_depth():
     assert chance([AHEAD], sheets=[FAR_WALL, board], sensor=two_eyes, pose=left) == pytest.approx([1.0])
 
 
-@pytest.mark.parametrize(("gain", "share"), [(0.5, 0.0), (1.0, 0.0), (DARK_RATIO**0.5, 0.5), (DARK_RATIO, 1.0)])
+@pytest.mark.parametrize(
+    ("gain", "share"), [(0.5, 0.0), (1.0, 0.0), (DARK_RATIO**0.5, 0.5), (DARK_RATIO, 1.0)]
+)
 def test_a_dark_surface_needs_more_light_than_was_too_little(gain, share):
     """Light falls with the square of the distance; 2 m and facing return 1/4."""
-    assert chance([AHEAD], dark=0.25 / gain) == pytest.approx([share], abs=1e-5)
+    assert chance([AHEAD], dark=0.25 / gain) == pytest.approx([DARK_CHANCE * share], abs=1e-5)
 
 
 def test_overlap_is_the_common_part_of_two_images_of_a_wall():
