@@ -85,7 +85,9 @@ def test_what_the_projector_does_not_see_has_no_depth():
     assert chance([AHEAD], sheets=[FAR_WALL, board], sensor=two_eyes, pose=left) == pytest.approx([1.0])
 
 
-@pytest.mark.parametrize(("gain", "share"), [(0.5, 0.0), (1.0, 0.0), (DARK_RATIO**0.5, 0.5), (DARK_RATIO, 1.0)])
+@pytest.mark.parametrize(
+    ("gain", "share"), [(0.5, 0.0), (1.0, 0.0), (DARK_RATIO**0.5, 0.5), (DARK_RATIO, 1.0)]
+)
 def test_a_dark_surface_needs_more_light_than_was_too_little(gain, share):
     """Light falls with the square of the distance; 2 m and facing return 1/4."""
     assert chance([AHEAD], dark=0.25 / gain) == pytest.approx([share], abs=1e-5)

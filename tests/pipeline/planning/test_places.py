@@ -26,7 +26,7 @@ def eyes_of(seen, kind, **limits):
 
 def test_the_floor_is_the_lowest_level_part(room):
     assert floor_m(room) == pytest.approx(0.0, abs=1e-6)
-    high = place([(points_m + (0, 0, 3.2), faces) for points_m, faces in box_room()], TARGETS)
+    high = place([(points_m + np.array([0, 0, 3.2]), faces) for points_m, faces in box_room()], TARGETS)
     assert floor_m(high) == pytest.approx(3.2, abs=1e-6)
 
 
