@@ -63,6 +63,10 @@ if TYPE_CHECKING:
     from pipeline.measuring.calls import measure
     from pipeline.measuring.surface import MeasuredSurface, measured_cloud, measured_surface, read_measured
     from pipeline.measuring.values import Measure, Value
+    from pipeline.planning.calls import RigPlan, plan
+    from pipeline.planning.plan import Plan, PlanConfig, PlannedCamera
+    from pipeline.planning.promise import Promise
+    from pipeline.planning.radio import CameraDelivery, PlanDelivery, PlanRadio
     from pipeline.reconstruct import Reconstruction, reconstruct
     from pipeline.registration import iterate_registration, point_error_m, register
     from pipeline.surface.ball_pivoting import iterate_ball, roll_ball
@@ -117,6 +121,10 @@ _NAMES = {
     "pipeline.measuring.calls": "measure",
     "pipeline.measuring.surface": "MeasuredSurface measured_cloud measured_surface read_measured",
     "pipeline.measuring.values": "Measure Value",
+    "pipeline.planning.calls": "RigPlan plan",
+    "pipeline.planning.plan": "Plan PlanConfig PlannedCamera",
+    "pipeline.planning.promise": "Promise",
+    "pipeline.planning.radio": "CameraDelivery PlanDelivery PlanRadio",
     "pipeline.reconstruct": "Reconstruction reconstruct",
     "pipeline.registration": "iterate_registration point_error_m register",
     "pipeline.surface.ball_pivoting": "iterate_ball roll_ball",
@@ -136,19 +144,20 @@ _PLACES = {name: (module, name) for module, names in _NAMES.items() for name in 
 
 __all__ = [
     "DEMO_SCENES", "NETWORK_PRESETS", "PRESETS", "AcquisitionConfig", "Arrivals", "BallPivotStep", "Board",
-    "CalibratedNode", "CameraIntrinsics", "CameraReport", "Cause", "Delivery", "DepthConfig", "DepthMap",
-    "EnergyConfig", "EventKind", "Events", "FusionConfig", "InputError", "LossConfig", "MacConfig",
-    "Measure", "MeasuredSurface", "Metric", "Moment", "NetworkConfig", "NetworkTrace", "NodesConfig",
-    "PacketMeshError", "PipelineConfig", "PointCloud", "PointSource", "Progress", "RadioConfig",
-    "Reconstruction", "ReconstructionError", "RegistrationConfig", "RegistrationResult", "RegistrationStep",
-    "RelativePose", "RgbdFrame", "Rig", "RigReport", "RigTruth", "RunConfig", "SchemeConfig", "Shown",
-    "StreetConfig", "Surface", "SurfaceConfig", "SurfaceQuality", "SurfaceResult", "UplinkConfig", "Value",
-    "arrivals", "back_project", "board_views_of", "calibrate", "calibrate_cameras", "deliver", "drain",
-    "estimate_normals", "image_delays_s", "iterate_ball", "iterate_registration", "iterate_simulation",
-    "load_demo", "load_frame", "load_rig", "measure", "measured_cloud", "measured_surface",
-    "network_metrics", "point_error_m", "read_cloud", "read_measured", "read_mesh", "reconstruct",
-    "register", "roll_ball", "save_rig", "show", "simulate", "spacing", "with_settings", "write_calibration",
-    "write_cloud", "write_mesh",
+    "CalibratedNode", "CameraDelivery", "CameraIntrinsics", "CameraReport", "Cause", "Delivery",
+    "DepthConfig", "DepthMap", "EnergyConfig", "EventKind", "Events", "FusionConfig", "InputError",
+    "LossConfig", "MacConfig", "Measure", "MeasuredSurface", "Metric", "Moment", "NetworkConfig",
+    "NetworkTrace", "NodesConfig", "PacketMeshError", "PipelineConfig", "Plan", "PlanConfig",
+    "PlanDelivery", "PlanRadio", "PlannedCamera", "PointCloud", "PointSource", "Progress", "Promise",
+    "RadioConfig", "Reconstruction", "ReconstructionError", "RegistrationConfig", "RegistrationResult",
+    "RegistrationStep", "RelativePose", "RgbdFrame", "Rig", "RigPlan", "RigReport", "RigTruth", "RunConfig",
+    "SchemeConfig", "Shown", "StreetConfig", "Surface", "SurfaceConfig", "SurfaceQuality", "SurfaceResult",
+    "UplinkConfig", "Value", "arrivals", "back_project", "board_views_of", "calibrate", "calibrate_cameras",
+    "deliver", "drain", "estimate_normals", "image_delays_s", "iterate_ball", "iterate_registration",
+    "iterate_simulation", "load_demo", "load_frame", "load_rig", "measure", "measured_cloud",
+    "measured_surface", "network_metrics", "plan", "point_error_m", "read_cloud", "read_measured",
+    "read_mesh", "reconstruct", "register", "roll_ball", "save_rig", "show", "simulate", "spacing",
+    "with_settings", "write_calibration", "write_cloud", "write_mesh",
 ]  # fmt: skip
 
 

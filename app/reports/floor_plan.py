@@ -27,6 +27,8 @@ FAR_SINK_M = 1.5
 """A sink farther than this from surface and cameras is an arrow at the frame."""
 WEDGE_M = 1.2
 """Length of the fields of view as they are drawn."""
+AIM_MM = 9.0
+"""Length of the line in the direction of a new camera's view."""
 TICK_MM = 12.0
 """Least distance of two numbers on an axis."""
 STANDS_ON = {"walls": "wall", "ceiling": "ceiling", "furniture": "furniture", "tripods": "tripod"}
@@ -237,8 +239,10 @@ def _sink(sink_m: FloatArray, near: bool, frame: Frame, labels: Labels) -> Itera
 def _marks(cameras: Sequence[Standing], frame: Frame, labels: Labels) -> Iterator[Shape]:
     """Yield each camera's mark and label: a numbered disc for a new one, a triangle for a present one."""
     places_mm = [frame.on_paper(camera.place_m[:2]) for camera in cameras]
-    for x_mm, y_mm in places_mm:
-        labels.keep_free(x_mm, y_mm, 3.0)
+    for camera, (x_mm, y_mm) in zip(cameras, places_mm, strict=True):
+        right, down = np.cos(np.radians(camera.pan_deg)), -np.sin(np.radians(camera.pan_deg))
+        for ahead_mm, radius_mm in ((0.0, 3.0), (0.5 * AIM_MM, 1.5), (AIM_MM, 1.0)):
+            labels.keep_free(x_mm + ahead_mm * right, y_mm + ahead_mm * down, radius_mm)
     for camera, (x_mm, y_mm) in zip(cameras, places_mm, strict=True):
         angle = np.radians(camera.pan_deg)
         ahead = np.array([np.cos(angle), -np.sin(angle)])
@@ -249,7 +253,7 @@ def _marks(cameras: Sequence[Standing], frame: Frame, labels: Labels) -> Iterato
             yield Area((np.array(corners_mm),), camera.color)
             yield from labels.beside(x_mm, y_mm, 3.0, camera.name, 2.8, camera.color)
             continue
-        yield Line(np.array([at_mm, at_mm + 9.0 * ahead]), camera.color, 0.7)
+        yield Line(np.array([at_mm, at_mm + AIM_MM * ahead]), camera.color, 0.7)
         yield Area((disc(x_mm, y_mm, 2.6),), camera.color, 1.0, (255, 255, 255), 0.3)
         yield Words(x_mm, y_mm + 1.2, camera.name, 3.4, (255, 255, 255), "middle", bold=True)
         text = f"{camera.place_m[2]:.2f} m high, {camera.pan_deg:.0f}°"

@@ -15,7 +15,7 @@ from network_sim.types import NS_PER_S
 from packetmesh.checks import above
 from packetmesh.errors import InputError
 from pipeline.delivery import coding_named
-from pipeline.delivery.plan import check_collects, network_of, placed
+from pipeline.delivery.plan import check_collects, network_of, places_of
 from pipeline.delivery.sending import packet_bytes_of
 from pipeline.delivery.sink import images_of
 from pipeline.planning.plan import Candidates, Plan, PlanConfig, plan_of
@@ -130,7 +130,7 @@ def _delivered(sending: _Sending, plan: Plan, radio: PlanRadio) -> PlanDelivery:
         radio.network.radio, walls_m=tuple(walls_m.ravel().tolist()), wall_db=DAMPING_DB[radio.walls]
     )
     network = network_of(rig, sending.present_bytes, replace(radio.network, radio=damped))
-    old_m = np.reshape(placed(rig, network, range(present)).nodes.places_m, (-1, 2))
+    old_m = np.reshape(network.nodes.places_m or places_of(rig, network.nodes.spacing_m), (-1, 2))
     sink_m = old_m[-1] if radio.sink_m is None else np.asarray(radio.sink_m)
     new_m = [camera.T_world_camera[:2, 3] for camera in plan.cameras]
     places_m = np.vstack([old_m[:-1], *new_m, sink_m])

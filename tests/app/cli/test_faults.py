@@ -63,6 +63,7 @@ def ellipsoid(tmp_path_factory):
 COMMANDS = {
     "reconstruct": lambda rig, cloud: ["--rig", rig, *QUICK, "--out"],
     "deliver": lambda rig, cloud: ["--rig", rig, "--moments", "1", *QUICK, "--out"],
+    "plan": lambda rig, cloud: ["--rig", rig, "--where", "tripods", *QUICK, "--out"],
     "register": lambda rig, cloud: [cloud, cloud, "--method", "icp", "--out"],
     "mesh": lambda rig, cloud: [cloud, "--radii-m", "0.2", "--out"],
     "simulate": lambda rig, cloud: ["--preset", "thesis-link", "--out"],
@@ -85,7 +86,7 @@ def test_a_disk_that_fills_is_one_sentence_and_leaves_nothing_half_written(
     check_one_sentence((got[0], "", got[2]), 1, "delete something there")
     left = [path for path in (tmp_path / "out").rglob("*") if path.is_file()]
     assert [path.name for path in left if path.name.startswith(".")] == []
-    assert "metrics.json" not in {path.name for path in left}
+    assert not {"metrics.json", "plan.json"} & {path.name for path in left}
     assert all(path.stat().st_size < room for path in left)
 
 
