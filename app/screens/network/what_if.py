@@ -62,7 +62,7 @@ class WhatIf:
             "Wall at",
             [NOBODY],
             hint="Puts a wall between this node and the sink, which also blocks nodes straight behind; it "
-            "has no effect on serial lines and recorded links.",
+            "has no effect on serial lines, recorded links and cellular modules.",
         )
         self._wall_db = gui.add_slider(
             "Wall loss (dB)",
@@ -75,8 +75,8 @@ class WhatIf:
         self._retries = gui.add_dropdown(
             "Retries",
             list(RETRIES),
-            hint="How often a frame without acknowledgement is sent again; only IEEE 802.15.4 with ACK "
-            "and 802.11b send again.",
+            hint="How often a frame without acknowledgement is sent again; without ACK no frame is, and "
+            "Bluetooth LE repeats a frame until it arrives.",
         )
         self._rate = gui.add_dropdown(
             "802.11b rate",
