@@ -132,8 +132,8 @@ def best_sentence(planned: RigPlan) -> str:
     """Say how far a plan can be from the best choice."""
     plan = planned.plan
     return (
-        f"It promises at least {plan.at_least_of_best:.0%} of what the best choice among the "
-        f"{plan.candidates} cameras that were judged could"
+        f"It promises at least {plan.at_least_of_best:.0%} of what the best choice could, among the "
+        f"{plan.candidates} judged cameras that can be registered and are not ruled out by the deadline"
     )
 
 

@@ -68,9 +68,9 @@ class Plan:
     total: Promise
     """What all of them add together."""
     at_least_of_best: float
-    """Share of the expected gain that the best choice among all candidates could have, at least."""
+    """Share of the expected gain that the best choice among these candidates could have, at least."""
     candidates: int
-    """Number of candidates that were judged."""
+    """Number of candidates that could be chosen: they could be registered, and none was barred."""
     measured_share: float
     """Share of the present cameras' rays on measured surface, before."""
 
@@ -142,7 +142,7 @@ def plan_of(
         tuple(_cameras(seen, judged, choice)),
         promise(choice.gains.sum(axis=0), seen.targets),
         min(1.0, choice.gain / choice.best_at_most),
-        len(judged.candidates),
+        int(allowed.sum()),
         seen.measured_share,
     )
 

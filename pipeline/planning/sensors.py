@@ -1,4 +1,4 @@
-"""Depth cameras that can be planned: their lens, range, noise, and the losses that their principle brings."""
+"""Depth cameras that can be planned: their lens, range, and what their second lens does not see."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from packetmesh.errors import InputError
-from pipeline.types import CameraIntrinsics, DepthNoise, Rig
+from pipeline.types import CameraIntrinsics, Rig
 
 FADE_SHARE = 0.12
 """Share of the range over which returns become rare before its end (a Kinect's last .6 of 4.5 m)."""
-KINECT_NOISE = DepthNoise(s0_m=0.0012, s1_m=0.0015, p=2.0, q=1.0)
-"""Standard deviation of a Kinect's depth, close to Nguyen, Izadi and Lovell (2012) from 1 to 4 m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +22,6 @@ class Sensor:
     near_m: float
     far_m: float
     """Least and greatest depth that it measures."""
-    noise: DepthNoise
     baseline_m: float
     """Distance from the camera to its projector or second camera, on its right: what only one of
     both sees has no depth. 0 for time of flight."""
@@ -38,44 +35,22 @@ def _lens(width_px: int, height_px: int, focal_px: float) -> CameraIntrinsics:
 SENSORS = {
     sensor.name: sensor
     for sensor in (
-        Sensor("kinect-v1", _lens(640, 480, 525.0), 0.4, 4.5, KINECT_NOISE, 0.075),
-        Sensor(
-            "kinect-v2",
-            _lens(512, 424, 365.0),
-            0.5,
-            4.5,
-            DepthNoise(s0_m=0.0015, s1_m=0.0004, p=2.0, q=1.0),
-            0.0,
-        ),
-        Sensor(
-            "azure-kinect",
-            _lens(640, 576, 504.0),
-            0.5,
-            3.86,
-            DepthNoise(s0_m=0.001, s1_m=0.0003, p=2.0, q=1.0),
-            0.0,
-        ),
-        Sensor(
-            "realsense-d435",
-            _lens(848, 480, 425.0),
-            0.2,
-            6.0,
-            DepthNoise(s0_m=0.001, s1_m=0.0038, p=2.0, q=1.0),
-            0.05,
-        ),
+        Sensor("kinect-v1", _lens(640, 480, 525.0), 0.4, 4.5, 0.075),
+        Sensor("kinect-v2", _lens(512, 424, 365.0), 0.5, 4.5, 0.0),
+        Sensor("azure-kinect", _lens(640, 576, 504.0), 0.5, 3.86, 0.0),
+        Sensor("realsense-d435", _lens(848, 480, 425.0), 0.2, 6.0, 0.05),
     )
 }
-"""Cameras by name. Lens and range from the makers' data sheets: Kinect v1 (Khoshelham and Elberink 2012),
-Kinect v2, Azure Kinect in NFOV unbinned, RealSense D435 at 848 x 480. Noise: Kinect v1 Nguyen et al. (2012);
-Kinect v2 and Azure Kinect about their published repeatability at 1 to 3 m (Tölgyessy et al. 2021); D435 by
-its disparity's standard deviation of .08 px."""
+"""Cameras by name. Lens and range: Kinect v1 (Khoshelham and Elberink 2012), Kinect v2, Azure Kinect in NFOV
+unbinned, RealSense D435 at 848 x 480, from their makers' data sheets, from memory. Loss by angle and darkness
+is that of a Kinect v1 for all."""
 
 AS_PRESENT = "as-present"
 """Name of the sensor that the rig has already."""
 
 
 def sensor_named(name: str, rig: Rig) -> Sensor:
-    """Return a sensor by name; ``as-present`` is a Kinect v1 with lens and noise of the rig's first node.
+    """Return a sensor by name; ``as-present`` is a Kinect v1 with the lens of the rig's first node.
 
     Raises:
         InputError: there is no sensor of that name.
@@ -87,7 +62,6 @@ def sensor_named(name: str, rig: Rig) -> Sensor:
             first.intrinsics,
             kinect.near_m,
             kinect.far_m,
-            first.noise or kinect.noise,
             kinect.baseline_m,
         )
     check_sensor(name)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.kernels.geometry import apply, pixel_rays
 from pipeline.planning.views import Meets, PresentView, pixels_of
-from pipeline.types import BoolArray, FloatArray, IntArray
+from pipeline.types import FloatArray, IntArray
 
 MOST_TARGETS = 3000
 """Most unmeasured rays that are judged; of more, an even grid of pixels is taken."""
@@ -27,8 +27,6 @@ class Targets:
     """(T, 3) estimated unit normals, towards the camera of the ray."""
     view: IntArray
     """(T,) row of the camera of the ray."""
-    guessed: BoolArray
-    """(T,) True where the ray meets guessed surface; False where it meets none."""
     dark_return: FloatArray
     """(T,) largest cosine over squared depth at which a present sensor got no return from there although
     nothing in the geometry explains that; 0 where there is no such sensor."""
@@ -41,21 +39,20 @@ def targets_of(views: Sequence[PresentView]) -> Targets:
     unmeasured = sum(int(np.isin(view.meets, (Meets.GUESSED, Meets.NOTHING)).sum()) for view in views)
     step = max(1, int(np.ceil(np.sqrt(unmeasured / MOST_TARGETS))))
     parts = [_targets_in(view, step) for view in views]
-    points_m, normals, guessed = (np.concatenate(column) for column in zip(*parts, strict=True))
+    points_m, normals = (np.concatenate(column) for column in zip(*parts, strict=True))
     view = np.repeat(np.arange(len(views)), [len(part[0]) for part in parts])
     rays = sum(int((view.meets != Meets.NO_RAY).sum()) for view in views)
-    return Targets(points_m, normals, view, guessed, _dark_returns(points_m, views), step * step / rays)
+    return Targets(points_m, normals, view, _dark_returns(points_m, views), step * step / rays)
 
 
-def _targets_in(view: PresentView, step: int) -> tuple[FloatArray, FloatArray, BoolArray]:
+def _targets_in(view: PresentView, step: int) -> tuple[FloatArray, FloatArray]:
     height, width = view.meets.shape
     v, u = (of.ravel() for of in np.mgrid[step // 2 : height : step, step // 2 : width : step])
     wanted = np.isin(view.meets[v, u], (Meets.GUESSED, Meets.NOTHING)) & (view.z_m[v, u] > 0.0)
     v, u = v[wanted], u[wanted]
     T = view.camera.T_world_camera
     at_m = pixel_rays(view.camera.intrinsics)[v, u] * view.z_m[v, u][:, None]
-    guessed = view.meets[v, u] == Meets.GUESSED
-    return apply(T, at_m), view.normals[v, u] @ T[:3, :3].T, guessed
+    return apply(T, at_m), view.normals[v, u] @ T[:3, :3].T
 
 
 def _dark_returns(points_m: FloatArray, views: Sequence[PresentView]) -> FloatArray:

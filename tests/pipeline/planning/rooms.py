@@ -5,14 +5,14 @@ import numpy as np
 from pipeline.kernels.geometry import look_at, pixel_rays
 from pipeline.kernels.rays import Camera, camera_hits, triangle_scene
 from pipeline.planning.seen import SeenPlace
-from pipeline.planning.sensors import SENSORS, Sensor
+from pipeline.planning.sensors import Sensor
 from pipeline.planning.space import FreeSpace
 from pipeline.planning.targets import Targets
 from pipeline.planning.views import Meets, PresentView
 from pipeline.types import CameraIntrinsics, Surface
 
 LENS = CameraIntrinsics.pinhole(100.0, 100.0, 79.5, 59.5, 160, 120)
-PLAIN = Sensor("plain", LENS, 0.4, 4.5, SENSORS["kinect-v2"].noise, 0.0)
+PLAIN = Sensor("plain", LENS, 0.4, 4.5, 0.0)
 """A time-of-flight camera with one eye; its image is 1.6 m wide in a distance of 1 m."""
 
 
@@ -57,8 +57,7 @@ def targets_at(points_m, normal, dark_return=0.0):
     points_m = np.reshape(np.asarray(points_m, float), (-1, 3))
     count = len(points_m)
     normals = np.tile(np.asarray(normal, float), (count, 1))
-    view, guessed = np.zeros(count, int), np.zeros(count, bool)
-    return Targets(points_m, normals, view, guessed, np.full(count, float(dark_return)), 0.001)
+    return Targets(points_m, normals, np.zeros(count, int), np.full(count, float(dark_return)), 0.001)
 
 
 def view_through(scene, camera):
