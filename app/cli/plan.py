@@ -93,6 +93,7 @@ def plan(
         check_plan_folder,
         clear_plan_folder,
         fewer_sentence,
+        level_sentence,
         plan_record,
         promise_sentence,
         settings_record,
@@ -114,7 +115,7 @@ def plan(
     planned = drain(part(iterate_plan(done, wanted, radio), "plan", DONE, 1.0, detail=True), say_progress)
     report = None if imported is None else asdict(imported)
     notes = [*imported_notes(report), *done.rig.notes]
-    notes += filter(None, [fewer_sentence(planned, cameras)])
+    notes += filter(None, [fewer_sentence(planned, cameras), level_sentence(planned)])
     clear_plan_folder(out)
     texture = dressed(done.rig, done.placement, done.after)
     write_plan_report(planned, texture, out, [*notes, *done.placement.sentences])

@@ -157,3 +157,13 @@ def fewer_sentence(planned: RigPlan, asked: int) -> str:
     if planned.plan.config.cameras < asked:
         return f"The budget of {radio.budget_j:g} J allows {found} of the {asked} cameras"
     return f"Only {found} of the {asked} cameras would add anything; allow more kinds of places for more"
+
+
+def level_sentence(planned: RigPlan) -> str:
+    """Say that the upward direction is assumed, where no camera has a pose; empty if one has."""
+    if any(frame.pose_known for frame in planned.rig.frames):
+        return ""
+    return (
+        "No camera has a pose, so the first counts as level: if it was tilted, heights, floor and walls of "
+        "this plan are wrong; give poses with the third axis upwards"
+    )

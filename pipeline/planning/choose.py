@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.types import BoolArray, FloatArray
+from pipeline.types import BoolArray, FloatArray, IntArray
 
 MOST_EXCHANGES = 20
 """Most cameras that are exchanged after the greedy choice."""
@@ -30,35 +30,34 @@ class Choice:
         return float(self.gains.sum())
 
 
-def choose(chance: FloatArray, allowed: BoolArray, count: int) -> Choice:
+def choose(chance: FloatArray, allowed: BoolArray, place: IntArray, count: int) -> Choice:
     """Choose candidates that together measure as many targets as possible.
 
-    The expected number of targets that at least one candidate measures is monotone and submodular, so the
-    greedy choice has at least 1 - 1/e of the best (Nemhauser, Wolsey and Fisher 1978). After it, single
-    candidates are exchanged while that gains. The bound on the best is the smallest of the greedy gain /
-    (1 - 1/e), of the ``count`` largest single gains, and of the gain plus the ``count`` largest further gains
-    (Minoux 1978).
+    The expected number of targets that at least one candidate measures is monotone and submodular. With at
+    most one camera at a place, the greedy choice has at least half of the best (Fisher, Nemhauser and Wolsey
+    1978). After it, single candidates are exchanged while that gains. The bound on the best is the smaller
+    of the ``count`` largest single gains, and of the gain plus the ``count`` largest further gains (Minoux
+    1978).
 
     Args:
         chance: (C, T) chance of each candidate to measure each target.
         allowed: (C,) True for candidates that may be chosen.
+        place: (C,) number of each candidate's place, at which one camera may stand.
         count: number of candidates; fewer are chosen if no other adds anything.
     """
     rows: list[int] = []
     for _ in range(count):
-        row, gain = _best(chance, allowed, rows)
+        row, gain = _best(chance, allowed, place, rows)
         if gain <= 0.0:
             break
         rows.append(row)
-    greedy = _total(chance, rows)
     for _ in range(MOST_EXCHANGES):
-        exchanged = _exchanged(chance, allowed, rows)
+        exchanged = _exchanged(chance, allowed, place, rows)
         if exchanged is None:
             break
         rows = exchanged
     ordered = _ordered(chance, rows)
     best_at_most = min(
-        greedy / (1.0 - 1.0 / np.e),
         _largest(chance, allowed, [], count),
         _total(chance, rows) + _largest(chance, allowed, rows, count),
     )
@@ -80,20 +79,20 @@ def _largest(chance: FloatArray, allowed: BoolArray, rows: list[int], count: int
     return float(np.sort(gains)[::-1][:count].sum())
 
 
-def _best(chance: FloatArray, allowed: BoolArray, rows: list[int]) -> tuple[int, float]:
+def _best(chance: FloatArray, allowed: BoolArray, place: IntArray, rows: list[int]) -> tuple[int, float]:
     """Return the candidate that adds most to the chosen ones, and how much."""
     gains = np.where(allowed, chance @ _missed(chance, rows), 0.0)
-    gains[rows] = 0.0
+    gains[np.isin(place, place[rows])] = 0.0
     row = int(np.argmax(gains))
     return row, float(gains[row])
 
 
-def _exchanged(chance: FloatArray, allowed: BoolArray, rows: list[int]) -> list[int] | None:
+def _exchanged(chance: FloatArray, allowed: BoolArray, place: IntArray, rows: list[int]) -> list[int] | None:
     """Return the choice after the best exchange of one candidate; None if no exchange gains."""
     best, most = None, _total(chance, rows) * (1.0 + WORTH)
-    for place in range(len(rows)):
-        others = rows[:place] + rows[place + 1 :]
-        row, gain = _best(chance, allowed, others)
+    for index in range(len(rows)):
+        others = rows[:index] + rows[index + 1 :]
+        row, gain = _best(chance, allowed, place, others)
         total = _total(chance, others) + gain
         if total > most:
             best, most = [*others, row], total
@@ -106,7 +105,7 @@ def _ordered(chance: FloatArray, rows: list[int]) -> list[int]:
     ordered: list[int] = []
     left[rows] = True
     for _ in rows:
-        row, _ = _best(chance, left, ordered)
+        row, _ = _best(chance, left, np.arange(len(chance)), ordered)
         ordered.append(row)
         left[row] = False
     return ordered

@@ -131,7 +131,9 @@ def plan_of(
             f"(at least {LEAST_OVERLAP:.0%} of its image), so no new camera could be registered; allow more "
             "kinds of places, or a sensor with a wider lens"
         )
-    choice = choose(judged.chance, allowed, config.cameras)
+    stands_m = np.array([candidate.T_world_camera[:3, 3] for candidate in judged.candidates])
+    place = np.unique(np.round(stands_m, 3), axis=0, return_inverse=True)[1].ravel()
+    choice = choose(judged.chance, allowed, place, config.cameras)
     if not choice.rows:
         raise InputError(
             "No camera on these places would measure anything that is missing; allow more kinds of places"
