@@ -17,7 +17,7 @@ ADDED = {
     "depth": {"stop": "2", "color": "confidence", "pictures": "inferred,difference,25"},
     "fuse": {"stop": "2", "race": "seed=3", "t": "4"},
     "surface": {"surface": "before", "color": "normal", "cam": "0.500,2.000,2.500,2.600,2.600,0.800"},
-    "network": {"net": "lose=10;burst=4", "t": "1.5"},
+    "network": {"net": "lose=10;burst=4", "t": "0.25"},
     "export": {"surface": "poisson"},
 }
 """By screen, what a link sets that is not as at the start."""
