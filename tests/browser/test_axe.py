@@ -20,7 +20,7 @@ to other settings, and two buttons of viser are there, in its own blue, until th
 
 
 @pytest.fixture(scope="module")
-def page(browser, app):
+def page(few, browser, app):
     """A page without the content policy, which forbids what axe-core is started with."""
     context = browser.new_context(viewport={"width": 1280, "height": 800}, bypass_csp=True)
     page = context.new_page()

@@ -32,7 +32,7 @@ STEP_MS = 400
 
 
 @pytest.fixture(scope="module")
-def page(browser, app):
+def page(few, browser, app):
     context = browser.new_context(viewport={"width": 1000, "height": 700})
     page = context.new_page()
     page.set_default_timeout(PATIENCE_MS)
