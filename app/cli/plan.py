@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -14,6 +16,7 @@ from packetmesh.progress import drain, part
 
 if TYPE_CHECKING:
     from pipeline.planning.calls import RigPlan
+    from pipeline.reconstruct import Reconstruction
 
 SinkPlace = Annotated[str | None, tyro.conf.arg(metavar="X,Y")]
 HEADINGS = (
@@ -31,7 +34,7 @@ DONE = 0.7
 
 def plan(
     images: Images,
-    out: Path,
+    out: Path | None = None,
     cameras: int = 1,
     sensor: str = "as-present",
     where: str = "walls,ceiling,furniture,tripods",
@@ -53,7 +56,8 @@ def plan(
 
     Args:
         images: Images of the present cameras.
-        out: Folder for plan.json, plan.html, and floor_plan.pdf and .svg, which are true to scale.
+        out: Folder for plan.json, plan.html, and floor_plan.pdf and .svg, which are true to scale; without it
+            the plan is only printed.
         cameras: Number of cameras to add, up to 20.
         sensor: Their depth camera: as-present, kinect-v1, kinect-v2, azure-kinect or realsense-d435.
         where: Where they may stand, separated by commas: walls, ceiling, furniture, tripods.
@@ -83,15 +87,12 @@ def plan(
 
     from app.cli.reconstruct import imported_notes, say_places
     from app.cli.runs import iterate_imported
-    from app.reports.plan import write_plan_report
-    from packetmesh.files import writable_folder, write_json
+    from packetmesh.files import writable_folder
     from pipeline.folders.plan import (
         PAGE,
         PRINT,
-        RECORD,
         best_sentence,
         check_plan_folder,
-        clear_plan_folder,
         fewer_sentence,
         level_sentence,
         plan_record,
@@ -102,33 +103,50 @@ def plan(
     from pipeline.planning.calls import iterate_plan
     from pipeline.reconstruct import iterate_reconstruction
     from pipeline.spec import Spec
-    from pipeline.stages import RunCache, compute, dressed
+    from pipeline.stages import RunCache, compute
 
-    check_plan_folder(out, named)
-    source, imported = drain(iterate_imported(named, out), say_progress)
-    say_network(network, before, preset, of_network, REPLACED)
-    spec, cache = Spec(source, chain, config), RunCache()
-    drain(compute(spec, "rig", cache), say_progress)
-    writable_folder(out)
-    steps = iterate_reconstruction(spec, cache)
-    done = drain(part(steps, "reconstruction", 0.0, DONE, detail=True), say_progress)
+    if out is not None:
+        check_plan_folder(out, named)
+    with TemporaryDirectory() as scratch:
+        source, imported = drain(iterate_imported(named, out or Path(scratch)), say_progress)
+        say_network(network, before, preset, of_network, REPLACED)
+        spec, cache = Spec(source, chain, config), RunCache()
+        drain(compute(spec, "rig", cache), say_progress)
+        if out is not None:
+            writable_folder(out)
+        steps = iterate_reconstruction(spec, cache)
+        done = drain(part(steps, "reconstruction", 0.0, DONE, detail=True), say_progress)
     planned = drain(part(iterate_plan(done, wanted, radio), "plan", DONE, 1.0, detail=True), say_progress)
     report = None if imported is None else asdict(imported)
     notes = [*imported_notes(report), *done.rig.notes]
     notes += filter(None, [fewer_sentence(planned, cameras), level_sentence(planned)])
-    clear_plan_folder(out)
-    texture = dressed(done.rig, done.placement, done.after)
-    write_plan_report(planned, texture, out, [*notes, *done.placement.sentences])
     record = plan_record(planned, spec.source.title, preset)
-    write_json(out / RECORD, record | settings_record(spec, planned))
+    if out is not None:
+        _write(planned, done, record | settings_record(spec, planned), notes, out)
     if json:
         print_json(record)
     else:
         print(aligned([HEADINGS, *_rows(planned)]))
     for sentence in (promise_sentence(planned), best_sentence(planned), times_sentence(planned), *notes):
         say(sentence)
-    say(f"See {out / PAGE}; to print at 100 %: {out / PRINT}")
+    if out is not None:
+        say(f"See {out / PAGE}; to print at 100 %: {out / PRINT}")
     say_places(done.placement)
+
+
+def _write(
+    planned: RigPlan, done: Reconstruction, record: dict[str, Any], notes: Sequence[str], out: Path
+) -> None:
+    """Write the report, the floor plan and, last, the record, in place of those of an earlier plan."""
+    from app.reports.plan import write_plan_report
+    from packetmesh.files import write_json
+    from pipeline.folders.plan import RECORD, clear_plan_folder
+    from pipeline.stages import dressed
+
+    clear_plan_folder(out)
+    texture = dressed(done.rig, done.placement, done.after)
+    write_plan_report(planned, texture, out, [*notes, *done.placement.sentences])
+    write_json(out / RECORD, record)
 
 
 def _place(text: str) -> tuple[float, float]:

@@ -106,6 +106,16 @@ def test_the_table_is_for_people_and_the_plan_is_the_same_again(capsys, rig_fold
     assert (tmp_path / "report.html").read_text() == "of a run"
 
 
+def test_without_a_folder_the_same_plan_is_printed(capsys, monkeypatch, rig_folder, planned, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    words = ("--cameras", 2, "--where", "walls,tripods", "--json", *FEW)
+    code, out, err = run(capsys, "plan", "--rig", rig_folder, *words)
+    assert code == 0
+    assert json.loads(out) == planned[1]
+    assert "See " not in err
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_budget_that_fewer_cameras_keep_says_so(capsys, rig_folder, planned, tmp_path):
     first, second = (camera["joules"] for camera in planned[1]["cameras"])
     words = ("--cameras", 2, "--where", "walls,tripods", "--budget-j", 0.9 * (first + second))
