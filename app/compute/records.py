@@ -86,6 +86,22 @@ class AveragedView:
 
 
 @dataclass(frozen=True, slots=True)
+class Stage:
+    """The viewpoint for a scene, and the place for a second scene next to it."""
+
+    viewpoint_m: FloatArray
+    """(3,), as all vectors here; world frame."""
+    middle_m: FloatArray
+    """The look-at point."""
+    right: FloatArray
+    """Horizontal unit vector to the right of the picture."""
+    width_m: float
+    """Extent of the scene along ``right``."""
+    top_m: FloatArray
+    """Position of a label above the scene."""
+
+
+@dataclass(frozen=True, slots=True)
 class SceneView:
     """A loaded rig."""
 
@@ -94,6 +110,8 @@ class SceneView:
     has_truth: bool
     notes: tuple[str, ...]
     """Doubts about the images of the rig, one sentence each."""
+    stage: Stage
+    """The viewpoint from which to look at it."""
     has_walk: bool = False
     """Whether its nodes are keyframes of a recording."""
     averaged: AveragedView | None = None

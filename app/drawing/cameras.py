@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.compute.records import SceneNode
+from app.compute.records import SceneNode, Stage
 from app.drawing.colors import NEUTRAL
 from app.drawing.poses import place
 from pipeline.kernels.geometry import apply
@@ -43,30 +42,13 @@ def add_camera(
     return frustum
 
 
-@dataclass(frozen=True, slots=True)
-class Stage:
-    """The viewpoint for a scene, and the place for a second scene next to it."""
-
-    viewpoint_m: FloatArray
-    """(3,), as all vectors here; world frame."""
-    middle_m: FloatArray
-    """The look-at point."""
-    right: FloatArray
-    """Horizontal unit vector to the right of the picture."""
-    width_m: float
-    """Extent of the scene along ``right``."""
-    top_m: FloatArray
-    """Position of a label above the scene."""
-
-
-def stage_of(nodes: Sequence[SceneNode]) -> Stage:
-    """Return a viewpoint behind and above the cameras that looks at the middle of what they see."""
-    clouds = [node.sensor.points_m.astype(float) for node in nodes]
-    return stage_around(clouds, [node.T_world_camera for node in nodes])
-
-
 def stage_around(clouds_m: Sequence[FloatArray], T_world_camera: Sequence[FloatArray]) -> Stage:
-    """Return the viewpoint for the (N, 3) points that each camera sees, in its own frame."""
+    """Return the viewpoint behind and above the cameras that looks at the middle of what they see.
+
+    Args:
+        clouds_m: (N, 3) points that each camera sees, in its own frame.
+        T_world_camera: (4, 4) pose of each camera.
+    """
     seen_m = [apply(pose, points_m) for pose, points_m in zip(T_world_camera, clouds_m, strict=True)]
     middle_m = np.mean([np.median(points_m, axis=0) for points_m in seen_m], axis=0)
     cameras_m = np.mean([pose[:3, 3] for pose in T_world_camera], axis=0)

@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from app.compute.records import DepthNode, SceneNode
-from app.drawing.cameras import VIEW_FOV_RAD, look, stage_of
+from app.drawing.cameras import VIEW_FOV_RAD, look
 from app.session.views import View, Views
 from app.window.panel import PanelSession
 from pipeline.kernels.geometry import apply
@@ -97,7 +97,7 @@ class Framing:
         scene = session.results.view("scene")
         shape = self._window()
         if scene is not None and (anew or wide != self._wide or shape != self._shape):
-            look(session.clients(), stage_of(scene.nodes), wide)
+            look(session.clients(), scene.stage, wide)
             self._wide, self._shape = wide, shape
         return "both" if wide else "scene"
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.compute.records import SceneView
-from app.drawing.cameras import Stage, add_camera, turn
+from app.compute.records import SceneView, Stage
+from app.drawing.cameras import add_camera, turn
 from app.drawing.clouds import add_sensor_cloud, clear
 from app.drawing.colors import BRAND, NEUTRAL, SOURCE, TARGET
 from app.drawing.poses import place

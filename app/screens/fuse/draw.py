@@ -14,8 +14,8 @@ import numpy as np
 import viser
 from viser import transforms
 
-from app.compute.records import DepthView
-from app.drawing.cameras import VIEW_FOV_RAD, Stage, turn
+from app.compute.records import DepthView, Stage
+from app.drawing.cameras import VIEW_FOV_RAD, turn
 from app.drawing.clouds import add_cloud, clear
 from app.drawing.colors import DISTANCE_STOPS, NEUTRAL, ramp
 from app.drawing.poses import move, place

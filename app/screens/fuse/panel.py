@@ -9,9 +9,8 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from app.compute.records import DepthView
+from app.compute.records import DepthView, Stage
 from app.compute.state import Spec, Step
-from app.drawing.cameras import Stage, stage_of
 from app.drawing.clouds import clear
 from app.lesson.files import Numbers
 from app.lesson.on_screen import ScreenLessons
@@ -363,7 +362,8 @@ class FusePanel(Panel):
         """Return the viewpoint for the race that has arrived: its room, or the scene."""
         if self._arrived is not None and self._arrived[1].mode not in OF_NODES:
             return ROOM_STAGE
-        return stage_of(self.session.results.view("scene").nodes)
+        stage: Stage = self.session.results.view("scene").stage
+        return stage
 
     def look(self) -> bool:
         """Fit all lanes into the picture, once per window shape. Returns False if nothing is drawn yet."""

@@ -10,10 +10,10 @@ from functools import partial
 import cv2
 import numpy as np
 
-from app.compute.records import sample
+from app.compute.records import Stage, sample
 from app.compute.state import Sent, Spec
 from app.compute.store import Store
-from app.drawing.cameras import Stage, stage_around
+from app.drawing.cameras import stage_around
 from app.drawing.colors import NEUTRAL
 from app.drawing.meshes import surface_glb
 from app.drawing.pictures import cividis, depth_range_m

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.compute.records import Stage
 from app.compute.state import Sent
-from app.drawing.cameras import Stage
 from app.screens.network.view import NetworkView
 from pipeline.types import BoolArray, ByteArray, FloatArray
 

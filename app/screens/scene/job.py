@@ -9,6 +9,7 @@ import numpy as np
 from app.compute.records import AveragedView, Picture, Sample, SceneNode, SceneView, grid_step, on_grid
 from app.compute.state import Spec
 from app.compute.store import Store
+from app.drawing.cameras import stage_around
 from app.drawing.pictures import depth_picture, depth_range_m
 from packetmesh.progress import Progress
 from pipeline.acquisition import back_project
@@ -22,8 +23,15 @@ def scene_job(store: Store, spec: Spec) -> Generator[Progress, None, SceneView]:
     step = grid_step(sum(int(frame.depth.valid.sum()) for frame in rig.frames))
     nodes = tuple(_scene_node(frame, step) for frame in rig.frames)
     notes = rig.notes if rig.walk is None else (*walk_sentences(rig.walk, len(nodes)), *rig.notes)
+    clouds_m = [node.sensor.points_m.astype(float) for node in nodes]
     return SceneView(
-        spec.source.title, nodes, rig.truth is not None, notes, rig.walk is not None, averaged_view(rig)
+        spec.source.title,
+        nodes,
+        rig.truth is not None,
+        notes,
+        stage_around(clouds_m, [node.T_world_camera for node in nodes]),
+        rig.walk is not None,
+        averaged_view(rig),
     )
 
 

@@ -7,7 +7,6 @@ from typing import Any, ClassVar
 
 from app.compute.records import SceneView
 from app.compute.state import Spec, Step
-from app.drawing.cameras import stage_of
 from app.lesson.files import Numbers
 from app.lesson.on_screen import ScreenLessons
 from app.looking.folder import LookFolder
@@ -281,7 +280,7 @@ class SurfacePanel(Panel):
         scene: SceneView | None = self.session.results.view("scene")
         with self.ui.atomic():
             self._stage.shown = self._shown.value
-            place = None if scene is None else stage_of(scene.nodes)
+            place = None if scene is None else scene.stage
             loops, unused = bool(self._loops.value), bool(self._unused.value)
             self._stage.arrange(place, loops, unused, self._rolling.showing)
             baseline = self._shown.value in labels.BASELINES

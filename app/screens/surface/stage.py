@@ -9,8 +9,7 @@ import numpy as np
 import viser
 
 from app.compute.cuts import Cut, kept_on_ray
-from app.compute.records import MeshView
-from app.drawing.cameras import Stage
+from app.compute.records import MeshView, Stage
 from app.drawing.colors import SOURCE
 from app.screens.surface.draw import SurfaceDrawing
 from app.screens.surface.labels import AFTER, BASELINES, BEFORE, BOTH

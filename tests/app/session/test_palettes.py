@@ -115,7 +115,7 @@ class Window:
     def __init__(self):
         camera = SimpleNamespace(position=np.zeros(3), look_at=np.ones(3), fov=1.2, aspect=1.5)
         self.client = SimpleNamespace(camera=camera, atomic=contextlib.nullcontext)
-        self.scene = SimpleNamespace(nodes=[node("node_00", -1.0), node("node_01", 1.0)])
+        self.scene = SimpleNamespace(nodes=[node("node_00", -1.0), node("node_01", 1.0)], stage=None)
         self.own_view = False
         screen = SimpleNamespace(drawn_below="/scene", look=lambda: self.own_view, wide=False)
         results = SimpleNamespace(view={"scene": self.scene, "depth": None}.get)
@@ -142,7 +142,6 @@ class Window:
 def window(monkeypatch):
     from app.session import framing
 
-    monkeypatch.setattr(framing, "stage_of", lambda nodes: None)
     monkeypatch.setattr(framing, "look", lambda clients, stage, wide: None)
     return Window()
 

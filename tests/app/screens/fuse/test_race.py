@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from app.compute.state import Spec
-from app.drawing.cameras import stage_of
 from app.drawing.colors import MOST_DISTANCE_M
 from app.screens.fuse.belief import Belief
 from app.screens.fuse.capture_job import capture_job
@@ -55,7 +54,7 @@ def test_all_lanes_start_from_the_same_pose(view):
 
 def test_all_lanes_have_one_place_in_the_scene(view, store, server):
     scene = end(scene_job(store, SPEC))
-    RaceDrawing(server.scene, "/race", view, stage_of(scene.nodes))
+    RaceDrawing(server.scene, "/race", view, scene.stage)
     for index in range(4):
         frame = server.scene.get_handle_by_name(f"/race/lane{index}")
         np.testing.assert_allclose(frame.position, view.T_world_target[:3, 3])

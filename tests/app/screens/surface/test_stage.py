@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.compute.cuts import Top
-from app.drawing.cameras import Stage
+from app.compute.records import Stage
 from app.screens.surface.labels import AFTER, BEFORE, BOTH
 from app.screens.surface.stage import APART, ChosenBall, SurfaceStage
 
