@@ -96,17 +96,20 @@ def _browsers(kind: Literal["load", "soak"], seconds: float) -> Benchmark:
     """Run the load test of thirty browsers; its time is the median from a click to its answer, NaN if none
     was answered.
     """
-    from app.load.classroom import hold_lesson
+    from app.load.classroom import Lesson, hold_lesson
     from app.load.load import put_load, soak
+    from app.load.one_more import OneMore, work_for_one_more
     from lab.benchmarks.benchmark import Benchmark
 
     load = put_load(seconds) if kind == "load" else soak(seconds)
     record = load.record()
-    lessons = [hold_lesson(by_name) for by_name in (True, False)] if kind == "load" else []
+    parts: list[Lesson | OneMore] = []
+    if kind == "load":
+        parts = [hold_lesson(by_name=True), hold_lesson(by_name=False), work_for_one_more()]
     return Benchmark(
         record["answers_s"].get("median", math.nan),
         {},
         record["server_peak_bytes"] + record["workers_peak_bytes"],
-        runs=(record, *(lesson.record() for lesson in lessons)),
-        notes=(*load.notes(), *(lesson.note() for lesson in lessons)),
+        runs=(record, *(part.record() for part in parts)),
+        notes=(*load.notes(), *(part.note() for part in parts)),
     )

@@ -55,6 +55,10 @@ class ClassPage(Connection):
         super().close()
         self._fetching.shutdown(wait=False, cancel_futures=True)
 
+    def meshes_s(self) -> list[float]:
+        """Return the times at which surfaces were whole."""
+        return _meshes(self.whole_s)
+
     def page_bytes(self) -> int:
         """Load the page itself. Returns its bytes."""
         return len(self._get("/"))
@@ -171,9 +175,9 @@ def hold_lesson(by_name: bool) -> Lesson:
         asked_s = time.monotonic()
         for page in pages:
             page.go("Surface")
-        wait_for(lambda: all(_meshes(page.whole_s) for page in pages), PATIENCE_S)
+        wait_for(lambda: all(page.meshes_s() for page in pages), PATIENCE_S)
         coarse_s = tuple(min(_meshes(page.coarse_s)) - asked_s for page in pages)
-        whole_s = tuple(min(_meshes(page.whole_s)) - asked_s for page in pages)
+        whole_s = tuple(min(page.meshes_s()) - asked_s for page in pages)
         first_bytes = (shared.bytes_down - before) / len(pages)
         _quiet(shared)
         before, drags_s = shared.bytes_down, list[float]()
@@ -200,7 +204,7 @@ def _drag(pages: list[ClassPage], radius_mm: float) -> list[float]:
         page.set("Radius (mm)", radius_mm)
 
     def newest_s(page: ClassPage) -> list[float]:
-        return [come_s for come_s in _meshes(page.whole_s) if come_s > asked_s]
+        return [come_s for come_s in page.meshes_s() if come_s > asked_s]
 
     wait_for(lambda: all(newest_s(page) for page in pages), PATIENCE_S)
     return [min(newest_s(page)) - asked_s for page in pages]

@@ -50,6 +50,11 @@ class Serving:
         inside: tuple[int, int, int, int, tuple[int, ...], bool] = self._pipe.recv()
         return Look(*inside, _memory_bytes(self._process), sum(map(_memory_bytes, self._workers())))
 
+    def used_s(self) -> float:
+        """Return the processor time that the serving process, without its workers, has used."""
+        times_s = self._process.cpu_times()
+        return float(times_s.user + times_s.system)
+
     def _workers(self) -> list[psutil.Process]:
         return self._process.children(recursive=True)
 

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from app.load import classroom
+from app.load import classroom, one_more
 from app.load.classroom import ClassPage, Lesson
 from app.load.line import BURST_S, line
 from app.web.contents import FOLDER
@@ -141,3 +141,16 @@ def test_a_class_on_the_running_app(monkeypatch):
         assert len(lesson.drags_s) == 4
         assert min(lesson.drags_s) > 0.0
         assert all(coarse <= whole for coarse, whole in zip(lesson.coarse_s, lesson.whole_s, strict=True))
+
+
+def test_the_work_for_one_more_browser_on_the_running_app(monkeypatch):
+    monkeypatch.setattr(one_more, "BROWSERS", 2)
+    monkeypatch.setattr(one_more, "SCENE", "box-on-table")
+    figures = one_more.work_for_one_more().record()
+    assert min(figures.values()) >= 0.0
+    assert 0.0 < figures["opens_s"] < one_more.PATIENCE_S
+
+
+def test_the_work_is_stated_in_milliseconds():
+    note = one_more.OneMore(0.25, 0.01, 0.0304).note()
+    assert "250 ms to open the page, 10 to show the surface, 30 for a radius" in note
