@@ -39,6 +39,7 @@
   let chain = Promise.resolve(); // the deliveries that wait for contents
   let waiting = 0; // their number
   let connection = 0; // number of the connection whose messages are valid
+  let ended = new AbortController(); // ends the fetches of this connection
   let idle = 0; // timer of the fetches ahead
   let bytesPerMs = Infinity; // rate of the line
   let worker = null; // holds the websocket
@@ -62,13 +63,14 @@
   }
 
   async function fetched(name, ahead) {
+    const {signal} = ended;
     for (let tried = 1; ; tried++) {
       try {
         const url = new URL(FOLDER + name, document.baseURI).href;
         const answer = await fetch(url, {
           priority: ahead ? "low" : "high",
           cache: tried > 1 ? "reload" : "default", // what the browser kept may be damaged
-          signal: AbortSignal.timeout(PATIENCE_MS),
+          signal: AbortSignal.any([signal, AbortSignal.timeout(PATIENCE_MS)]),
         });
         if (answer.ok) {
           const packed = await answer.arrayBuffer();
@@ -77,7 +79,7 @@
         }
         if (answer.status < 500) throw new RangeError(LOST);
       } catch (error) {
-        if (error instanceof RangeError || tried === TRIES) throw error;
+        if (error instanceof RangeError || tried === TRIES || signal.aborted) throw error;
       }
       await new Promise(done => setTimeout(done, tried * PAUSE_MS));
     }
@@ -175,11 +177,13 @@
     for (const name of loading.keys()) if (!needed.has(name)) loading.delete(name);
     const next = [...needed].find(name => !loading.has(name) && !lost.has(name));
     if (next === undefined) return;
+    const mine = connection;
     const giveUp = () => {
+      if (mine !== connection) return;
       loading.delete(next);
       lost.add(next);
     };
-    load(next, true).catch(giveUp).then(fetchAhead);
+    load(next, true).catch(giveUp).then(() => mine === connection && fetchAhead());
   }
 
   // Give viser messages once their contents are there.
@@ -251,6 +255,8 @@
 
   function reset() {
     const mine = ++connection;
+    ended.abort(); // the line is for this connection's contents
+    ended = new AbortController();
     chain = Promise.resolve();
     waiting = 0;
     for (const all of [hidden, containers, held, lost, loading, drawn, refining]) all.clear();

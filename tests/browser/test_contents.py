@@ -39,7 +39,7 @@ class Line:
     """What the server of the page is asked for, and how it answers."""
 
     def __init__(self):
-        self.asked, self.refusals = [], []
+        self.asked, self.refusals, self.held = [], [], []
 
     def answer(self, route):
         name = route.request.url.removeprefix(ADDRESS).partition("?")[0]
@@ -54,6 +54,8 @@ class Line:
             )
         name = route.request.url.removeprefix(f"{ADDRESS}contents/")
         self.asked.append(name)
+        if name in self.held:
+            return None  # never answered
         status = self.refusals.pop(0) if self.refusals else 200
         if status != 200:
             return route.fulfill(status=status)
@@ -276,6 +278,23 @@ def test_a_new_connection_forgets_the_old_one(page):
     connect(page)
     send(page, create("/fuse/mesh", "b"))
     assert seen(page, 1) == [["GlbMessage", "/fuse/mesh", {"glb_data": "second", "scale": 1}]]
+
+
+def test_a_new_connection_ends_the_fetches_of_the_old_one(page):
+    ended = []
+    page.on("requestfailed", lambda request: ended.append(request.url.removeprefix(f"{ADDRESS}contents/")))
+    page.line.held = ["a"]
+    send(page, create("/mesh", "a"))
+    page.wait_for_timeout(200)
+    assert ended == []
+    connect(page)
+    page.line.held = []
+    send(page, create("/mesh", "b"))
+    assert seen(page, 1)[0][2]["glb_data"] == "second"
+    assert ended == ["a"]
+    page.wait_for_timeout(1500)  # longer than the pause before another try
+    assert page.line.asked == ["a", "b"]
+    assert page.evaluate("notices") == []
 
 
 def test_the_first_screen_waits_for_the_one_that_the_address_names(page):
