@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pipeline.planning.calls import RigPlan
     from pipeline.reconstruct import Reconstruction
 
-SinkPlace = Annotated[str | None, tyro.conf.arg(metavar="X,Y")]
+SinkPlace = Annotated[str | None, tyro.conf.arg(metavar="X,Y|best")]
 HEADINGS = (
     *("camera", "x m", "y m", "height m", "pan", "tilt", "on", "promise points (95 %)", "overlap"),
     *("90 % after s", "99 % after s", "J", "battery days"),
@@ -64,7 +64,8 @@ def plan(
         preset: The network: thesis-link, greenhouse, office, or the config.json of a finished simulation.
         coding: How images are encoded; `deliver` lists the codings.
         walls: Material of the walls, which damp the radio: plaster, wood, brick or concrete.
-        sink: Place of the sink in metres; without it, the network's, or behind the present cameras.
+        sink: Place of the sink in metres, or "best": where its weakest link to a camera is strongest; without
+            it, the network's, or behind the present cameras.
         every_s: Time between two images of a camera, for the days that a battery lasts.
         budget_j: Most energy of all new cameras together for one image of each.
         deadline_s: Latest time until 99 % of the bytes of each new camera have arrived.
@@ -149,12 +150,16 @@ def _write(
     write_json(out / RECORD, record)
 
 
-def _place(text: str) -> tuple[float, float]:
-    """Return x and y of --sink; exit with 2 if the text is not two numbers."""
+def _place(text: str) -> tuple[float, float] | Literal["best"]:
+    """Return x and y of --sink, or "best"; exit with 2 if the text is something else."""
+    if text == "best":
+        return "best"
     try:
         x_m, y_m = (float(number) for number in text.split(","))
     except ValueError:
-        wrong_use(f"--sink takes a place such as 1.5,-0.4 (metres, without blanks), not '{text.strip()}'")
+        wrong_use(
+            f"--sink takes a place such as 1.5,-0.4 (metres, without blanks), or best, not '{text.strip()}'"
+        )
     return x_m, y_m
 
 

@@ -141,9 +141,10 @@ def times_sentence(planned: RigPlan) -> str:
     """Say of what the times are, and where the sink and the walls are from."""
     delivery, radio = planned.delivery, planned.radio
     x_m, y_m = delivery.sink_m
+    by = ", where its weakest link to a camera is strongest" if radio.sink_m == "best" else ""
     return (
         f"Times and joules are for one image from each present and new camera at once, coded by "
-        f"{radio.coding}, to a sink at {x_m:.2f}, {y_m:.2f} (x, y in metres); a new image counts as "
+        f"{radio.coding}, to a sink at {x_m:.2f}, {y_m:.2f} (x, y in metres{by}); a new image counts as "
         f"{delivery.image_bytes:,} bytes, the present ones' mean, because its content is not known, and so "
         f"not its surface either"
     )

@@ -64,7 +64,7 @@ def candidates(seen: SeenPlace, where: Sequence[Where], most: int = MOST_CANDIDA
     """
     if not where:
         raise InputError(f"No camera may stand anywhere; allow one or more of {', '.join(WHERES)}")
-    places = [(place, kind) for kind in WHERES if kind in where for place in _places(seen, kind)]
+    places = [(place, kind) for kind in WHERES if kind in where for place in free_places(seen, kind)]
     aims_m = aims(seen)
     found = [
         Candidate(look_at(place, aim), kind)
@@ -116,7 +116,7 @@ def triangles_of(seen: SeenPlace) -> tuple[FloatArray, FloatArray, FloatArray]:
     return normals, corners_m.mean(axis=1), areas_m2
 
 
-def _places(seen: SeenPlace, kind: Where) -> Iterator[FloatArray]:
+def free_places(seen: SeenPlace, kind: Where) -> Iterator[FloatArray]:
     """Yield (3,) places of one kind that are free."""
     proposed_m = _tripods(seen) if kind == "tripods" else _carried(seen, kind)
     clear_m = CLEAR_M if kind == "tripods" else 0.7 * OFF_WALL_M

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from pipeline.delivery.sink import images_of
 from pipeline.planning.plan import Candidates, Plan, PlanConfig, plan_of
 from pipeline.planning.seen import SeenPlace
 from pipeline.planning.sensors import Sensor
+from pipeline.planning.sinks import best_sink
 from pipeline.planning.walls import DAMPING_DB, walls_of
 from pipeline.types import FloatArray, Rig
 
@@ -41,8 +43,8 @@ class PlanRadio:
     """Name in ``pipeline.delivery.CODINGS``."""
     walls: str = "brick"
     """Material of the walls, a name in ``DAMPING_DB``."""
-    sink_m: tuple[float, float] | None = None
-    """x and y of the sink; None leaves it where the network has it."""
+    sink_m: tuple[float, float] | Literal["best"] | None = None
+    """x and y of the sink; "best" places it by ``best_sink``, None leaves it where the network has it."""
     every_s: float = 600.0
     """Time between two images of a camera, for the days that its battery lasts."""
     budget_j: float | None = None
@@ -96,6 +98,7 @@ class _Sending:
     rig: Rig
     present_bytes: tuple[int, ...]
     """Bytes of each present camera's image."""
+    seen: SeenPlace
     walls_m: FloatArray
 
 
@@ -120,7 +123,7 @@ def deliver_plan(rig: Rig, seen: SeenPlace, plan: Plan, radio: PlanRadio) -> Pla
 def _sending(rig: Rig, seen: SeenPlace, radio: PlanRadio) -> _Sending:
     coding, packet_bytes = coding_named(radio.coding), packet_bytes_of(radio.network)
     present_bytes = tuple(len(coding.encode(images_of(frame), packet_bytes)) for frame in rig.frames)
-    return _Sending(rig, present_bytes, walls_of(seen))
+    return _Sending(rig, present_bytes, seen, walls_of(seen))
 
 
 def _delivered(sending: _Sending, plan: Plan, radio: PlanRadio) -> PlanDelivery:
@@ -131,9 +134,10 @@ def _delivered(sending: _Sending, plan: Plan, radio: PlanRadio) -> PlanDelivery:
     )
     network = network_of(rig, sending.present_bytes, replace(radio.network, radio=damped))
     old_m = np.reshape(network.nodes.places_m or places_of(rig, network.nodes.spacing_m), (-1, 2))
-    sink_m = old_m[-1] if radio.sink_m is None else np.asarray(radio.sink_m)
     new_m = [camera.T_world_camera[:2, 3] for camera in plan.cameras]
-    places_m = np.vstack([old_m[:-1], *new_m, sink_m])
+    cameras_m = np.vstack([old_m[:-1], *new_m])
+    sink_m = _sink_m(sending.seen, cameras_m, old_m[-1], replace(radio, network=network))
+    places_m = np.vstack([cameras_m, sink_m])
     nodes = replace(
         network.nodes,
         count=present + len(new_m),
@@ -156,6 +160,14 @@ def _delivered(sending: _Sending, plan: Plan, radio: PlanRadio) -> PlanDelivery:
     ]
     lasting = [replace(one, battery_days=_battery_days(one, radio)) for one in cameras]
     return PlanDelivery(tuple(lasting), image_bytes, (float(sink_m[0]), float(sink_m[1])), walls_m)
+
+
+def _sink_m(seen: SeenPlace, cameras_m: FloatArray, old_m: FloatArray, radio: PlanRadio) -> FloatArray:
+    if radio.sink_m is None:
+        return old_m
+    if radio.sink_m == "best":
+        return best_sink(seen, cameras_m, radio.network.radio)
+    return np.asarray(radio.sink_m)
 
 
 def _seconds(came: Arrivals, node: int, least_bytes: float) -> float:
@@ -222,7 +234,7 @@ def _why_none(delivery: PlanDelivery, radio: PlanRadio) -> str:
     if not np.isfinite(slowest_s):
         return (
             "The radio does not carry a new camera's image to the sink from any place that was tried; try "
-            "another preset, a sink that is nearer, or walls of another material"
+            "another preset, a sink that is nearer or the best one, or walls of another material"
         )
     needs = f"{slowest_s:.3g} s and {delivery.joules:.3g} J"
     return f"No camera meets budget and deadline: the last one that was tried needs {needs}; allow that much"

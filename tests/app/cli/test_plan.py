@@ -125,6 +125,12 @@ def test_a_budget_that_fewer_cameras_keep_says_so(capsys, rig_folder, planned, t
     assert re.search(r"The budget of [\d.]+ J allows 1 of the 2 cameras", err)
 
 
+def test_the_plan_may_place_the_sink(capsys, rig_folder):
+    code, _, err = run(capsys, "plan", "--rig", rig_folder, "--where", "tripods", "--sink", "best", *FEW)
+    assert code == 0
+    assert "where its weakest link to a camera is strongest" in err
+
+
 def test_a_place_of_the_sink_may_be_negative_and_replaced_settings_are_named(capsys, rig_folder, tmp_path):
     words = ("--where", "tripods", "--sink", "-1.5,0.5", "--out", tmp_path, "--json")
     settings = (*FEW, "radio.wall_db=3", "nodes.images=2")
