@@ -158,7 +158,7 @@ def _place(text: str) -> tuple[float, float] | Literal["best"]:
         x_m, y_m = (float(number) for number in text.split(","))
     except ValueError:
         wrong_use(
-            f"--sink takes a place such as 1.5,-0.4 (metres, without blanks), or best, not '{text.strip()}'"
+            f"--sink takes best or a place such as 1.5,-0.4 (metres, without blanks), not '{text.strip()}'"
         )
     return x_m, y_m
 

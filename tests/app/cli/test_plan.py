@@ -155,8 +155,8 @@ def test_a_place_of_the_sink_may_be_negative_and_replaced_settings_are_named(cap
         (("--preset", "moon"), 1, "no preset 'moon'"),
         (("--every-s", "0"), 1, "every_s"),
         (("--budget-j", "-1"), 1, "budget_j"),
-        (("--sink", "here"), 2, "--sink takes a place such as 1.5,-0.4"),
-        (("--sink", "1,2,3"), 2, "--sink takes a place"),
+        (("--sink", "here"), 2, "--sink takes best or a place such as 1.5,-0.4"),
+        (("--sink", "1,2,3"), 2, "--sink takes best or a place"),
         (("--scene", "office"), 2, "--scene"),
     ],
 )

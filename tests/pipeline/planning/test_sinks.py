@@ -40,9 +40,8 @@ def test_no_free_place_has_a_stronger_weakest_link(office):
     most_w = weakest_link_w(best_m, cameras_m, RADIO)
     assert all(weakest_link_w(place_m, cameras_m, RADIO) <= most_w for place_m in places_m)
     farthest_m = np.linalg.norm(places_m[:, None] - cameras_m, axis=2).max(axis=1)
-    assert np.linalg.norm(best_m - cameras_m, axis=1).max() == pytest.approx(
-        farthest_m.min()
-    )  # without walls
+    without_walls_m = np.linalg.norm(best_m - cameras_m, axis=1).max()
+    assert without_walls_m == pytest.approx(farthest_m.min())
 
 
 def test_the_plan_s_images_go_to_the_best_sink_of_all_its_cameras(office):
