@@ -73,7 +73,7 @@ class Ghosts:
                 name, fov=fov_rad, aspect=aspect, scale=FRUSTUM_M, thickness=0.008, color=GHOST
             )
             place(frustum, T)
-            self._scene.add_label(f"{name}/name", f"new {row + 1}", font_screen_scale=1.0)
+            self._scene.add_label(f"{name}/name", f"new {row + 1}", anchor="center-right")
             if self._on_pick is not None:
                 frustum.on_click(lambda _, row=row: self._on_pick(row))
             self._frusta.append(frustum)

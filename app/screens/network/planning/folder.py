@@ -12,7 +12,7 @@ from app.compute.state import Sent, Spec
 from app.drawing.ghosts import Ghosts
 from app.screens.network.planning.controls import PlanControls
 from app.screens.network.planning.export import plan_offers
-from app.screens.network.planning.labels import DRAG, NONE_YET, PICTURE, PLANNING, STOPPED, TEXT
+from app.screens.network.planning.labels import BEFORE, DRAG, NONE_YET, PICTURE, PLANNING, STOPPED, TEXT
 from app.screens.network.planning.numbers import delivery_bars, ghost_table, summary
 from app.screens.network.planning.taking import Taking
 from app.screens.network.planning.view import (
@@ -214,11 +214,11 @@ class PlanFolder:
             return
         self._poses[row] = _pose_of(T_world_camera)
         self._drawn.stand(row, T_world_camera)
-        self._stale = True
+        self._stale, self._arrivals = True, ()
+        self._caption.content = BEFORE
         if not self._judging:
             self._judge()
         if ended:
-            self._arrivals = ()
             self._look()
 
     def _judge(self) -> None:

@@ -48,6 +48,9 @@ PICTURE = Markdown(
     "What it would see, on the surface known today. Green: newly measured, the stronger the likelier; "
     "violet: guessed surface; red: no surface known."
 )
+BEFORE = Markdown(
+    "**Picture and bars are still those of the place before**; they follow when you let go of the ghost."
+)
 TAKING = Markdown(
     "The room is rendered from there and reconstructed again; this takes half a minute or more."
 )

@@ -144,7 +144,9 @@ def kept_sentence(taken: TakenView) -> Markdown:
     """Return markdown: the promise of a camera that was added, beside what it really added."""
     low, high = taken.promise.ci95_share
     real, gain = taken.real_share, taken.promise.gain_share
-    text = Markdown("**Promised {} points, really {:.1f}.** ").format(points(taken.promise), 100.0 * real)
+    text = Markdown(
+        "**Promised {} points, really {:.1f}** (hundredths of the earlier cameras' rays). "
+    ).format(points(taken.promise), 100.0 * real)
     if not taken.placed:
         return text + Markdown("Registration did not find the new camera's pose, so its image was left out.")
     if not low <= real <= high:
