@@ -102,8 +102,8 @@ def ghost_table(ghosts: GhostsView, arrivals: Sequence[Arrival]) -> Markup:
             *(one[1] for one in sent),
         ),
         (
-            "Energy",
-            "Of its radio and computer until 99 % have arrived, or until the end of the run.",
+            "Energy of the image",
+            "Of radio and computer until 99 % have arrived, or until the end of the run.",
             *(one[2] for one in sent),
         ),
     ]
