@@ -64,9 +64,8 @@ def warm_up() -> Iterator[None]:
         importlib.import_module(f"{SCREENS}.{step}.job")
         yield
     screens = importlib.import_module(SCREENS)
-    for screen in pkgutil.iter_modules(screens.__path__, f"{SCREENS}."):
-        for module in pkgutil.iter_modules(importlib.import_module(screen.name).__path__, f"{screen.name}."):
-            if module.name.endswith("job"):
-                importlib.import_module(module.name)
-                yield
+    for module in pkgutil.walk_packages(screens.__path__, f"{SCREENS}."):
+        if module.name.endswith("job"):
+            importlib.import_module(module.name)
+            yield
     yield from importlib.import_module("app.compute.warm").warm_up()

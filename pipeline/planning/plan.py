@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from pipeline.types import BoolArray, FloatArray
 LEAST_OVERLAP = 0.25
 """Share of a candidate's image that one present camera must see, too, so that registration finds its pose."""
 MOST_CAMERAS = 20
+BY_HAND: Literal["by hand"] = "by hand"
+"""Kind of place of a camera that was moved from the place of its plan."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +54,7 @@ class PlannedCamera:
     """One camera of a plan."""
 
     T_world_camera: FloatArray
-    where: Where
+    where: Where | Literal["by hand"]
     promise: Promise
     """What it adds to the present cameras and to those before it in the plan."""
     overlap_share: float
@@ -147,6 +150,31 @@ def plan_of(
         int(allowed.sum()),
         seen.measured_share,
     )
+
+
+def moved_plan(
+    seen: SeenPlace, plan: Plan, T_world_camera: Sequence[FloatArray], judged: Sequence[Judged]
+) -> Plan:
+    """Return a plan whose cameras were moved by hand, with the promises of their new places.
+
+    Args:
+        seen: the place.
+        plan: the plan before.
+        T_world_camera: (4, 4) pose of each camera, in the order of the plan.
+        judged: what a camera at each of these poses would measure.
+    """
+    targets = seen.targets
+    missed: FloatArray = np.ones(len(targets.points_m))
+    cameras = []
+    for camera, pose, found in zip(plan.cameras, T_world_camera, judged, strict=True):
+        where = camera.where if np.array_equal(pose, camera.T_world_camera) else BY_HAND
+        gain = promise(missed * found.chance, targets)
+        cameras.append(PlannedCamera(pose, where, gain, found.overlap_share))
+        missed = missed * (1.0 - found.chance)
+    total = promise(1.0 - missed, targets)
+    share = total.gain_share / plan.total.gain_share  # plan_of returns no plan without gain
+    at_least = min(1.0, plan.at_least_of_best * share)
+    return replace(plan, cameras=tuple(cameras), total=total, at_least_of_best=at_least)
 
 
 def _cameras(seen: SeenPlace, judged: Candidates, choice: Choice) -> list[PlannedCamera]:

@@ -35,7 +35,7 @@ FILES: dict[Shown, str] = {
     "alpha": "surface_alpha.ply",
 }
 """File name of each surface in the run folder."""
-KINDS = ("Surface", "Clouds", "Numbers", "Measures", "To show", "Race", "Delivery", "Network")
+KINDS = ("Surface", "Clouds", "Numbers", "Measures", "To show", "Race", "Delivery", "Network", "Plan")
 """Kinds of files in the order of the buttons; kinds without files are hidden."""
 
 

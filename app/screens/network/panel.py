@@ -34,6 +34,7 @@ from app.screens.network.lesson import CROSSING, KIND, LOST_PACKET, NetworkLook,
 from app.screens.network.measures import MomentMeasures
 from app.screens.network.numbers import metric_tables, runs_summary, verdict
 from app.screens.network.packets import Frames, legend_html
+from app.screens.network.planning.folder import PlanFolder
 from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import NetworkView
 from app.web.markup import Markdown, Markup
@@ -89,6 +90,8 @@ class NetworkPanel(Panel):
         self._table = gui.add_html(Markup(""))
         with gui.add_folder("What if"):
             self._setup.add_what_if(f"{self.drawn_below}/what-if")
+        setup = self._setup
+        self._plan = PlanFolder(self.session, f"{self.drawn_below}/plan", setup.sent, lambda: setup.preset)
         self._inspector = Inspector(ui, self.session)
         self._legend = gui.add_html(Markup(""))
         self._measures = MomentMeasures(self.session)
@@ -99,6 +102,7 @@ class NetworkPanel(Panel):
             self._setup.add_advanced()
         self._dock = Dock(ui, self._moved, self._inspector.pick)
         self.in_address |= self._lessons.in_address | {"measure": self._measures}
+        self.in_address["plan"] = CallbackState(self._plan.place, self._plan.take)
         self.in_address["net"] = CallbackState(self._setup.place, self._take_place)
         self.in_address["t"] = CallbackState(self._moment, self._take_moment)
 
@@ -123,6 +127,7 @@ class NetworkPanel(Panel):
 
     def on_spec(self, spec: Spec) -> None:
         """Ignore partial results of other settings; another scene also drops the previous delivery."""
+        self._plan.on_spec(spec)
         if spec.source != self._source:
             self._source = spec.source
             self._before, self._other_room, self._difference.content = None, True, Markdown("")
@@ -187,11 +192,13 @@ class NetworkPanel(Panel):
 
     def offers(self) -> tuple[Offers, ...]:
         """Return the offers of the delivery or runs shown, once they are complete."""
+        plan = self._plan.offers()
         if not self.session.results.fresh("network", self.session.spec):
-            return ()
+            return plan
         if self._delivery is None:
             return (network_offers(self._labels, self.command),) if self._runs else ()
-        return (delivery_offers(self._delivery, self._dock.now_ns, self.command), network_offers((), ""))
+        delivery = delivery_offers(self._delivery, self._dock.now_ns, self.command)
+        return (delivery, network_offers((), ""), *plan)
 
     @property
     def command(self) -> str:
@@ -207,6 +214,7 @@ class NetworkPanel(Panel):
         self._text.content = STREET_TEXT if preset.street else TEXT
         about = Markdown("{} {}").format(preset.sentence, ORIGIN)
         self._about.content = about if preset.street else Markdown("")
+        self._plan.show(not preset.street)
         if preset.street:
             runs = setup.runs()
             self._labels = tuple(runs)

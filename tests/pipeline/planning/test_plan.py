@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
+from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.planning.calls import plan
-from pipeline.planning.plan import LEAST_OVERLAP, PlanConfig, plan_of
+from pipeline.planning.chances import judge
+from pipeline.planning.plan import BY_HAND, LEAST_OVERLAP, PlanConfig, moved_plan, plan_of
 from pipeline.planning.promise import promise
 from pipeline.planning.sensors import SENSORS, sensor_named
 from tests.pipeline.planning.rooms import targets_at
@@ -107,3 +109,24 @@ def test_the_present_sensor_has_the_rigs_lens(office):
     for name, sensor in SENSORS.items():
         assert sensor_named(name, office.rig) is sensor
         assert sensor.near_m < sensor.far_m
+
+
+def test_a_plan_moved_nowhere_is_the_same_and_a_moved_camera_promises_what_it_sees_there(office):
+    before = planned(office, 2)
+    poses = [camera.T_world_camera for camera in before.cameras]
+    judged = [judge(office.seen, pose, office.sensor) for pose in poses]
+    same = moved_plan(office.seen, before, poses, judged)
+    for one, other in zip(before.cameras, same.cameras, strict=True):
+        assert other.where == one.where
+        assert other.promise.gain_share == pytest.approx(one.promise.gain_share, rel=1e-6)
+    assert same.total.gain_share == pytest.approx(before.total.gain_share, rel=1e-6)
+    away = poses[0] @ rigid(rotation_exp(np.array([0.0, np.pi, 0.0])), np.zeros(3))  # it turns its back
+    behind = judge(office.seen, away, office.sensor)
+    moved = moved_plan(office.seen, before, [away, poses[1]], [behind, judged[1]])
+    assert [camera.where for camera in moved.cameras] == [BY_HAND, before.cameras[1].where]
+    assert moved.cameras[0].promise == promise(behind.chance, office.seen.targets)
+    alone = promise(judged[1].chance * (1.0 - behind.chance), office.seen.targets)
+    assert moved.cameras[1].promise.gain_share == pytest.approx(alone.gain_share)
+    assert moved.total.gain_share < before.total.gain_share
+    ratio = moved.total.gain_share / before.total.gain_share
+    assert moved.at_least_of_best == pytest.approx(ratio * before.at_least_of_best)

@@ -448,6 +448,7 @@ def test_vehicles_move_and_two_schemes_stand_beside_each_other(screen):
     screen.refuse = ""
     screen.use("run.horizon_s=660")
     assert ORIGIN in gui.text()
+    assert not gui.find("Suggest").seen, "vehicles are not planned"
     assert gui.find("Scheme").seen
     assert not gui.find("Coding").seen
     (run,) = screen.results.view("network")

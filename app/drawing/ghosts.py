@@ -1,0 +1,142 @@
+"""Ghosts: planned cameras in the scene, one of which can be dragged, and what they would newly see."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from app.drawing.clouds import clear
+from app.drawing.colors import BACKGROUND, GHOST
+from app.drawing.poses import move, place
+from pipeline.kernels.geometry import rigid
+from pipeline.types import FloatArray
+
+if TYPE_CHECKING:
+    import viser
+
+FRUSTUM_M, HANDLE_M, POINT_M = 0.22, 0.32, 0.016
+"""viser's ``scale`` of a frustum, length of the handle's arrows, and size of a point."""
+LEAST_CHANCE = 0.1
+"""Points that are less likely measured are not drawn."""
+PALE = 0.6
+"""Share of the background in the points of ghosts that are not chosen."""
+AWAY_M = (0.0, 0.0, -1000.0)
+"""Place of points that are not drawn: the number of points of a cloud stays."""
+
+
+class Ghosts:
+    """The planned cameras below a scene node."""
+
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        below: str,
+        on_move: Callable[[int, FloatArray, bool], None] | None = None,
+        on_pick: Callable[[int], None] | None = None,
+    ) -> None:
+        """Draw nothing yet.
+
+        Args:
+            scene: the scene.
+            below: scene node below which all is drawn.
+            on_move: called on a thread of the browser's messages with the index of a dragged ghost, its
+                (4, 4) pose, and whether it was released; None: nothing can be dragged.
+            on_pick: called on such a thread with the index of a ghost that was clicked.
+        """
+        self._scene, self._below = scene, below
+        self._on_move, self._on_pick = on_move, on_pick
+        self._frusta: list[viser.CameraFrustumHandle] = []
+        self._handle: viser.TransformControlsHandle | None = None
+        self._cloud: viser.PointCloudHandle | None = None
+        self._targets_m: FloatArray = np.zeros((0, 3), np.float32)
+        self._chosen = 0
+
+    def draw(
+        self, T_world_camera: Sequence[FloatArray], fov_rad: float, aspect: float, targets_m: FloatArray
+    ) -> None:
+        """Draw ghosts of one lens at (4, 4) poses; the first is chosen.
+
+        Args:
+            T_world_camera: pose of each ghost.
+            fov_rad: vertical field of view.
+            aspect: width over height.
+            targets_m: (T, 3) float32 places that they might newly see, world frame.
+        """
+        self.clear()
+        self._targets_m = targets_m
+        for row, T in enumerate(T_world_camera):
+            name = f"{self._below}/{row + 1}"
+            frustum = self._scene.add_camera_frustum(
+                name, fov=fov_rad, aspect=aspect, scale=FRUSTUM_M, thickness=0.008, color=GHOST
+            )
+            place(frustum, T)
+            self._scene.add_label(f"{name}/name", f"new {row + 1}", anchor="center-right")
+            if self._on_pick is not None:
+                frustum.on_click(lambda _, row=row: self._on_pick(row))
+            self._frusta.append(frustum)
+        if len(targets_m):
+            self._cloud = self._scene.add_point_cloud(
+                f"{self._below}/seen",
+                np.tile(np.array(AWAY_M, np.float32), (len(targets_m), 1)),
+                np.tile(np.array(GHOST, np.uint8), (len(targets_m), 1)),
+                point_size=POINT_M,
+                point_shape="circle",
+                precision="float32",
+            )
+        self.choose(0)
+
+    def choose(self, row: int) -> None:
+        """Give the handle to a ghost."""
+        self._chosen = row
+        if self._on_move is None or row >= len(self._frusta):
+            return
+        if self._handle is not None:
+            self._handle.remove()
+        frustum = self._frusta[row]
+        handle = self._handle = self._scene.add_transform_controls(
+            f"{self._below}/handle-{row + 1}", scale=HANDLE_M, disable_sliders=True, depth_test=False
+        )
+        place(handle, _pose(frustum))
+        handle.on_update(partial(self._dragged, row, handle))
+
+    def _dragged(self, row: int, handle: viser.TransformControlsHandle, event: Any) -> None:
+        pose = _pose(handle)
+        if self._on_move is not None:
+            self._on_move(row, pose, event.phase == "end")
+
+    def stand(self, row: int, T_world_camera: FloatArray) -> None:
+        """Move a ghost's frustum; its handle is where the hand has it."""
+        if row < len(self._frusta):
+            move(self._frusta[row], T_world_camera)
+
+    def show_newly(self, newly: Sequence[FloatArray]) -> None:
+        """Show for each ghost the (T,) chances that it newly measures each target, the chosen one's full.
+
+        A target belongs to the ghost that measures it most likely.
+        """
+        if self._cloud is None:
+            return
+        chances = np.stack([*newly])
+        best = chances.argmax(axis=0)
+        seen = chances.max(axis=0) >= LEAST_CHANCE
+        pale = np.where(best == self._chosen, 0.0, PALE)[:, None]
+        colors = (1.0 - pale) * np.array(GHOST) + pale * np.array(BACKGROUND)
+        self._cloud.points = np.where(seen[:, None], self._targets_m, np.array(AWAY_M, np.float32))
+        self._cloud.colors = np.rint(colors).astype(np.uint8)
+        self._cloud.visible = bool(seen.any())
+
+    def clear(self) -> None:
+        """Remove all ghosts."""
+        clear(self._scene, self._below)
+        self._frusta, self._handle, self._cloud = [], None, None
+
+
+def _pose(handle: Any) -> FloatArray:
+    """Return the (4, 4) pose of a scene node in its parent."""
+    from viser import transforms
+
+    turn = transforms.SO3(np.asarray(handle.wxyz, float)).as_matrix()
+    return rigid(np.asarray(turn), np.asarray(handle.position, float))

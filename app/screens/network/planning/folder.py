@@ -1,0 +1,279 @@
+"""The folder *Plan*: it asks for a plan, shows its ghosts, and follows the one that is dragged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+import viser
+
+from app.compute.state import Sent, Spec
+from app.drawing.ghosts import Ghosts
+from app.screens.network.planning.controls import PlanControls
+from app.screens.network.planning.export import plan_offers
+from app.screens.network.planning.labels import BEFORE, DRAG, NONE_YET, PICTURE, PLANNING, STOPPED, TEXT
+from app.screens.network.planning.numbers import delivery_bars, ghost_table, summary
+from app.screens.network.planning.taking import Taking
+from app.screens.network.planning.view import (
+    Arrival,
+    GhostsView,
+    LookView,
+    NoPlan,
+    PlanView,
+    Pose,
+    Poses,
+)
+from app.web.markup import Markdown, Markup
+from app.window.panel import Offers, PanelSession
+from pipeline.spec import key
+from pipeline.types import FloatArray
+
+if TYPE_CHECKING:
+    from collections.abc import Hashable
+
+EMPTY = np.full((1, 1, 3), 235, np.uint8)
+QUALITY = 85
+
+
+class PlanFolder:
+    """Controls, numbers and ghosts of a plan of the room's next cameras."""
+
+    def __init__(
+        self, session: PanelSession, below: str, sent: Callable[[], Sent], preset: Callable[[], str]
+    ):
+        """Add the folder to the current container.
+
+        Args:
+            session: the session.
+            below: scene node below which the ghosts are drawn.
+            sent: returns the delivery that the screen's controls set; raises ``InputError``.
+            preset: returns the name of the screen's preset.
+        """
+        self._session, self._ui, self._sent, self._preset = session, session.ui, sent, preset
+        gui = session.ui.gui
+        self._plan: PlanView | None = None
+        self._ghosts: GhostsView | None = None
+        self._arrivals: tuple[Arrival, ...] = ()
+        self._poses: list[Pose] = []
+        self._row = 0
+        self._judging = self._stale = False
+        """Whether an answer for a dragged ghost is awaited, and whether the ghost has moved since."""
+        self._looked: Sent | None = None
+        """How the images travelled whose arrivals are shown."""
+        self._surface: Hashable = None
+        """The surface from which the plan was made."""
+        self._drawn = Ghosts(session.ui.scene, below, self._dragged, self._clicked)
+        with gui.add_folder("Plan", expand_by_default=False) as self._folder:
+            gui.add_markdown(TEXT)
+            self._controls = PlanControls(session.ui)
+            gui.add_button(
+                "Suggest", icon=viser.Icon.BULB, hint="Judges free places and shows the best as ghosts."
+            ).on_click(lambda _: session.ui.post(self._suggest))
+            self._status = gui.add_markdown(NONE_YET)
+            self._table = gui.add_html(Markup(""))
+            self._about = gui.add_markdown(Markdown(""))
+            self._chosen = gui.add_dropdown(
+                "Ghost",
+                ["new 1"],
+                hint="The ghost that has the arrows, the picture and Take it.",
+                visible=False,
+            )
+            session.ui.when_changed(self._chosen, self._choose)
+            self._picture = gui.add_image(EMPTY, format="jpeg", jpeg_quality=QUALITY, visible=False)
+            self._caption = gui.add_markdown(Markdown(""))
+            self._bars = gui.add_html(Markup(""))
+            self._files = gui.add_button_group(
+                "Save", ("…",), hint="The floor plan true to scale, and all positions.", visible=False
+            )
+            self._files.on_click(lambda event: session.ui.post(self._save, event.target.value, event.client))
+            self._taking = Taking(session)
+        self.place, self.take = self._controls.place, self._controls.take
+
+    def show(self, visible: bool) -> None:
+        """Show or hide the folder and its ghosts: on streets nothing is planned."""
+        self._folder.visible = visible
+        if not visible:
+            self.forget()
+
+    def on_spec(self, spec: Spec) -> None:
+        """Drop a plan of another surface; send the images of the same ghosts through a changed network."""
+        self._taking.on_spec(spec)
+        plan = self._plan
+        if plan is None:
+            return
+        if key(spec, "truth") != self._surface:
+            self.forget()
+        elif spec.sent is not None and spec.sent != self._looked:
+            self._look()
+
+    def forget(self) -> None:
+        """Show no plan."""
+        self._plan, self._ghosts, self._arrivals = None, None, ()
+        self._poses = []
+        self._drawn.clear()
+        self._status.content = NONE_YET
+        for text in (self._about, self._caption):
+            text.content = Markdown("")
+        self._table.content = self._bars.content = Markup("")
+        for handle in (self._chosen, self._picture, self._files):
+            handle.visible = False
+        self._taking.offer(None, "")
+
+    def offers(self) -> tuple[Offers, ...]:
+        """Return the files of the plan."""
+        if self._plan is None:
+            return ()
+        return (plan_offers(self._plan.request, self._sent_now, self._where, self._preset()),)
+
+    # A plan.
+
+    def _suggest(self) -> None:
+        """Request a plan of the controls' settings."""
+        request = self._controls.request(self._sent())
+        surface = key(self._session.spec, "truth")
+        self.forget()
+        self._status.content = PLANNING
+
+        def came(answer: PlanView | NoPlan | None) -> None:
+            if surface != key(self._session.spec, "truth"):
+                return
+            self._surface = surface
+            if isinstance(answer, PlanView):
+                self._load(answer)
+            else:
+                self._status.content = (
+                    STOPPED if answer is None else Markdown("**No plan**: {}.").format(answer.sentence)
+                )
+
+        self._session.side_job("network.planning.plan_job:plan_job", request, on_end=came)
+
+    def _load(self, plan: PlanView) -> None:
+        """Show a plan."""
+        ghosts = plan.ghosts.ghosts
+        self._plan, self._row, self._arrivals = plan, 0, plan.arrivals
+        self._poses = [_pose_of(one.T_world_camera) for one in ghosts]
+        self._drawn.draw([one.T_world_camera for one in ghosts], plan.fov_rad, plan.aspect, plan.targets_m)
+        self._about.content = DRAG
+        self._chosen.options = tuple(f"new {row}" for row in range(1, len(ghosts) + 1))
+        self._chosen.value = "new 1"
+        self._chosen.visible = len(ghosts) > 1
+        self._files.options = tuple(
+            offer.label for offer in plan_offers(plan.request, plan.request.sent, (), "").files
+        )
+        self._files.visible = True
+        self._show(plan.ghosts)
+        self._look()
+
+    def _show(self, ghosts: GhostsView) -> None:
+        """Show the promises of the ghosts, and what they would newly see."""
+        plan, self._ghosts = self._plan, ghosts
+        if plan is None:
+            return
+        self._status.content = summary(plan, ghosts)
+        self._table.content = ghost_table(ghosts, self._arrivals)
+        self._drawn.show_newly([one.newly for one in ghosts.ghosts])
+        self._taking.offer(self._poses[self._row], plan.request.sensor)
+
+    @property
+    def _where(self) -> Poses:
+        return tuple(self._poses)
+
+    @property
+    def _sent_now(self) -> Sent:
+        """How the images travel by the screen's settings now."""
+        assert self._plan is not None
+        return self._session.spec.sent or self._plan.request.sent
+
+    # A dragged ghost.
+
+    def _clicked(self, row: int) -> None:
+        self._ui.post(self._choose_row, row)
+
+    def _choose_row(self, row: int) -> None:
+        self._chosen.value = f"new {row + 1}"
+        self._choose()
+
+    def _choose(self) -> None:
+        """Give arrows and picture to the ghost of the list."""
+        row = self._chosen.options.index(self._chosen.value)
+        if self._ghosts is None or row == self._row:
+            return
+        self._row = row
+        self._drawn.choose(row)
+        self._show(self._ghosts)
+        self._look()
+
+    def _dragged(self, row: int, T_world_camera: FloatArray, ended: bool) -> None:
+        """Note a dragged ghost's pose, on the thread of the browser's messages."""
+        self._ui.post(self._moved, self._plan, row, T_world_camera, ended)
+
+    def _moved(self, plan: PlanView | None, row: int, T_world_camera: FloatArray, ended: bool) -> None:
+        """Move a ghost; judge it as soon as the last judgement is there, and at the end send its image."""
+        if plan is None or plan is not self._plan:
+            return
+        self._poses[row] = _pose_of(T_world_camera)
+        self._drawn.stand(row, T_world_camera)
+        self._stale, self._arrivals = True, ()
+        self._caption.content = BEFORE
+        if not self._judging:
+            self._judge()
+        if ended:
+            self._look()
+
+    def _judge(self) -> None:
+        """Request the promises of the ghosts where they are; only one request is under way."""
+        plan = self._plan
+        if plan is None:
+            return
+        self._judging, self._stale = True, False
+
+        def came(ghosts: GhostsView | None) -> None:
+            self._judging = False
+            if plan is not self._plan:
+                return
+            if ghosts is not None:
+                self._show(ghosts)
+            if self._stale:
+                self._judge()
+
+        job = "network.planning.drag_job:drag_job"
+        self._session.quick_job(job, plan.request, self._where, on_end=came)
+
+    def _look(self) -> None:
+        """Request the chosen ghost's picture, and the times at which all images arrive."""
+        plan, where, row = self._plan, self._where, self._row
+        if plan is None:
+            return
+        self._looked = self._sent_now
+
+        def came(look: LookView | None) -> None:
+            if plan is not self._plan or look is None or (where, row) != (self._where, self._row):
+                return
+            self._arrivals = look.arrivals
+            self._picture.image, self._picture.visible = look.picture, True
+            self._caption.content = PICTURE
+            self._bars.content = delivery_bars(look.arrivals, plan.request.deadline_s)
+            if self._ghosts is not None:
+                self._table.content = ghost_table(self._ghosts, look.arrivals)
+
+        job = "network.planning.look_job:look_job"
+        self._session.quick_job(job, plan.request, self._sent_now, where, row, on_end=came)
+
+    # Files.
+
+    def _save(self, label: str, client: viser.ClientHandle | None) -> None:
+        """Send a file of the plan to the browser that asked for it."""
+        offer = next((one for offers in self.offers() for one in offers.files if one.label == label), None)
+        if offer is None or client is None:
+            return
+
+        def send(content: bytes | None) -> None:
+            if content is not None:
+                client.send_file_download(offer.file, content, save_immediately=True)
+
+        self._session.side_job(offer.job, *offer.arguments, on_end=send)
+
+
+def _pose_of(T_world_camera: FloatArray) -> Pose:
+    return tuple(np.asarray(T_world_camera, float).ravel().tolist())

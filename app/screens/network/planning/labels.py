@@ -1,0 +1,61 @@
+"""Names of sensors and places, and texts of the folder *Plan*."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from app.web.markup import Markdown
+
+SENSORS: Mapping[str, str] = MappingProxyType(
+    {
+        "as-present": "As the present ones",
+        "kinect-v1": "Kinect v1",
+        "kinect-v2": "Kinect v2",
+        "azure-kinect": "Azure Kinect",
+        "realsense-d435": "RealSense D435",
+    }
+)
+"""Titles of ``pipeline.planning.sensors.sensor_names``."""
+WHERES: Mapping[str, str] = MappingProxyType(
+    {"walls": "On walls", "ceiling": "On the ceiling", "furniture": "On furniture", "tripods": "On tripods"}
+)
+"""Titles of ``pipeline.planning.places.WHERES``, whose libraries the server process does not load."""
+STANDS_ON: Mapping[str, str] = MappingProxyType(
+    {
+        "walls": "wall",
+        "ceiling": "ceiling",
+        "furniture": "furniture",
+        "tripods": "tripod",
+        "by hand": "by hand",
+    }
+)
+RENDERED = ("as-present", "kinect-v1")
+"""Sensors that the demo rooms can be rendered with: the model of their sensor is that of a Kinect v1."""
+
+TEXT = Markdown(
+    """Where would the next cameras stand best? The planner judges up to 500 free places by what a camera
+there would newly measure; pink ghosts show the best. Walls found in the surface damp the radio like brick."""
+)
+NONE_YET = Markdown("No plan yet.")
+PLANNING = Markdown("Planning; the bar at the top shows the progress. *Cancel* stops it.")
+STOPPED = Markdown("The planning was stopped or replaced; press *Suggest* again.")
+DRAG = Markdown(
+    """**Drag a ghost by its arrows and rings**: promise and pink points follow. When you let go, its picture
+and the time of its image follow, too."""
+)
+PICTURE = Markdown(
+    "What it would see, on the surface known today. Green: newly measured, the stronger the likelier; "
+    "violet: guessed surface; red: no surface known."
+)
+BEFORE = Markdown(
+    "**Picture and bars are still those of the place before**; they follow when you let go of the ghost."
+)
+TAKING = Markdown(
+    "The room is rendered from there and reconstructed again; this takes half a minute or more."
+)
+NO_TRUTH = Markdown("*Take it* renders demo rooms, whose truth is known; this scene is not one of them.")
+OTHER_SENSOR = Markdown(
+    "*Take it* renders demo rooms with a Kinect v1; choose that sensor, or *As the present ones*."
+)
+NOT_TAKEN = Markdown("The camera was not added: the computation was stopped or failed.")
