@@ -12,6 +12,7 @@ from pipeline.kernels import geometry
 from pipeline.nodes import NodeClouds
 from pipeline.placement.agreement import NOTHING_SHARED, Agreement
 from pipeline.placement.attempt import Attempt, attempt_given
+from pipeline.placement.given import given_edges, is_loose, loose_nodes, with_given_poses
 from pipeline.placement.outcome import NodeAgreement, NodeRegistration, NodeVerdict, Placement
 from pipeline.placement.pairs import given_pairs
 from pipeline.placement.samples import NodeSample, both_ways, sample_of, shared_view
@@ -58,13 +59,18 @@ def place_nodes(
     edges = [attempt.edge for attempt in tried if attempt.edge is not None]
     reference, group = _reference(known, edges)
     graph = solve_pose_graph([sample.graph_points_m for sample in samples], edges, reference)
-    poses = _poses(frames, graph.T_reference_node, reference, group, tried)
     held = [edge for edge, used in zip(edges, graph.used, strict=True) if used]
+    loose = loose_nodes(graph, held, reference)
+    if any(is_loose(edge) for edge in held):
+        given = given_edges([frame.T_world_camera for frame in frames], known, graph, reference)
+        graph = with_given_poses(graph, held, given, reference)
+        held += given
+    poses = _poses(frames, graph.T_reference_node, reference, group, tried)
     covariances = motion_covariances(graph.T_reference_node, held, reference)
     to_world = adjoint(poses[reference])
     agreements = dict(_agreements(samples, poses, group))
     names = [node.name for node in nodes]
-    verdicts = verdicts_of(names, known, group, agreements, tried)
+    verdicts = verdicts_of(names, known, group, agreements, tried, [node for node in loose if known[node]])
     return Placement(
         tuple(_registrations(names, tried, graph)),
         tuple(poses),

@@ -14,6 +14,7 @@ from pipeline.placement.attempt import (
     Attempt,
     less,
 )
+from pipeline.placement.given import LOOSE
 from pipeline.placement.outcome import NodeVerdict
 
 
@@ -23,6 +24,7 @@ def verdicts_of(
     group: Sequence[int],
     agreements: dict[tuple[int, int], Agreement],
     tried: Sequence[Attempt],
+    loose: Sequence[int] = (),
 ) -> list[NodeVerdict]:
     """Return the verdict on each node.
 
@@ -35,6 +37,7 @@ def verdicts_of(
         group: numbers of the nodes that are placed relative to each other.
         agreements: agreement of each pair (source, target) of the group at the final poses.
         tried: all registrations, which give the reason for a node outside the group.
+        loose: nodes whose given pose counts where the registrations leave their place open.
     """
 
     shared: list[list[tuple[int, Agreement]]] = [[] for _ in names]
@@ -70,6 +73,8 @@ def verdicts_of(
                 f"{name} has a pose that no other placed camera confirms: each measured less than "
                 f"{100.0 * LEAST_OVERLAP:.0f} % of what it sees"
             )
+        elif index in loose:
+            sentence = LOOSE.format(name)
         verdicts.append(NodeVerdict(name, index in placed, found, sentence))
     return verdicts
 
