@@ -30,6 +30,8 @@ LORA_PAYLOAD_BYTES = {7: 222, 8: 222, 9: 115, 10: 51, 11: 51, 12: 51}
 
 STARS: tuple[MacKind, ...] = ("lora", "ble", "lte-m", "nb-iot")
 """Medium accesses whose nodes reach only the sink: no node forwards for another one."""
+NO_DOWNLINK: tuple[MacKind, ...] = ("ble", "lte-m", "nb-iot")
+"""Medium accesses whose model carries packets to the sink only."""
 ANY_DISTANCE: tuple[MacKind, ...] = ("serial", "replay", "lte-m", "nb-iot")
 """Medium accesses that connect a node and the sink wherever they are; an operator's cell covers all nodes."""
 
@@ -186,6 +188,11 @@ class NodesConfig:
     """Size of the depth image that is sent after each colour image, as part of it; 0 sends none."""
     bytes_by_node: tuple[int, ...] = ()
     """Size of each node's own image, depth included; empty gives every node both sizes above."""
+    first_bytes_by_node: tuple[int, ...] = ()
+    """Bytes of its image that each node sends first; it sends the others when the sink requests them, which
+    has then these of all nodes. Empty: nodes send their whole images without a request."""
+    request_bytes_by_node: tuple[int, ...] = ()
+    """Bytes of the sink's request to each node, without its header, if nodes wait for one."""
     payload_bytes: int = 116
     """Bytes that a packet hands to the medium access."""
     header_bytes: int = 0
@@ -226,14 +233,38 @@ class NodesConfig:
         nodes = f"nodes.count is {self.count}"
         places = f"x and y of each node and of the sink ({nodes})"
         one_each("nodes.places_m", self.places_m, 2 * (self.count + 1), places)
-        one_each("nodes.bytes_by_node", self.bytes_by_node, self.count, f"one size for each node ({nodes})")
+        for key in ("bytes_by_node", "first_bytes_by_node", "request_bytes_by_node"):
+            one_each(f"nodes.{key}", getattr(self, key), self.count, f"one size for each node ({nodes})")
         finite("nodes.places_m", self.places_m, "metres")
         at_least("nodes.bytes_by_node", min(self.bytes_by_node, default=1), 1)
+        self._check_requests()
         if self.header_bytes >= self.payload_bytes:
             raise InputError(
                 f"nodes.header_bytes is {self.header_bytes}, which leaves no room for data in a payload of "
                 f"{self.payload_bytes} bytes; try a larger nodes.payload_bytes"
             )
+
+    def _check_requests(self) -> None:
+        """Check the sizes of what nodes send before a request, and of the requests."""
+        first = self.first_bytes_by_node
+        at_least("nodes.first_bytes_by_node", min(first, default=1), 1)
+        at_least("nodes.request_bytes_by_node", min(self.request_bytes_by_node, default=0), 0)
+        if bool(first) != bool(self.request_bytes_by_node):
+            raise InputError(
+                "nodes.first_bytes_by_node and nodes.request_bytes_by_node belong together: nodes wait for "
+                "requests that have a size; try both or neither"
+            )
+        if first and self.images != 1:
+            raise InputError(
+                f"nodes.images is {self.images}, but nodes that wait for a request "
+                "(nodes.first_bytes_by_node) have one image each; try nodes.images=1"
+            )
+        for node, first_bytes in enumerate(first):
+            if first_bytes > self.size_bytes(node):
+                raise InputError(
+                    f"nodes.first_bytes_by_node has {first_bytes} for node {node + 1}, whose image has "
+                    f"{self.size_bytes(node)} bytes; try at most these"
+                )
 
     def size_bytes(self, node: int) -> int:
         """Return the bytes of one image of a node, depth image included."""
@@ -343,6 +374,13 @@ class NetworkConfig:
             key, size_bytes = "scheme.datagram_bytes", self.scheme.datagram_bytes + self.scheme.headers_bytes
         else:
             key, size_bytes = "nodes.payload_bytes", self.nodes.payload_bytes
+        confirmed = self.mac.kind == "lora" and self.mac.ack
+        if self.nodes.first_bytes_by_node and (self.mac.kind in NO_DOWNLINK or confirmed):
+            raise InputError(
+                f"mac.kind is {self.mac.kind}{' with mac.ack' if confirmed else ''}, by which the sink sends "
+                "nodes no requests here, but nodes.first_bytes_by_node makes them wait for one; try "
+                f"{'mac.ack=false' if confirmed else 'mac.kind=ieee802154'}"
+            )
         most = self.mac.max_payload_bytes
         capture_db = self.radio.capture_db
         if self.mac.kind in ("ieee80211b", "lora") and capture_db is not None and capture_db < 0.0:

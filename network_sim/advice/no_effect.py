@@ -168,10 +168,11 @@ def _of_nodes(config: NetworkConfig) -> Reasons:
         yield ("nodes.deadline_s",), "the run stops at run.horizon_s, before an image can be that old"
     if kind in ("serial", "ble", *CELLULAR) and not _loses(config):
         yield ("nodes.retransmit",), "no packet gets lost"
-    requests = nodes.retransmit and kind == "replay" and not config.mac.ack
+    statuses = nodes.retransmit and kind == "replay" and not config.mac.ack
+    requests = statuses or bool(nodes.first_bytes_by_node)
     if kind in ANY_DISTANCE and not nodes.failures_per_h and not requests:
         yield ("energy.rx_w",), "no camera receives anything"
-    if kind == "lora" and not config.mac.ack and not nodes.retransmit:
+    if kind == "lora" and not config.mac.ack and not nodes.retransmit and not nodes.first_bytes_by_node:
         yield ("energy.rx_w",), "no camera receives anything"
     if uplink.trace is not None:
         yield ("uplink.rate_bps", "uplink.latency_s", "uplink.loss"), "uplink.trace replaces it"
