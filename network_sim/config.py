@@ -193,6 +193,8 @@ class NodesConfig:
     has then these of all nodes. Empty: nodes send their whole images without a request."""
     request_bytes_by_node: tuple[int, ...] = ()
     """Bytes of the sink's request to each node, without its header, if nodes wait for one."""
+    request_after_s: float = 1.0
+    """Time that the sink computes before it sends these requests."""
     payload_bytes: int = 116
     """Bytes that a packet hands to the medium access."""
     header_bytes: int = 0
@@ -215,7 +217,7 @@ class NodesConfig:
 
     def __post_init__(self) -> None:
         at_least("nodes.count", self.count, 1)
-        for key in ("images", "interval_s", "depth_bytes", "header_bytes", "failures_per_h"):
+        for key in ("images", "interval_s", "request_after_s", "depth_bytes", "header_bytes", "failures_per_h"):
             at_least(f"nodes.{key}", getattr(self, key), 0)
         for key in ("image_bytes", "payload_bytes", "buffer_packets"):
             at_least(f"nodes.{key}", getattr(self, key), 1)

@@ -158,6 +158,8 @@ def _of_nodes(config: NetworkConfig) -> Reasons:
         yield _PLACES, f"mac.kind is {kind}, which connects nodes at any distance; only drawings show it"
     if nodes.bytes_by_node:
         yield ("nodes.image_bytes", "nodes.depth_bytes"), "nodes.bytes_by_node has the size of each image"
+    if not nodes.first_bytes_by_node:
+        yield ("nodes.request_after_s",), "nodes.first_bytes_by_node is empty, so the sink requests nothing"
     if nodes.duty_cycle == 1.0:
         yield ("nodes.duty_period_s",), "nodes.duty_cycle is 1, so nodes never sleep"
     if not nodes.failures_per_h:

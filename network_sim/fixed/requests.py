@@ -14,7 +14,7 @@ import simpy
 
 from network_sim.fixed.images import Image, request_packets_bytes
 from network_sim.fixed.nodes import Shared, Station
-from network_sim.types import Cause, Packet, PacketKind
+from network_sim.types import Cause, Packet, PacketKind, to_ns
 
 MOST_SILENCES = 4
 """Times ``Shared.status_after_ns`` without new first bytes after which the sink decides without those that
@@ -32,7 +32,7 @@ class Requests:
         """Start waiting; ``station`` sends the requests."""
         self._shared, self._station = shared, station
         self._awaited = set(range(shared.config.count)) - set(shared.unreachable)
-        self._decided = False
+        self._decided = self._requesting = False
         self._last_news_ns = -1
         self._requested_ns: dict[int, int] = {}
         """Time of the newest request, by image."""
@@ -53,7 +53,7 @@ class Requests:
             self._last_news_ns = now_ns
         if not image.at_sink.missing(image.first_count):
             self._awaited.discard(image.node)
-        if self._decided:
+        if self._requesting:
             self._request(image)
         elif not self._awaited:
             self._decide()
@@ -70,7 +70,14 @@ class Requests:
             yield shared.env.timeout(most_ns - silent_ns)
 
     def _decide(self) -> None:
-        self._decided = True
+        if not self._decided:
+            self._decided = True
+            self._shared.env.process(self._request_all())
+
+    def _request_all(self) -> Generator[simpy.Event, Any, None]:
+        """Compute the requests and send them, as a process."""
+        yield self._shared.env.timeout(to_ns(self._shared.config.request_after_s))
+        self._requesting = True
         for image in self._shared.book.images:
             self._request(image)
 

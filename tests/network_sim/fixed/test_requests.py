@@ -7,7 +7,7 @@ from network_sim.metrics.arrivals import arrivals
 from network_sim.presets import PRESETS
 from network_sim.simulate import simulate
 from network_sim.trace.conservation import image_balance
-from network_sim.types import Cause, EventKind, PacketKind
+from network_sim.types import Cause, EventKind, PacketKind, to_ns
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings
 
@@ -39,7 +39,7 @@ def requests(trace, kind=EventKind.RECEIVE):
     ],
 )
 def test_the_others_follow_the_request_that_follows_the_first_bytes_of_all(preset, settings):
-    trace = run(*settings, *WAITING, preset=preset)
+    trace = run(*settings, *WAITING, "nodes.request_after_s=0.5", preset=preset)
     came = arrivals(trace)
     assert [int(came.byte_count[came.node == node].sum()) for node in range(3)] == [9000, 8000, 7000]
     data_bytes = trace.config.nodes.payload_bytes - trace.config.nodes.header_bytes
@@ -47,7 +47,7 @@ def test_the_others_follow_the_request_that_follows_the_first_bytes_of_all(prese
     early = came.first_byte < first[came.node]
     asked = requests(trace, EventKind.ENQUEUE)
     begun_ns = asked.t_ns[asked.node == len(FIRST)].min()
-    assert came.t_ns[early].max() <= begun_ns
+    assert came.t_ns[early].max() <= begun_ns - to_ns(0.5)
     answered = requests(trace)
     frames = trace.events.where(trace.events.packet_kind == PacketKind.IMAGE).of(EventKind.AIR)
     for node in range(3):
@@ -82,7 +82,7 @@ def test_where_nothing_is_sent_again_the_sink_decides_after_a_silence_and_every_
     came, asked = arrivals(trace), requests(trace, EventKind.ENQUEUE)
     first_ns = asked.t_ns.min()
     before = came.t_ns[came.t_ns < first_ns]
-    assert first_ns - before.max() >= 2_000_000_000
+    assert first_ns - before.max() >= 2_000_000_000 + to_ns(trace.config.nodes.request_after_s)
     assert came.t_ns.max() > first_ns
 
 
