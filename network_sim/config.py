@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from network_sim.bounds.limits import LARGEST_S, check_limits
+from network_sim.bounds.requests import check_requests
 from network_sim.settings.street import SchemeConfig, StreetConfig
 from packetmesh.checks import above, at_least, finite, one_each, one_of, several, share
 from packetmesh.errors import InputError
@@ -217,7 +218,14 @@ class NodesConfig:
 
     def __post_init__(self) -> None:
         at_least("nodes.count", self.count, 1)
-        for key in ("images", "interval_s", "request_after_s", "depth_bytes", "header_bytes", "failures_per_h"):
+        for key in (
+            "images",
+            "interval_s",
+            "request_after_s",
+            "depth_bytes",
+            "header_bytes",
+            "failures_per_h",
+        ):
             at_least(f"nodes.{key}", getattr(self, key), 0)
         for key in ("image_bytes", "payload_bytes", "buffer_packets"):
             at_least(f"nodes.{key}", getattr(self, key), 1)
@@ -239,34 +247,13 @@ class NodesConfig:
             one_each(f"nodes.{key}", getattr(self, key), self.count, f"one size for each node ({nodes})")
         finite("nodes.places_m", self.places_m, "metres")
         at_least("nodes.bytes_by_node", min(self.bytes_by_node, default=1), 1)
-        self._check_requests()
+        sizes = [self.size_bytes(node) for node in range(len(self.first_bytes_by_node))]
+        check_requests(self.first_bytes_by_node, self.request_bytes_by_node, sizes, self.images)
         if self.header_bytes >= self.payload_bytes:
             raise InputError(
                 f"nodes.header_bytes is {self.header_bytes}, which leaves no room for data in a payload of "
                 f"{self.payload_bytes} bytes; try a larger nodes.payload_bytes"
             )
-
-    def _check_requests(self) -> None:
-        """Check the sizes of what nodes send before a request, and of the requests."""
-        first = self.first_bytes_by_node
-        at_least("nodes.first_bytes_by_node", min(first, default=1), 1)
-        at_least("nodes.request_bytes_by_node", min(self.request_bytes_by_node, default=0), 0)
-        if bool(first) != bool(self.request_bytes_by_node):
-            raise InputError(
-                "nodes.first_bytes_by_node and nodes.request_bytes_by_node belong together: nodes wait for "
-                "requests that have a size; try both or neither"
-            )
-        if first and self.images != 1:
-            raise InputError(
-                f"nodes.images is {self.images}, but nodes that wait for a request "
-                "(nodes.first_bytes_by_node) have one image each; try nodes.images=1"
-            )
-        for node, first_bytes in enumerate(first):
-            if first_bytes > self.size_bytes(node):
-                raise InputError(
-                    f"nodes.first_bytes_by_node has {first_bytes} for node {node + 1}, whose image has "
-                    f"{self.size_bytes(node)} bytes; try at most these"
-                )
 
     def size_bytes(self, node: int) -> int:
         """Return the bytes of one image of a node, depth image included."""

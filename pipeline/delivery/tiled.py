@@ -107,8 +107,8 @@ class Tiled:
         """Decode as ``Coding.decode``; an incomplete depth tile gives the depths before its first gap.
 
         Bytes that are damaged, or another tile's, are noticed in the protected part, and in 255 of 256 tiles
-        that are whole; they count as lost. The first bytes of a tile that is cut have no check. Of a tile that
-        the node leaves out, as in ``joined``, there is what the base layer has.
+        that are whole; they count as lost. The first bytes of a tile that is cut have no check. Of a tile
+        that the node leaves out, as in ``joined``, there is what the base layer has.
 
         Raises:
             InputError: the depths are of another version of the coding.
