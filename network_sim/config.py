@@ -158,6 +158,11 @@ class MacConfig:
             raise InputError("mac.kind is replay, but of which recorded link? Try mac.trace=FILE")
 
     @property
+    def reaches_nodes(self) -> bool:
+        """Whether the sink can send nodes packets of its own in this model."""
+        return self.kind not in NO_DOWNLINK and not (self.kind == "lora" and self.ack)
+
+    @property
     def max_payload_bytes(self) -> int | None:
         """Largest payload of a frame; None if every size is possible."""
         if self.kind == "lora":
@@ -363,8 +368,8 @@ class NetworkConfig:
             key, size_bytes = "scheme.datagram_bytes", self.scheme.datagram_bytes + self.scheme.headers_bytes
         else:
             key, size_bytes = "nodes.payload_bytes", self.nodes.payload_bytes
-        confirmed = self.mac.kind == "lora" and self.mac.ack
-        if self.nodes.first_bytes_by_node and (self.mac.kind in NO_DOWNLINK or confirmed):
+        if self.nodes.first_bytes_by_node and not self.mac.reaches_nodes:
+            confirmed = self.mac.kind == "lora"
             raise InputError(
                 f"mac.kind is {self.mac.kind}{' with mac.ack' if confirmed else ''}, by which the sink sends "
                 "nodes no requests here, but nodes.first_bytes_by_node makes them wait for one; try "

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from network_sim.config import NO_DOWNLINK, NetworkConfig
+from network_sim.config import NetworkConfig
 from network_sim.metrics.requests import Requested, requested
 from network_sim.simulate import simulate
 from network_sim.trace.log import NetworkTrace
@@ -103,7 +103,7 @@ def check_can_leave_out(coding: str, network: NetworkConfig) -> None:
             f"{coding}; try --coding {ONLY_CODING}"
         )
     kind = network.mac.kind
-    if kind in NO_DOWNLINK or (kind == "lora" and network.mac.ack):
+    if not network.mac.reaches_nodes:
         confirmed = " with mac.ack=true" if kind == "lora" else ""
         raise InputError(
             f"Over {kind}{confirmed} the sink sends nodes no packets in this model, so it cannot tell them "
@@ -138,7 +138,7 @@ def send_without_seen(
     if len(senders) < 2:
         raise InputError(
             "Only one camera sends images, so no other camera can have shown its tiles; add a camera, or "
-            "leave out --leave-out-seen"
+            "send all tiles"
         )
     packet_bytes = network.nodes.payload_bytes - network.nodes.header_bytes
     nodes = [_sender(rig, coding, node) for node in range(len(rig.frames))]
