@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from network_sim.bounds.limits import LARGEST_S, check_limits
+from network_sim.bounds.requests import check_requests
 from network_sim.settings.street import SchemeConfig, StreetConfig
 from packetmesh.checks import above, at_least, finite, one_each, one_of, several, share
 from packetmesh.errors import InputError
@@ -30,6 +31,8 @@ LORA_PAYLOAD_BYTES = {7: 222, 8: 222, 9: 115, 10: 51, 11: 51, 12: 51}
 
 STARS: tuple[MacKind, ...] = ("lora", "ble", "lte-m", "nb-iot")
 """Medium accesses whose nodes reach only the sink: no node forwards for another one."""
+NO_DOWNLINK: tuple[MacKind, ...] = ("ble", "lte-m", "nb-iot")
+"""Medium accesses whose model carries packets to the sink only."""
 ANY_DISTANCE: tuple[MacKind, ...] = ("serial", "replay", "lte-m", "nb-iot")
 """Medium accesses that connect a node and the sink wherever they are; an operator's cell covers all nodes."""
 
@@ -155,6 +158,11 @@ class MacConfig:
             raise InputError("mac.kind is replay, but of which recorded link? Try mac.trace=FILE")
 
     @property
+    def reaches_nodes(self) -> bool:
+        """Whether the sink can send nodes packets of its own in this model."""
+        return self.kind not in NO_DOWNLINK and not (self.kind == "lora" and self.ack)
+
+    @property
     def max_payload_bytes(self) -> int | None:
         """Largest payload of a frame; None if every size is possible."""
         if self.kind == "lora":
@@ -186,6 +194,13 @@ class NodesConfig:
     """Size of the depth image that is sent after each colour image, as part of it; 0 sends none."""
     bytes_by_node: tuple[int, ...] = ()
     """Size of each node's own image, depth included; empty gives every node both sizes above."""
+    first_bytes_by_node: tuple[int, ...] = ()
+    """Bytes of its image that each node sends first; it sends the others when the sink requests them, which
+    has then these of all nodes. Empty: nodes send their whole images without a request."""
+    request_bytes_by_node: tuple[int, ...] = ()
+    """Bytes of the sink's request to each node, without its header, if nodes wait for one."""
+    request_after_s: float = 1.0
+    """Time that the sink computes before it sends these requests."""
     payload_bytes: int = 116
     """Bytes that a packet hands to the medium access."""
     header_bytes: int = 0
@@ -208,7 +223,14 @@ class NodesConfig:
 
     def __post_init__(self) -> None:
         at_least("nodes.count", self.count, 1)
-        for key in ("images", "interval_s", "depth_bytes", "header_bytes", "failures_per_h"):
+        for key in (
+            "images",
+            "interval_s",
+            "request_after_s",
+            "depth_bytes",
+            "header_bytes",
+            "failures_per_h",
+        ):
             at_least(f"nodes.{key}", getattr(self, key), 0)
         for key in ("image_bytes", "payload_bytes", "buffer_packets"):
             at_least(f"nodes.{key}", getattr(self, key), 1)
@@ -226,9 +248,12 @@ class NodesConfig:
         nodes = f"nodes.count is {self.count}"
         places = f"x and y of each node and of the sink ({nodes})"
         one_each("nodes.places_m", self.places_m, 2 * (self.count + 1), places)
-        one_each("nodes.bytes_by_node", self.bytes_by_node, self.count, f"one size for each node ({nodes})")
+        for key in ("bytes_by_node", "first_bytes_by_node", "request_bytes_by_node"):
+            one_each(f"nodes.{key}", getattr(self, key), self.count, f"one size for each node ({nodes})")
         finite("nodes.places_m", self.places_m, "metres")
         at_least("nodes.bytes_by_node", min(self.bytes_by_node, default=1), 1)
+        sizes = [self.size_bytes(node) for node in range(len(self.first_bytes_by_node))]
+        check_requests(self.first_bytes_by_node, self.request_bytes_by_node, sizes, self.images)
         if self.header_bytes >= self.payload_bytes:
             raise InputError(
                 f"nodes.header_bytes is {self.header_bytes}, which leaves no room for data in a payload of "
@@ -343,6 +368,13 @@ class NetworkConfig:
             key, size_bytes = "scheme.datagram_bytes", self.scheme.datagram_bytes + self.scheme.headers_bytes
         else:
             key, size_bytes = "nodes.payload_bytes", self.nodes.payload_bytes
+        if self.nodes.first_bytes_by_node and not self.mac.reaches_nodes:
+            confirmed = self.mac.kind == "lora"
+            raise InputError(
+                f"mac.kind is {self.mac.kind}{' with mac.ack' if confirmed else ''}, by which the sink sends "
+                "nodes no requests here, but nodes.first_bytes_by_node makes them wait for one; try "
+                f"{'mac.ack=false' if confirmed else 'mac.kind=ieee802154'}"
+            )
         most = self.mac.max_payload_bytes
         capture_db = self.radio.capture_db
         if self.mac.kind in ("ieee80211b", "lora") and capture_db is not None and capture_db < 0.0:

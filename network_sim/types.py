@@ -34,7 +34,8 @@ class PacketKind(IntEnum):
     SUMMARY = 1
     """Tags of images that a node offers."""
     REQUEST = 2
-    """Ids of images that the collector asks for."""
+    """What the collector asks for: ids of images, or in a collection the parts that follow an image's first
+    bytes."""
     STATUS = 3
     """Which fragments of an image the sink is missing."""
 

@@ -45,6 +45,7 @@ def deliver(
     coding: str = "exact",
     moments: int = 40,
     config: PipelineConfig = PRESETS["packetmesh"],
+    leave_out_seen: bool = False,
 ) -> Delivery:
     """Send a rig's images through a network and rebuild the scene from what has arrived at each moment.
 
@@ -54,6 +55,8 @@ def deliver(
         coding: name in ``pipeline.delivery.CODINGS``, which decides how images become bytes.
         moments: number of moments at which the scene is rebuilt, after equal shares of the bytes that arrive.
         config: settings of the reconstruction.
+        leave_out_seen: whether every node first sends a coarse image, and then leaves out the tiles of which
+            the sink tells it that another camera shows them; with the coding ``exact`` and two nodes or more.
 
     Returns:
         The moments in order of time, with surfaces in metres, times in seconds and energies in joules.
@@ -68,8 +71,9 @@ def deliver(
     >>> [moment.surface is not None for moment in result.moments]
     [False, True]
     """
+    spec = Spec(LoadedRig(rig), config=config)
     return drain(
-        iterate_delivery(DeliverySpec(Spec(LoadedRig(rig), config=config), network, coding, moments))
+        iterate_delivery(DeliverySpec(spec, network, coding, moments, leave_out_seen=leave_out_seen))
     )
 
 

@@ -26,6 +26,7 @@ def deliver(
     moments: int = 40,
     link_trace: Path | None = None,
     down: tuple[str, ...] = (),
+    leave_out_seen: bool = False,
     chain: PresetName = "packetmesh",
     set: Settings = (),
     json: bool = False,
@@ -43,6 +44,8 @@ def deliver(
         link_trace: A recorded link over which every node sends: columns (s, Mbit/s, round trip ms, loss
             share), a mahimahi trace, or the output of iperf3 --json.
         down: Names of nodes that have failed and send nothing, for example node_02.
+        leave_out_seen: Leave out tiles that another camera shows. Every node first sends a coarse image; by
+            these the sink tells each node its tiles. Needs the coding exact and two cameras.
         chain: Settings of the reconstruction to start from.
         set: Settings of the network or the reconstruction, for example
             `--set nodes.retransmit=false loss.share=0.1 loss.burst_packets=8`.
@@ -57,7 +60,12 @@ def deliver(
     from packetmesh.files import writable_folder
     from pipeline.deliver import iterate_delivery
     from pipeline.delivery.sending import DeliverySpec
-    from pipeline.folders.delivery import delivery_metrics, summary, write_delivery_folder
+    from pipeline.folders.delivery import (
+        delivery_metrics,
+        left_out_sentences,
+        summary,
+        write_delivery_folder,
+    )
     from pipeline.folders.run import check_run_folder, clear_run_folder
     from pipeline.spec import Spec
     from pipeline.stages import RunCache, compute
@@ -67,7 +75,7 @@ def deliver(
     if link_trace is not None:
         network = _with_link(network, link_trace, of_network)
     say_network(network, before, preset, of_network, {})
-    delivery_spec = DeliverySpec(Spec(source, chain, config), network, coding, moments, down)
+    delivery_spec = DeliverySpec(Spec(source, chain, config), network, coding, moments, down, leave_out_seen)
     cache = RunCache()
     drain(compute(delivery_spec.spec, "rig", cache), say_progress)
     steps = iterate_delivery(delivery_spec, min(2, os.cpu_count() or 1), cache)
@@ -81,6 +89,8 @@ def deliver(
     page = write_hand_out(delivery, out)
     write_delivery_folder(delivery, metrics, preset, out)
     say(f"100%  {summary(delivery)}; see {page}")
+    for sentence in left_out_sentences(delivery.sending):
+        say(sentence)
     for note in (*imported_notes(report), *delivery.sending.rig.notes):
         say(note)
     if json:

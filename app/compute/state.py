@@ -38,6 +38,8 @@ class Sent:
     moments: int = 20
     down: tuple[str, ...] = ()
     """Names of nodes that have failed."""
+    leave_out_seen: bool = False
+    """Whether nodes leave out tiles that another camera shows, which the sink tells them."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from packetmesh.files import atomic_path
 from pipeline.deliver import Delivery
 from pipeline.delivery.moments import Moment
 from pipeline.delivery.sending import Sending, received_at
-from pipeline.folders.delivery import summary
+from pipeline.folders.delivery import left_out_sentences, summary
 
 RECEIVED = "received"
 PAGE, ANIMATION = "delivery.html", "delivery.gif"
@@ -42,7 +42,8 @@ def hand_out_of(delivery: Delivery) -> HandOut:
     return HandOut(
         title=f"{rig.name}: from packets to a surface",
         sentence=f"{_cameras(len(rig.frames))} colour and depth images ({sending.coding.title}); the "
-        f"surface is rebuilt from the data that have arrived. Result: {summary(delivery)}.",
+        f"surface is rebuilt from the data that have arrived. Result: {summary(delivery)}."
+        + "".join(f" {one[0].upper()}{one[1:]}." for one in left_out_sentences(sending)[:1]),
         nodes=tuple(
             HandOutNode(frame.name, frame.intrinsics, pose)
             for frame, pose in zip(rig.frames, poses, strict=True)

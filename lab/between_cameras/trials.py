@@ -18,7 +18,7 @@ from pipeline.delivery.base_points import BaseView
 from pipeline.delivery.base_poses import place_by_base
 from pipeline.delivery.coding import Images
 from pipeline.delivery.left_out import TileBytes, base_view, tile_bytes, without_tiles
-from pipeline.delivery.shared_views import STRICT, Limits, SharedViews, shared_views
+from pipeline.delivery.shared_views import STRICT, Limits, request_bytes, shared_views
 from pipeline.delivery.sink import frame_at_sink, images_of, units_per_m
 from pipeline.placement.outcome import Placement
 from pipeline.sources import LoadedRig
@@ -79,7 +79,7 @@ def ours(limits: Limits | None = None) -> Method:
     def masks(rig: Rig, poses: Sequence[FloatArray]) -> Masks:
         return shared_views(base_views(rig, poses), limits=limits).leave_out
 
-    return Method(masks, lambda _, masks: sum(SharedViews(masks).request_bytes))
+    return Method(masks, lambda _, masks: sum(request_bytes(masks)))
 
 
 def rprr(known: Known, thresholds: Thresholds) -> Method:

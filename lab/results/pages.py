@@ -8,7 +8,17 @@ from collections.abc import Callable, Iterator
 from lab.benchmarks.filling import FLAT, OURS
 from lab.claims.claim import VERDICTS, is_beyond
 from lab.claims.registry import CLAIMS
-from lab.results import codings, completion, measuring, places, planning, recordings, tables, verdicts
+from lab.results import (
+    between_cameras,
+    codings,
+    completion,
+    measuring,
+    places,
+    planning,
+    recordings,
+    tables,
+    verdicts,
+)
 from lab.results.markdown import Row, listed, percent
 from lab.results.record import ROOT, Record, Records, read_records
 from lab.walks.ours import OURS as WALKER
@@ -54,6 +64,7 @@ SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "bench_network": ("The camera network: speed", tables.network_speed),
     "delivery_claims": ("What a lost packet costs: ours, beyond the thesis", tables.our_claims),
     "bench_codings": ("Bytes of a camera's images", codings.codings),
+    "between_cameras": ("Tiles that another camera shows", between_cameras.between_cameras),
     "setting_claims": ("Settings, and what cannot be tested", tables.claims),
     "ns3_saturation": ("The camera network: throughput beside ns-3", tables.ns3_throughput),
 }

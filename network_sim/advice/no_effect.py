@@ -158,6 +158,8 @@ def _of_nodes(config: NetworkConfig) -> Reasons:
         yield _PLACES, f"mac.kind is {kind}, which connects nodes at any distance; only drawings show it"
     if nodes.bytes_by_node:
         yield ("nodes.image_bytes", "nodes.depth_bytes"), "nodes.bytes_by_node has the size of each image"
+    if not nodes.first_bytes_by_node:
+        yield ("nodes.request_after_s",), "nodes.first_bytes_by_node is empty, so the sink requests nothing"
     if nodes.duty_cycle == 1.0:
         yield ("nodes.duty_period_s",), "nodes.duty_cycle is 1, so nodes never sleep"
     if not nodes.failures_per_h:
@@ -168,10 +170,11 @@ def _of_nodes(config: NetworkConfig) -> Reasons:
         yield ("nodes.deadline_s",), "the run stops at run.horizon_s, before an image can be that old"
     if kind in ("serial", "ble", *CELLULAR) and not _loses(config):
         yield ("nodes.retransmit",), "no packet gets lost"
-    requests = nodes.retransmit and kind == "replay" and not config.mac.ack
+    statuses = nodes.retransmit and kind == "replay" and not config.mac.ack
+    requests = statuses or bool(nodes.first_bytes_by_node)
     if kind in ANY_DISTANCE and not nodes.failures_per_h and not requests:
         yield ("energy.rx_w",), "no camera receives anything"
-    if kind == "lora" and not config.mac.ack and not nodes.retransmit:
+    if kind == "lora" and not config.mac.ack and not nodes.retransmit and not nodes.first_bytes_by_node:
         yield ("energy.rx_w",), "no camera receives anything"
     if uplink.trace is not None:
         yield ("uplink.rate_bps", "uplink.latency_s", "uplink.loss"), "uplink.trace replaces it"

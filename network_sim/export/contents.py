@@ -78,7 +78,8 @@ class Contents:
     def _destination(self, row: OnAir) -> int:
         if self._last == NOBODY:
             return row.peer
-        return int(self._cameras[row.image]) if row.packet_kind == PacketKind.STATUS else self._last
+        to_camera = row.packet_kind in (PacketKind.STATUS, PacketKind.REQUEST)
+        return int(self._cameras[row.image]) if to_camera else self._last
 
     def _text(self, row: OnAir, data_bytes: int) -> str:
         name, image, first_byte = self._names[self._sources[row.packet]], row.image, row.first_byte

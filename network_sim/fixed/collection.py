@@ -19,7 +19,7 @@ from network_sim.mac.context import MacContext
 from network_sim.mac.medium import Medium
 from network_sim.radio.places import FixedPlaces, place_nodes
 from network_sim.radio.propagation import Radio
-from network_sim.types import BEGIN_WITHIN_NS, Cause, Delivery, EventKind, Packet, to_ns
+from network_sim.types import BEGIN_WITHIN_NS, Cause, Delivery, EventKind, Packet, PacketKind, to_ns
 
 if TYPE_CHECKING:
     from network_sim.trace.log import Recorder
@@ -134,7 +134,10 @@ class Collection:
             self._sink.receive(packet)
         elif receiver == packet.destination:
             shared.book.received(packet, receiver)
-            self._cameras[receiver].on_status(packet.image, shared.requested.pop(packet.id))
+            if packet.kind is PacketKind.REQUEST:
+                self._cameras[receiver].on_request(packet.image, packet.first_byte)
+            else:
+                self._cameras[receiver].on_status(packet.image, shared.requested.pop(packet.id))
         else:
             self.stations[receiver].put(packet)
 

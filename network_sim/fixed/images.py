@@ -13,9 +13,12 @@ from packetmesh.errors import InputError
 if TYPE_CHECKING:
     import simpy
 
+    from network_sim.config import NodesConfig
     from network_sim.trace.log import Recorder
 
 ImageFormat = Literal["ppm", "pgm", "jpeg", "png"]
+REQUEST_BYTES = 4
+"""Bytes for the image id and the packet's number in each packet of a request."""
 
 
 def ppm_bytes(width_px: int, height_px: int) -> int:
@@ -58,6 +61,13 @@ def encoded_bytes(image: np.ndarray, file_format: ImageFormat, quality: int = 90
     return len(cv2.imencode(f".{file_format}", image, options)[1])
 
 
+def request_packets_bytes(config: NodesConfig, node: int) -> list[int]:
+    """Return the data bytes of each packet of the sink's request to a node."""
+    room = max(1, config.payload_bytes - config.header_bytes - REQUEST_BYTES)
+    whole, rest = divmod(config.request_bytes_by_node[node], room)
+    return [REQUEST_BYTES + size for size in [room] * whole + [rest] * bool(rest or not whole)]
+
+
 class Fragments:
     """The fragments of an image that one node has."""
 
@@ -76,9 +86,9 @@ class Fragments:
         self.missing_count -= 1
         return True
 
-    def missing(self) -> list[int]:
-        """Return the indices of the missing fragments, in rising order."""
-        return [index for index, present in enumerate(self.present) if not present]
+    def missing(self, of_first: int | None = None) -> list[int]:
+        """Return the indices of the missing fragments, or of those among the first, in rising order."""
+        return [index for index, present in enumerate(self.present[:of_first]) if not present]
 
 
 @dataclass(slots=True)
@@ -91,6 +101,8 @@ class Image:
     size_bytes: int
     data_bytes: int
     """Most bytes of the image in one packet."""
+    first_bytes: int = 0
+    """Bytes that its camera sends before it waits for a request; 0 if it waits for none."""
     at_sink: Fragments = field(init=False)
     at_cloud: Fragments = field(init=False)
     packets: int = 0
@@ -111,6 +123,11 @@ class Image:
     def count(self) -> int:
         """Number of fragments of the image."""
         return -(-self.size_bytes // self.data_bytes)
+
+    @property
+    def first_count(self) -> int:
+        """Number of fragments that are sent before a request."""
+        return -(-self.first_bytes // self.data_bytes)
 
     def index_of(self, packet: Packet) -> int:
         """Return the index of the fragment that a packet carries."""
@@ -137,9 +154,9 @@ class Book:
         self._under_way = 0
         self._packets = 0
 
-    def capture(self, node: int, size_bytes: int) -> Image:
-        """Create and record an image that a camera took."""
-        image = Image(len(self.images), node, int(self.env.now), size_bytes, self._data_bytes)
+    def capture(self, node: int, size_bytes: int, first_bytes: int = 0) -> Image:
+        """Create and record an image that a camera took; of it ``first_bytes`` are sent before a request."""
+        image = Image(len(self.images), node, int(self.env.now), size_bytes, self._data_bytes, first_bytes)
         self.images.append(image)
         self._open += 1
         self._recorder.add(image.captured_ns, EventKind.CAPTURE, node, image=image.id, size_bytes=size_bytes)
@@ -167,6 +184,12 @@ class Book:
     def status_packet(self, source: int, destination: int, data_bytes: int, image: int) -> Packet:
         """Create a STATUS packet, with which the sink requests fragments of an image."""
         return self._packet(PacketKind.STATUS, source, destination, data_bytes, image, 0)
+
+    def request_packet(
+        self, source: int, destination: int, data_bytes: int, image: int, number: int
+    ) -> Packet:
+        """Create a packet of the sink's request for what follows an image's first bytes."""
+        return self._packet(PacketKind.REQUEST, source, destination, data_bytes, image, number)
 
     def _packet(
         self, kind: PacketKind, source: int, destination: int, count: int, image: int, first_byte: int

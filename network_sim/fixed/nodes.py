@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ import numpy as np
 import simpy
 
 from network_sim.config import GUARD_S, NodesConfig
-from network_sim.fixed.images import Book, Fragments, Image
+from network_sim.fixed.images import Book, Fragments, Image, request_packets_bytes
 from network_sim.fixed.routing import Routes
 from network_sim.types import NS_PER_S, Cause, Delivery, Packet, PacketKind, to_ns
 
@@ -81,6 +81,8 @@ class Station:
         """Start the sending loop with an empty buffer; a ``Camera`` sets ``camera`` on its own station."""
         self.index = index
         self.camera: Camera | None = None
+        self.on_given_up: Callable[[Packet, Cause], None] | None = None
+        """Called with a packet that was dropped, and why, unless the node believes that it was delivered."""
         self.buffer: deque[Packet] = deque()
         self._shared = shared
         self._idle: simpy.Event | None = None
@@ -205,15 +207,22 @@ class Station:
         if self._is_own_fragment(packet):
             assert self.camera is not None
             self.camera.on_sent(packet, ok, False)
+        elif self.on_given_up is not None and not ok:
+            self.on_given_up(packet, cause)
 
 
 class Outgoing:
     """Sending state of one image at its camera."""
 
-    def __init__(self, image: Image, settled: simpy.Event) -> None:
-        """Start with all fragments unsent; ``settled`` is triggered when no more must be sent."""
+    def __init__(self, image: Image, settled: simpy.Event, request_packets: int = 0) -> None:
+        """Start with all fragments unsent; ``settled`` is triggered when no more must be sent.
+
+        Those after the image's first bytes wait for all packets of a request, if it has any.
+        """
         self.image = image
-        self.to_send = deque(range(image.count))
+        self.requested = Fragments(request_packets)
+        """Packets of the sink's request that have come."""
+        self.to_send = deque(range(self.sendable))
         self.queued: set[int] = set()
         """Fragments in the buffer or on the air."""
         self.confirmed = Fragments(image.count)
@@ -221,6 +230,16 @@ class Outgoing:
         self.settled = settled
         self.last_news_ns = 0
         self.probed = False
+
+    @property
+    def waits(self) -> bool:
+        """Whether the camera waits for the sink's request before it sends more."""
+        return bool(self.requested.missing_count)
+
+    @property
+    def sendable(self) -> int:
+        """Number of fragments that may be sent."""
+        return self.image.first_count if self.waits else self.image.count
 
 
 class Camera:
@@ -268,12 +287,17 @@ class Camera:
             outgoing.confirmed.add(index)
         elif not ok and shared.config.retransmit:
             outgoing.to_send.append(index)
+        self._settle_if_done(outgoing)
+
+    def _settle_if_done(self, outgoing: Outgoing) -> None:
+        """Stop sending an image if nothing of it is left to send, or start to wait for the sink's word."""
+        shared = self._shared
         all_sent = not outgoing.to_send and not outgoing.queued
-        if all_sent and not shared.config.retransmit:
+        if all_sent and not shared.config.retransmit and not outgoing.waits:
             outgoing.image.sending_over = True
             self._settle(outgoing)
             shared.book.give_up_if_lost(outgoing.image)
-        elif not outgoing.confirmed.missing_count:
+        elif not outgoing.confirmed.missing_count and not outgoing.waits:
             self._settle(outgoing)
         elif all_sent and not outgoing.probed:
             outgoing.probed = True
@@ -289,8 +313,22 @@ class Camera:
             return
         outgoing.last_news_ns = int(self._shared.env.now)
         known = outgoing.queued.union(outgoing.to_send)
-        outgoing.to_send.extend(index for index in missing if index not in known)
+        outgoing.to_send.extend(
+            index for index in missing if index not in known and index < outgoing.sendable
+        )
         self._station.wake()
+
+    def on_request(self, image: int, number: int) -> None:
+        """Process packet ``number`` of the sink's request: with the last one, all other fragments follow."""
+        outgoing = self._open.get(image)
+        if outgoing is None or not outgoing.waits:
+            return
+        outgoing.requested.add(number)
+        if not outgoing.waits:
+            outgoing.last_news_ns = int(self._shared.env.now)
+            outgoing.to_send.extend(range(outgoing.image.first_count, outgoing.image.count))
+            self._settle_if_done(outgoing)
+            self._station.wake()
 
     def _settle(self, outgoing: Outgoing) -> None:
         """Stop sending an image."""
@@ -298,12 +336,15 @@ class Camera:
             outgoing.settled.succeed()
 
     def _probe(self, outgoing: Outgoing) -> Generator[simpy.Event, Any, None]:
-        """Send the last fragment again after long silence: the sink may have received none of the image."""
+        """Send the last fragment again after long silence: the sink may have received none of the image, or
+        its request may be lost.
+        """
         env, wait_ns = self._shared.env, 2 * self._shared.status_after_ns
-        while outgoing.image.id in self._open:
+        again = self._shared.config.retransmit
+        while outgoing.image.id in self._open and (again or outgoing.waits):
             silent_ns = env.now - outgoing.last_news_ns
             if silent_ns >= wait_ns and not outgoing.to_send and not outgoing.queued:
-                outgoing.to_send.append(outgoing.image.count - 1)
+                outgoing.to_send.append(outgoing.sendable - 1)
                 outgoing.last_news_ns = int(env.now)
                 self._station.wake()
                 silent_ns = 0
@@ -332,11 +373,14 @@ class Camera:
         """Take an image; returns its ``settled`` event, or None without a route to the sink."""
         shared, config = self._shared, self._shared.config
         node = self._station.index
-        image = shared.book.capture(node, config.size_bytes(node))
+        waits = bool(config.first_bytes_by_node)
+        first_bytes = config.first_bytes_by_node[node] if waits else 0
+        image = shared.book.capture(node, config.size_bytes(node), first_bytes)
         if node in shared.unreachable:
             shared.book.close(image, -1, Cause.NO_ROUTE)
             return None
-        outgoing = self._open[image.id] = Outgoing(image, shared.env.event())
+        request_packets = len(request_packets_bytes(config, node)) if waits else 0
+        outgoing = self._open[image.id] = Outgoing(image, shared.env.event(), request_packets)
         if config.deadline_s is not None:
             shared.env.process(self._expire(outgoing, to_ns(config.deadline_s)))
         self._station.wake()

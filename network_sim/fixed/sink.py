@@ -11,6 +11,7 @@ import simpy
 from network_sim.config import UplinkConfig
 from network_sim.fixed.images import Image
 from network_sim.fixed.nodes import Shared, Station
+from network_sim.fixed.requests import Requests
 from network_sim.fixed.uplink import Uplink
 from network_sim.types import Cause, Packet
 
@@ -38,6 +39,7 @@ class Sink:
         self._shared = shared
         self._station = station
         self._reported_ns: dict[int, int] = {}
+        self._requests = Requests(shared, station) if shared.config.first_bytes_by_node else None
         self._uplink: Uplink | None = None
         if uplink.exists:
             places = shared.sink, shared.destination
@@ -48,7 +50,8 @@ class Sink:
         """Process a fragment that arrived over the radio."""
         book = self._shared.book
         image = book.images[packet.image]
-        new = image.at_sink.add(image.index_of(packet))
+        index = image.index_of(packet)
+        new = image.at_sink.add(index)
         if new:
             image.last_news_ns = int(self._shared.env.now)
             if image.count - image.at_sink.missing_count == 1 and self._shared.config.retransmit:
@@ -61,6 +64,8 @@ class Sink:
             if self._uplink is None:
                 book.close(image, self._station.index)
             self._report_complete(image)
+        if self._requests is not None:
+            self._requests.received(image, index, new)
 
     def _needs_status(self, image: Image) -> bool:
         """Return whether the camera needs STATUS packets to learn which fragments have arrived."""
@@ -82,16 +87,20 @@ class Sink:
         while image.at_sink.missing_count and not image.closed:
             silent_ns = shared.env.now - image.last_news_ns
             if silent_ns >= shared.status_after_ns:
-                if self._needs_status(image):
-                    self._send_status(image, self._missing_for_status(image))
+                missing = self._missing_for_status(image)
+                if missing and self._needs_status(image):
+                    self._send_status(image, missing)
                 image.last_news_ns, silent_ns = int(shared.env.now), 0
             yield shared.env.timeout(shared.status_after_ns - silent_ns)
 
     def _missing_for_status(self, image: Image) -> tuple[int, ...]:
-        """Return the missing fragments, limited to the runs that fit into one packet."""
+        """Return the missing fragments, limited to the runs that fit into one packet; before the request for
+        what follows an image's first bytes, only those of the first bytes.
+        """
         config = self._shared.config
         room = max(1, (config.payload_bytes - config.header_bytes - ID_BYTES) // RUN_BYTES)
-        missing = image.at_sink.missing()
+        waits = self._requests is not None and not self._requests.requested(image)
+        missing = image.at_sink.missing(image.first_count if waits else None)
         starts = np.flatnonzero(np.diff(missing, prepend=-2) > 1)
         return tuple(missing[: starts[room]] if len(starts) > room else missing)
 

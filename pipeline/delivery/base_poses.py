@@ -20,7 +20,10 @@ from pipeline.types import ByteArray, CameraIntrinsics, DepthMap, RgbdFrame, Rig
 
 
 def place_by_base(
-    views: Sequence[BaseView], colors: Sequence[ByteArray], config: PipelineConfig | None = None
+    views: Sequence[BaseView],
+    colors: Sequence[ByteArray],
+    config: PipelineConfig | None = None,
+    pose_known: Sequence[bool] | None = None,
 ) -> Placement:
     """Register a rig's cameras by their base layers, as images of one pixel a block.
 
@@ -31,6 +34,7 @@ def place_by_base(
         views: base layers with the believed poses.
         colors: (H, W, 3) RGB of each, as decoded from the base layer.
         config: settings of the chain; None takes the defaults.
+        pose_known: whether each believed pose is known; None means that all are.
 
     Raises:
         PacketMeshError: the registration cannot work with the base layers; the message says why.
@@ -43,8 +47,11 @@ def place_by_base(
             _camera(view),
             view.T_world_camera,
             noise=view.noise,
+            pose_known=known,
         )
-        for index, (view, rgb) in enumerate(zip(views, colors, strict=True))
+        for index, (view, rgb, known) in enumerate(
+            zip(views, colors, pose_known or [True] * len(views), strict=True)
+        )
     )
     spec = Spec(LoadedRig(Rig("base layers", frames)), config=config or PipelineConfig())
     placement: Placement = drain(compute(spec, "placement", RunCache())).value

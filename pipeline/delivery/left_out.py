@@ -48,6 +48,11 @@ def tile_bytes(images: Images, colors: Colors) -> TileBytes:
     )
 
 
+def all_tiles(leave_out: BoolArray, color_grid: tuple[int, int]) -> BoolArray:
+    """Return (T,) the tiles that are not sent, depth before colour, as ``Tiled.joined`` takes them."""
+    return np.concatenate([leave_out.ravel(), whole_tiles(leave_out, color_grid).ravel()])
+
+
 def without_tiles(images: Images, leave_out: BoolArray, color_side_px: int = TILE) -> Received:
     """Return what the sink has if all arrives that a node sends, and some tiles are not sent.
 
@@ -63,9 +68,9 @@ def without_tiles(images: Images, leave_out: BoolArray, color_side_px: int = TIL
         InputError: ``leave_out`` has another number of tiles than the images.
     """
     shape = (images.depth.shape[0], images.depth.shape[1])
-    _check(_grid(shape, TILE), leave_out)
+    _check(grid_of(shape, TILE), leave_out)
     missing = pixels_of(leave_out, shape, TILE)
-    whole = whole_tiles(leave_out, _grid(shape, color_side_px))
+    whole = whole_tiles(leave_out, grid_of(shape, color_side_px))
     colorless = pixels_of(whole, shape, color_side_px)
     base = coarse.read_depth(coarse.write_depth(images.depth), shape)
     rgb = images.rgb
@@ -120,10 +125,11 @@ def whole_tiles(leave_out: BoolArray, larger: tuple[int, ...]) -> BoolArray:
 def _on_grid(sizes: list[int], shape: tuple[int, ...], side_px: int) -> IntArray:
     """Return the bytes of streams with their seals; an empty stream has none."""
     found = np.array(sizes)
-    return np.where(found > 0, found + SEAL_BYTES, 0).reshape(_grid(shape, side_px))
+    return np.where(found > 0, found + SEAL_BYTES, 0).reshape(grid_of(shape, side_px))
 
 
-def _grid(shape: tuple[int, ...], side_px: int) -> tuple[int, int]:
+def grid_of(shape: tuple[int, ...], side_px: int) -> tuple[int, int]:
+    """Return (rows, columns) of the tiles of an image."""
     return -(-shape[0] // side_px), -(-shape[1] // side_px)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,12 @@ from packetmesh.errors import InputError
 from pipeline.types import FloatArray, Rig
 
 SAME_PLACE_M = 1e-6
+_NO_SIZES: dict[str, Any] = {
+    "bytes_by_node": (),
+    "first_bytes_by_node": (),
+    "request_bytes_by_node": (),
+}
+"""Settings of one value for each node of another rig."""
 
 
 def poses_known(rig: Rig) -> bool:
@@ -34,7 +41,13 @@ def check_collects(network: NetworkConfig) -> None:
         )
 
 
-def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> NetworkConfig:
+def network_of(
+    rig: Rig,
+    sizes_bytes: Sequence[int],
+    network: NetworkConfig,
+    first_bytes: Sequence[int] = (),
+    request_bytes: Sequence[int] = (),
+) -> NetworkConfig:
     """Configure a network with the rig's cameras as nodes, each with one image to send.
 
     Nodes are at ``nodes.places_m`` if it is given; else at their cameras' x and y, with the sink
@@ -45,9 +58,11 @@ def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> 
         rig: one to 200 nodes; the world's third axis points up.
         sizes_bytes: bytes of each node's encoded images.
         network: a preset, or any other network that collects images from fixed nodes.
+        first_bytes: bytes of each that it sends before it waits for a request; empty sends all at once.
+        request_bytes: bytes of these requests.
 
     Raises:
-        InputError: the network's nodes are vehicles.
+        InputError: the network's nodes are vehicles, or the sink cannot send them requests.
     """
     check_collects(network)
     believed_places_m = places_of(rig, network.nodes.spacing_m) if poses_known(rig) else ()
@@ -57,6 +72,8 @@ def network_of(rig: Rig, sizes_bytes: Sequence[int], network: NetworkConfig) -> 
         images=1,
         interval_s=0.0,
         bytes_by_node=tuple(sizes_bytes),
+        first_bytes_by_node=tuple(first_bytes),
+        request_bytes_by_node=tuple(request_bytes),
         places_m=network.nodes.places_m or believed_places_m,
     )
     return replace(network, nodes=nodes, run=replace(network.run, keep="all", warmup_s=0.0))
@@ -71,6 +88,8 @@ def replaced_settings(network: NetworkConfig) -> dict[str, str]:
         "nodes.image_bytes",
         "nodes.depth_bytes",
         "nodes.bytes_by_node",
+        "nodes.first_bytes_by_node",
+        "nodes.request_bytes_by_node",
     )
     reasons = dict.fromkeys(own, image)
     reasons |= dict.fromkeys(("run.keep", "run.warmup_s"), "a delivery needs every event from the start")
@@ -106,9 +125,9 @@ def placed(rig: Rig, network: NetworkConfig, senders: Sequence[int]) -> NetworkC
     elif poses_known(rig):
         places_m = np.reshape(places_of(rig, nodes.spacing_m), (-1, 2))
     elif len(senders) < count:
-        whole = replace(nodes, count=count, bytes_by_node=())
+        whole = replace(nodes, count=count, **_NO_SIZES)
         places_m = place_nodes(whole, np.random.default_rng(network.run.seed)).positions_m
     else:
         return network
     some_m = tuple(places_m[[*senders, count]].ravel().tolist())
-    return replace(network, nodes=replace(nodes, count=len(senders), bytes_by_node=(), places_m=some_m))
+    return replace(network, nodes=replace(nodes, count=len(senders), places_m=some_m, **_NO_SIZES))

@@ -17,7 +17,9 @@ from pipeline.types import BoolArray, ByteArray
 
 BASE_LOSS = 0.3
 """Share of its packets that a base may lose (SPEC 6.5)."""
-_UNIT_BYTES = (64, 8192)
+_LEAST_UNIT_BYTES = 64
+MOST_UNIT_BYTES = 8192
+"""Most bytes of a symbol with its header; a larger packet holds several."""
 _LEAST_CERTAIN = 6  # with a loss of three in ten, all of these are lost once in a thousand times
 _NUMBER_BYTES = 2
 _LENGTH_BYTES = 3
@@ -72,6 +74,12 @@ def protect(base: bytes, body: bytes, packet_bytes: int, repair_every: int) -> b
     return units.tobytes()
 
 
+def first_bytes(base: bytes, packet_bytes: int) -> int:
+    """Return the bytes at the start of a stream of ``protect`` that suffice to recover the base."""
+    unit = _unit_bytes(packet_bytes)
+    return -(-len(base) // _symbol_bytes(unit)) * unit
+
+
 def unprotect(data: ByteArray, arrived: BoolArray, packet_bytes: int, repair_every: int) -> Unprotected:
     """Recover the base and the received part of the body from a stream of ``protect``.
 
@@ -106,8 +114,7 @@ def unprotect(data: ByteArray, arrived: BoolArray, packet_bytes: int, repair_eve
 
 def _unit_bytes(packet_bytes: int) -> int:
     """Return the bytes of a symbol with its header: one packet if possible, else several or a part of one."""
-    least, most = _UNIT_BYTES
-    return min(packet_bytes * max(1, -(-least // packet_bytes)), most)
+    return min(packet_bytes * max(1, -(-_LEAST_UNIT_BYTES // packet_bytes)), MOST_UNIT_BYTES)
 
 
 def _symbol_bytes(unit_bytes: int) -> int:

@@ -16,8 +16,10 @@ from network_sim.trace.log import NetworkTrace
 from packetmesh.errors import InputError
 from pipeline.delivery import coding_named
 from pipeline.delivery.coding import Coding, Received
+from pipeline.delivery.leaving_out import LeftOut, check_can_leave_out, send_without_seen, tiles_of
 from pipeline.delivery.plan import network_of, placed
 from pipeline.delivery.sink import frame_at_sink, images_of
+from pipeline.delivery.tiled import Tiled
 from pipeline.spec import Spec
 from pipeline.types import BoolArray, ByteArray, RgbdFrame, Rig
 
@@ -36,10 +38,15 @@ class DeliverySpec:
     moments: int = MOMENTS
     down: tuple[str, ...] = ()
     """Names of failed nodes, which send nothing."""
+    leave_out_seen: bool = False
+    """Whether nodes leave out tiles that another camera shows, which the sink tells them."""
 
     def __post_init__(self) -> None:
         if self.moments < 1:
             raise InputError(f"{self.moments} moments show nothing; try at least 1")
+        if self.leave_out_seen:
+            coding_named(self.coding)
+            check_can_leave_out(self.coding, self.network)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,11 +64,22 @@ class Sending:
     """(M,) times of the moments."""
     spent: Spent
     """(M,) bytes, losses and energy until each moment."""
+    left_out: LeftOut | None = None
+    """Tiles that were not sent because another camera shows them; None if nodes send all without asking."""
 
     @property
     def packet_bytes(self) -> int:
         """Bytes of a stream per packet."""
         return packet_bytes_of(self.trace.config)
+
+    def decoded(self, node: int, there: BoolArray) -> Received:
+        """Decode a node's images from the bytes of its stream that are ``there`` (S,)."""
+        data, shape = np.where(there, self.streams[node], 0), self.rig.frames[node].rgb.shape
+        size = shape[0], shape[1]
+        if self.left_out is None or not isinstance(self.coding, Tiled):
+            return self.coding.decode(data, there, size, self.packet_bytes)
+        missing = tiles_of(self.left_out.tiles[node], size, self.coding)
+        return self.coding.decode(data, there, size, self.packet_bytes, missing)
 
 
 def send(spec: DeliverySpec, rig: Rig) -> Sending:
@@ -76,16 +94,20 @@ def send(spec: DeliverySpec, rig: Rig) -> Sending:
     """
     coding = coding_named(spec.coding)
     packet_bytes = packet_bytes_of(spec.network)
-    encoded = [coding.encode(images_of(frame), packet_bytes) for frame in rig.frames]
-    senders = senders_of(rig, spec.down)
-    part = Rig(rig.name, tuple(rig.frames[node] for node in senders))
+    senders, left_out = senders_of(rig, spec.down), None
     network = placed(rig, spec.network, senders)
-    trace = simulate(network_of(part, [len(encoded[node]) for node in senders], network))
+    if spec.leave_out_seen and isinstance(coding, Tiled):
+        sent = send_without_seen(rig, coding, senders, network, spec.spec.config)
+        encoded, trace, left_out = sent.streams, sent.trace, sent.left_out
+    else:
+        encoded = tuple(coding.encode(images_of(frame), packet_bytes) for frame in rig.frames)
+        part = Rig(rig.name, tuple(rig.frames[node] for node in senders))
+        trace = simulate(network_of(part, [len(encoded[node]) for node in senders], network))
     streams = tuple(np.frombuffer(data, np.uint8) for data in encoded)
     came = arrivals(trace)
     came = replace(came, node=np.array(senders)[came.node])
     times_ns = moment_times_ns(came, trace, spec.moments)
-    return Sending(spec, rig, coding, streams, trace, came, times_ns, until(trace, times_ns))
+    return Sending(spec, rig, coding, streams, trace, came, times_ns, until(trace, times_ns), left_out)
 
 
 def senders_of(rig: Rig, down: Sequence[str]) -> list[int]:
@@ -139,12 +161,7 @@ def arrived_bytes(sending: Sending, t_ns: int) -> list[BoolArray]:
 
 def received_at(sending: Sending, t_ns: int) -> list[Received]:
     """Decode each node's images from the bytes that have reached the sink by ``t_ns``."""
-    return [
-        sending.coding.decode(np.where(there, stream, 0), there, frame.rgb.shape[:2], sending.packet_bytes)
-        for frame, stream, there in zip(
-            sending.rig.frames, sending.streams, arrived_bytes(sending, t_ns), strict=True
-        )
-    ]
+    return [sending.decoded(node, there) for node, there in enumerate(arrived_bytes(sending, t_ns))]
 
 
 def frames_at_sink(sending: Sending, received: Sequence[Received]) -> list[RgbdFrame]:

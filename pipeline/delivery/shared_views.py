@@ -54,11 +54,13 @@ class SharedViews:
 
     leave_out: tuple[BoolArray, ...]
     """(rows, columns) of each camera, True for tiles to leave out."""
+    shown_by: IntArray
+    """(N, N) number of tiles that camera i leaves out and camera j shows, in whole or in part."""
 
-    @property
-    def request_bytes(self) -> tuple[int, ...]:
-        """Bytes of the request to each node: one bit a tile, nothing if it sends all."""
-        return tuple(-(-mask.size // 8) if mask.any() else 0 for mask in self.leave_out)
+
+def request_bytes(leave_out: Sequence[BoolArray]) -> tuple[int, ...]:
+    """Return the bytes of the request to each node: one bit a tile, nothing if it sends all."""
+    return tuple(-(-mask.size // 8) if mask.any() else 0 for mask in leave_out)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +120,7 @@ def shared_views(
     sights = [_sight(views, index, limits) for index in range(len(views))]
     leave_out = [np.zeros(sight.candidates.shape, np.bool_) for sight in sights]
     needed = [mask.copy() for mask in leave_out]
+    shown_by = np.zeros((len(views), len(views)), np.int64)
     for camera in reversed(order):
         for row, column in np.argwhere(sights[camera].candidates & ~needed[camera]).tolist():
             replacements = _replacements(sights[camera], (row, column), leave_out, limits.shared)
@@ -125,7 +128,8 @@ def shared_views(
                 leave_out[camera][row, column] = True
                 for other, rows, columns in replacements:
                     needed[other][rows, columns] = True
-    return SharedViews(tuple(leave_out))
+                    shown_by[camera, other] += len(rows) > 0
+    return SharedViews(tuple(leave_out), shown_by)
 
 
 def _check(index: int, view: BaseView) -> None:

@@ -34,6 +34,18 @@ class Colors:
 
 
 @dataclass(frozen=True, slots=True)
+class Pieces:
+    """A node's images as tiles, before they are joined to a stream."""
+
+    base: bytes
+    """The protected part."""
+    depth: tuple[bytes, ...]
+    """Sealed streams of the depth tiles, row after row; empty where nothing was measured."""
+    color: tuple[bytes, ...]
+    """Sealed streams of the colour tiles, which may be larger."""
+
+
+@dataclass(frozen=True, slots=True)
 class Tiled:
     """Exact depth tiles, then colour tiles; their lengths, the levels of depth and the base layer are
     protected.
@@ -52,6 +64,10 @@ class Tiled:
 
     def encode(self, images: Images, packet_bytes: int) -> bytes:
         """Encode as ``Coding.encode``; whole packets unless ``packet_bytes`` is very small or large."""
+        return self.joined(self.pieces(images), packet_bytes)
+
+    def pieces(self, images: Images) -> Pieces:
+        """Encode the images' tiles and the protected part."""
         from pipeline.delivery import coarse, levels, rvl
 
         areas = areas_of(images.depth.shape, TILE)
@@ -63,18 +79,36 @@ class Tiled:
         protected = [rvl.encode(lengths), depth.header]
         if self.base:
             protected += [coarse.write_depth(images.depth), coarse.write_color(images.rgb)]
-        body = b"".join(streams[index] for index in _order(len(areas), len(color_areas)))
         base = _joined(protected)
         base += zlib.crc32(base).to_bytes(_CHECK_BYTES, "big")
-        return protect(base, body, packet_bytes, self.repair_every)
+        return Pieces(base, tuple(streams[: len(areas)]), tuple(streams[len(areas) :]))
+
+    def joined(self, pieces: Pieces, packet_bytes: int, leave_out: BoolArray | None = None) -> bytes:
+        """Join tiles to the bytes of a frame, as ``Coding.encode`` returns them.
+
+        Args:
+            pieces: the tiles.
+            packet_bytes: as in ``encode``.
+            leave_out: (T,) True for tiles that are not sent, depth before colour; None sends all.
+        """
+        streams = [*pieces.depth, *pieces.color]
+        order = _order(len(pieces.depth), len(pieces.color))
+        body = b"".join(streams[index] for index in order if leave_out is None or not leave_out[index])
+        return protect(pieces.base, body, packet_bytes, self.repair_every)
 
     def decode(
-        self, data: ByteArray, arrived: BoolArray, shape: tuple[int, int], packet_bytes: int
+        self,
+        data: ByteArray,
+        arrived: BoolArray,
+        shape: tuple[int, int],
+        packet_bytes: int,
+        leave_out: BoolArray | None = None,
     ) -> Received:
         """Decode as ``Coding.decode``; an incomplete depth tile gives the depths before its first gap.
 
         Bytes that are damaged, or another tile's, are noticed in the protected part, and in 255 of 256 tiles
-        that are whole; they count as lost. The first bytes of a tile that is cut have no check.
+        that are whole; they count as lost. The first bytes of a tile that is cut have no check. Of a tile
+        that the node leaves out, as in ``joined``, there is what the base layer has.
 
         Raises:
             InputError: the depths are of another version of the coding.
@@ -100,6 +134,8 @@ class Tiled:
         for area, length in zip(areas, lengths[: len(areas)], strict=True):
             if length == 0:  # nothing was measured there
                 received.coarse[area] = 0
+        if leave_out is not None:
+            lengths = np.where(leave_out, 0, lengths).astype(np.uint16)
         order = _order(len(areas), len(color_areas))
         for index, stream in _streams(parts.body, parts.arrived, lengths, order):
             whole = stream.size == lengths[index]

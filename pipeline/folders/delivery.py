@@ -9,7 +9,9 @@ from typing import Any
 from packetmesh.files import atomic_path, write_json
 from packetmesh.settings import settings
 from pipeline.deliver import Delivery
+from pipeline.delivery.leaving_out import LeftOut
 from pipeline.delivery.moments import Moment, NodeArrival
+from pipeline.delivery.sending import Sending
 from pipeline.folders.run import (
     METRICS,
     MOMENTS,
@@ -29,7 +31,7 @@ def delivery_metrics(delivery: Delivery) -> dict[str, Any]:
         | {"f_score_5cm": _f_score(lossless.truth_after), "bytes": raw_bytes(delivery)},
         "bytes": sum(len(stream) for stream in delivery.sending.streams),
         "packet_bytes": delivery.sending.packet_bytes,
-    }
+    } | _left_out(delivery.sending)
 
 
 def raw_bytes(delivery: Delivery) -> int:
@@ -51,6 +53,7 @@ def write_delivery_folder(delivery: Delivery, metrics: dict[str, Any], preset: s
     config = (
         config_of(spec.spec)
         | {"coding": spec.coding, "moments": spec.moments, "network": preset}
+        | ({"leave_out_seen": True} if spec.leave_out_seen else {})
         | {"network_settings": settings(delivery.sending.trace.config)}
     )
     _write_table(delivery.moments, folder / MOMENTS)
@@ -71,7 +74,74 @@ def summary(delivery: Delivery) -> str:
     if last.surface is None:
         return f"{share}, too little for a surface"
     holes = f"{last.surface.quality.no_hit_ray_share:.1%} of the rays are without a surface"
-    return f"{share}: {holes}, {delivery.lossless.after.quality.no_hit_ray_share:.1%} without losses"
+    whole = "without losses" if delivery.sending.left_out is None else "with all tiles and without losses"
+    return f"{share}: {holes}, {delivery.lossless.after.quality.no_hit_ray_share:.1%} {whole}"
+
+
+def left_out_sentences(sending: Sending) -> list[str]:
+    """Describe what each node left out, and whose tiles show it; no sentence if nodes send all."""
+    left_out, names = sending.left_out, [frame.name for frame in sending.rig.frames]
+    if left_out is None:
+        return []
+    if left_out.requested_s is None:
+        return ["no base layer reached the sink, so it requested nothing"]
+    share = sum(left_out.left_out_bytes) / sum(left_out.whole_bytes)
+    sentences = [
+        "the sink decided by the base layers which tiles another camera shows, and sent its requests of "
+        f"{sum(left_out.request_bytes)} bytes after {left_out.requested_s:.3g} s: {sum(left_out.counts)} "
+        f"tiles with {sum(left_out.left_out_bytes):,} bytes, {share:.1%} of all, were left out"
+    ]
+    for node, name in enumerate(names):
+        if name not in sending.spec.down:
+            sentences.append(f"{name}: {_left_out_of(left_out, node, names)}")
+    return sentences
+
+
+def _left_out_of(left_out: LeftOut, node: int, names: list[str]) -> str:
+    if not left_out.base_arrived[node]:
+        return "its base layer was late, so that it was to send all"
+    if not left_out.placed[node]:
+        return "its camera could not be placed by the base layers, so that it was to send all"
+    count = left_out.counts[node]
+    if not left_out.answered[node]:
+        return "the sink's request did not reach it, so that it sent no more than its base layer"
+    if not count:
+        return "sent all tiles, as no other camera shows them well enough"
+    shown = [
+        f"{number} shown by {names[other]}"
+        for other, number in enumerate(left_out.shown_by[node].tolist())
+        if number
+    ]
+    return f"left out {count} tiles with {left_out.left_out_bytes[node]:,} bytes ({', '.join(shown)})"
+
+
+def _left_out(sending: Sending) -> dict[str, Any]:
+    """Return what was left out and by whose decision; nothing if all nodes send all without asking."""
+    left_out, names = sending.left_out, [frame.name for frame in sending.rig.frames]
+    if left_out is None:
+        return {}
+    found = {
+        "tiles": sum(left_out.counts),
+        "bytes": sum(left_out.left_out_bytes),
+        "whole_bytes": sum(left_out.whole_bytes),
+        "decided_by": "sink",
+        "requested_s": left_out.requested_s,
+        "nodes": [
+            {
+                "name": name,
+                "tiles": left_out.counts[node],
+                "bytes": left_out.left_out_bytes[node],
+                "whole_bytes": left_out.whole_bytes[node],
+                "request_bytes": left_out.request_bytes[node],
+                "base_arrived": left_out.base_arrived[node],
+                "placed": left_out.placed[node],
+                "answered": left_out.answered[node],
+                "shown_by": dict(zip(names, left_out.shown_by[node].tolist(), strict=True)),
+            }
+            for node, name in enumerate(names)
+        ],
+    }
+    return {"left_out": found}
 
 
 def _moment(moment: Moment) -> dict[str, Any]:

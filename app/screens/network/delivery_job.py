@@ -41,6 +41,7 @@ from pipeline.delivery.sending import (
     send,
     senders_of,
 )
+from pipeline.folders.delivery import left_out_sentences
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
 from pipeline.spec import key as spec_key
 from pipeline.types import (
@@ -85,19 +86,13 @@ def packet_job(
     sending = yield from sending_of(store, spec)
     frame, stream = sending.rig.frames[row], sending.streams[row]
     there = np.ones(len(stream), np.bool_)
-    whole = _decoded(sending, row, there)
+    whole = sending.decoded(row, there)
     there[first_byte : first_byte + byte_count] = False
-    without = _decoded(sending, row, there)
+    without = sending.decoded(row, there)
     depth = (whole.depth > 0) & (without.depth == 0)
     color = whole.rgb_known & (~without.rgb_known | (whole.rgb != without.rgb).any(axis=2))
     cloud = cloud_of(replace(frame, depth=DepthMap(np.where(depth, frame.depth.z_m, np.nan))))
     return PacketView(row, depth, color, _lit(frame.rgb, depth | color), cloud.points_m.astype(np.float32))
-
-
-def _decoded(sending: Sending, row: int, there: BoolArray) -> Received:
-    """Decode a node's images from the bytes that are ``there`` (S,)."""
-    data, shape = np.where(there, sending.streams[row], 0), sending.rig.frames[row].rgb.shape[:2]
-    return sending.coding.decode(data, there, (shape[0], shape[1]), sending.packet_bytes)
 
 
 def sending_of(store: Store, spec: Spec) -> Generator[Progress, None, Sending]:
@@ -110,7 +105,8 @@ def _send(store: Store, spec: Spec) -> Generator[Progress, None, Sending]:
     rig = yield from store.stage(spec, "rig")
     yield Progress("sending the images", 0.02)
     sent = _sent_of(spec)
-    return send(DeliverySpec(spec, sent.network, sent.coding, sent.moments, sent.down), rig)
+    how = sent.network, sent.coding, sent.moments, sent.down, sent.leave_out_seen
+    return send(DeliverySpec(spec, *how), rig)
 
 
 def _delivered(store: Store, spec: Spec) -> Steps:
@@ -167,7 +163,7 @@ def _measured(store: Store, sending: Sending) -> Generator[Progress, None, Lossl
 
 
 def _first_view(sending: Sending, sent: Sent, elapsed_s: float) -> DeliveryView:
-    rig, down = sending.rig, sending.spec.down
+    rig, down, left_out = sending.rig, sending.spec.down, sending.left_out
     senders = senders_of(rig, down)
     names = tuple(rig.frames[node].name for node in senders) + sending.trace.names[len(senders) :]
     run = replace(run_view(sending.trace, elapsed_s), names=names)
@@ -179,6 +175,8 @@ def _first_view(sending: Sending, sent: Sent, elapsed_s: float) -> DeliveryView:
             aspect=frame.intrinsics.width_px / frame.intrinsics.height_px,
             total_bytes=len(stream),
             row=senders.index(row) if row in senders else -1,
+            left_out_tiles=0 if left_out is None else left_out.counts[row],
+            left_out_bytes=0 if left_out is None else left_out.left_out_bytes[row],
         )
         for row, (frame, stream) in enumerate(zip(rig.frames, sending.streams, strict=True))
     )
@@ -186,7 +184,14 @@ def _first_view(sending: Sending, sent: Sent, elapsed_s: float) -> DeliveryView:
     total = np.cumsum(came.byte_count)
     some = np.unique(np.linspace(0, len(total) - 1, min(len(total), CURVE_POINTS)).astype(int))
     return DeliveryView(
-        sent, run, nodes, _stage(rig.frames), tuple(sending.times_ns.tolist()), came.t_ns[some], total[some]
+        sent,
+        run,
+        nodes,
+        _stage(rig.frames),
+        tuple(sending.times_ns.tolist()),
+        came.t_ns[some],
+        total[some],
+        left_out=tuple(left_out_sentences(sending)),
     )
 
 

@@ -51,6 +51,7 @@ def moment_table(view: DeliveryView, now: MomentView | None) -> Markup:
             _megabytes(None if last is None else last.delivered_bytes),
             _megabytes(view.total_bytes),
         ),
+        *_left_out(view),
         (
             "Frames lost",
             "Transmissions that failed until the column's time; most are sent again.",
@@ -100,6 +101,14 @@ def _head(now: MomentView | None) -> Head:
     return f"by {time_text(now.t_ns)}", "The last moment before the clock at which the surface is rebuilt."
 
 
+def _left_out(view: DeliveryView) -> list[Row]:
+    """Return the row of the bytes that were left out; none if every node sends all."""
+    if not view.left_out:
+        return []
+    text = "Bytes of tiles that the sink told the cameras not to send, because another camera shows them."
+    return [("Left out", text, "", _megabytes(view.left_out_bytes), "0")]
+
+
 def _by_cause(view: DeliveryView, now: MomentView | None, last: MomentView | None) -> list[Row]:
     """Return rows with the causes of lost frames, the most frequent first."""
     pieces = view.run.pieces
@@ -140,7 +149,17 @@ def more_rows(view: DeliveryView, now: MomentView | None) -> Markup:
         "",
     )
     sent = ("Sent on the air", "Bytes with headers and retransmissions.", _megabytes(now.sent_bytes), "", "")
-    return table([*rows, sent, energy], ("depth", "colour", "coarse"))
+    left_out = [
+        (
+            f"{node.name}: left out",
+            f"Tiles that another camera shows, and their bytes. {sentence}.",
+            f"{node.left_out_tiles} tiles",
+            _megabytes(node.left_out_bytes),
+            "",
+        )
+        for node, sentence in zip(view.senders, view.left_out[1:], strict=False)
+    ]
+    return table([*rows, *left_out, sent, energy], ("depth", "colour", "coarse"))
 
 
 def summary(view: DeliveryView) -> Markdown:
@@ -152,6 +171,9 @@ def summary(view: DeliveryView) -> Markdown:
         view.run.packets,
         view.run.elapsed_s,
     )
+    if view.left_out:
+        first = view.left_out[0]
+        sentence += Markdown(" {}.").format(first[0].upper() + first[1:])
     if not view.run.series or not len(view.run.pieces):
         sentence += " No frame was sent in that time."
     if computed < planned:
@@ -187,6 +209,8 @@ def changes(before: DeliveryView, after: DeliveryView) -> str:
     words = [f"{name} off" for name in after.sent.down if name not in before.sent.down]
     if before.sent.coding != after.sent.coding:
         words.append(f"coding {after.sent.coding} instead of {before.sent.coding}")
+    if before.sent.leave_out_seen != after.sent.leave_out_seen:
+        words.append("shown tiles left out" if after.sent.leave_out_seen else "all tiles sent again")
     words += [f"{name} on again" for name in before.sent.down if name not in after.sent.down]
     changed = _network_changes(before.sent.network, after.sent.network)
     words += changed[:MOST_CHANGES] + (["and more"] if len(changed) > MOST_CHANGES else [])

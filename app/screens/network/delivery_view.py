@@ -31,6 +31,9 @@ class CameraNode:
     """Size of its encoded images."""
     row: int
     """Its index in the network; -1 if it is down."""
+    left_out_tiles: int = 0
+    left_out_bytes: int = 0
+    """Tiles that it did not send because another camera shows them, and their bytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +110,8 @@ class DeliveryView:
     """Computed moments by time."""
     lossless: Lossless | None = None
     """None while it is computed, or if there is no surface without losses either."""
+    left_out: tuple[str, ...] = ()
+    """A sentence on the tiles that were left out, and one on each sender's; empty if every node sends all."""
 
     @property
     def senders(self) -> tuple[CameraNode, ...]:
@@ -117,6 +122,11 @@ class DeliveryView:
     def total_bytes(self) -> int:
         """Size of all nodes' images, including those of failed nodes."""
         return sum(node.total_bytes for node in self.nodes)
+
+    @property
+    def left_out_bytes(self) -> int:
+        """Bytes of all tiles that were left out."""
+        return sum(node.left_out_bytes for node in self.nodes)
 
     def moment_at(self, t_ns: int) -> MomentView | None:
         """Return the last computed moment up to this time."""

@@ -11,7 +11,7 @@ import numpy as np
 import viser
 
 from app.compute.state import Sent, Spec
-from app.screens.network.labels import CODINGS, NETWORKS, ways
+from app.screens.network.labels import CODINGS, LEAVES_OUT, NETWORKS, ways
 from app.screens.network.lesson import NetworkLook
 from app.screens.network.place import show, shown, text_of, values_of
 from app.screens.network.what_if import WhatIf
@@ -56,6 +56,13 @@ class NetworkSetup:
         self._coding = gui.add_dropdown(
             "Coding", list(CODING_NAMES), hint="How images are encoded, and which bytes are sent first."
         )
+        self._leave_out = gui.add_checkbox(
+            "Leave out what another camera showed",
+            False,
+            hint="Every camera first sends a coarse image. The sink then tells each the tiles that another "
+            "camera shows, and these are not sent. Needs two cameras, the coding with AVIF colour, and a "
+            "radio by which the sink reaches them.",
+        )
         self._share = gui.add_slider(
             "Lose packets (%)",
             0.0,
@@ -88,7 +95,7 @@ class NetworkSetup:
         )
         ui.when_changed(self._preset, self._picked)
         for handle in (
-            *(self._coding, self._share, self._burst, self._retransmit),
+            *(self._coding, self._leave_out, self._share, self._burst, self._retransmit),
             *(self._vehicles, self._scheme, self._beside, self._seed),
         ):
             ui.when_changed(handle, on_change)
@@ -145,7 +152,7 @@ class NetworkSetup:
     def reset(self) -> None:
         """Restore the first settings."""
         self._preset.value = NETWORKS[FIRST].title
-        self._coding.value = CODINGS[NetworkLook().coding]
+        self._coding.value, self._leave_out.value = CODINGS[NetworkLook().coding], False
         self._moments.value, self._burst.value = MOMENTS, BURST_FRAMES
         self.what_if.forget()
         self._load()
@@ -205,6 +212,7 @@ class NetworkSetup:
     def _handles(self) -> dict[str, Any]:
         names = {
             "coding": self._coding,
+            "leave-out": self._leave_out,
             "lose": self._share,
             "burst": self._burst,
             "again": self._retransmit,
@@ -234,7 +242,7 @@ class NetworkSetup:
             (self._scheme if self.street else self._access).value = look.way
         if look.beside:
             self._beside.value = look.beside
-        self._coding.value = CODINGS[look.coding]
+        self._coding.value, self._leave_out.value = CODINGS[look.coding], False
         self._share.value, self._burst.value = look.lose_percent, look.burst_frames
         self._retransmit.value = look.again and self._retransmit.value
         self._moments.value = MOMENTS
@@ -262,7 +270,14 @@ class NetworkSetup:
         )
         network = with_settings(PRESETS[self.preset], changes)
         coding, moments = CODING_NAMES[self._coding.value], int(self._moments.value)
-        return Sent(network, coding, moments, self.what_if.off)
+        leave_out = bool(self._leave_out.value) and self._can_leave_out(coding, network)
+        return Sent(network, coding, moments, self.what_if.off, leave_out)
+
+    def _can_leave_out(self, coding: str, network: NetworkConfig) -> bool:
+        """Return whether the cameras can leave out tiles, as far as is known before they have sent."""
+        what_if = self.what_if
+        alone = what_if.in_room and what_if.count - len(what_if.off) < 2
+        return coding == LEAVES_OUT and network.mac.reaches_nodes and not alone
 
     def runs(self) -> dict[str, NetworkConfig]:
         """Return the street runs that the controls set, by their labels.
@@ -316,7 +331,7 @@ class NetworkSetup:
         else:
             self._access.options = tuple(self._ways)
             self._access.value = next(iter(self._ways))
-        for handle in (self._coding, self._share, self._burst, self._retransmit):
+        for handle in (self._coding, self._leave_out, self._share, self._burst, self._retransmit):
             handle.visible = not street
         for handle in (self._access, self._shadowing, self._moments):
             handle.visible = not street
@@ -334,7 +349,10 @@ class NetworkSetup:
         self._on_change()
 
     def show_idle(self) -> None:
-        """Show why some of the given settings change nothing; nothing if all of them count."""
+        """Show why some of the given settings change nothing, and disable what cannot be chosen."""
+        if not self.street:
+            sent = self.sent()
+            self._leave_out.disabled = not self._can_leave_out(sent.coding, sent.network)
         given = [key_of(change) for change in (*self._extra, *self._beside_extra)]
         if self._shadowing.value and not self.street:
             given.append("radio.shadowing_db")
@@ -358,6 +376,8 @@ def deliver_command(spec: Spec, preset: str, sent: Sent) -> str:
     """Return the command line that delivers the same rig in the same way."""
     words = ["packetmesh", "deliver", *spec.source.arguments(), "--preset", preset, "--coding", sent.coding]
     words += ["--moments", str(sent.moments)]
+    if sent.leave_out_seen:
+        words.append("--leave-out-seen")
     if sent.down:
         words += ["--down", *sent.down]
     if spec.preset != "packetmesh":

@@ -101,6 +101,11 @@ class WhatIf:
         return () if self._off.value == NOBODY else (self._off.value,)
 
     @property
+    def count(self) -> int:
+        """Number of nodes of the room, those that have failed included."""
+        return len(self._off.options) - 1
+
+    @property
     def handles(self) -> dict[str, Any]:
         """The controls by their names in an address."""
         names = ("off", "wall", "wall-db", "retries", "rate")

@@ -94,9 +94,32 @@ def test_nothing_arrives_and_that_is_said(capsys, rig_folder, tmp_path):
     assert not (tmp_path / "d" / "surface.glb").exists()
 
 
+def test_what_was_left_out_and_by_whose_decision_is_printed_and_written(
+    capsys, rig_folder, delivered, tmp_path
+):
+    words = ("--preset", "thesis-link", "--leave-out-seen", "--moments", 1, "--json", *FEW)
+    code, text, err = run(capsys, "deliver", "--rig", rig_folder, "--out", tmp_path / "d", *words)
+    assert code == 0
+    answer = json.loads(text)
+    found = answer["left_out"]
+    assert found["bytes"] + answer["bytes"] == found["whole_bytes"]
+    assert found["bytes"] == sum(node["bytes"] for node in found["nodes"])
+    assert found["tiles"] == sum(node["tiles"] for node in found["nodes"]) > 0
+    assert f"{found['tiles']} tiles with {found['bytes']:,} bytes" in err
+    (giver,) = (node for node in found["nodes"] if node["name"] == "node_01")
+    assert f"node_01: left out {giver['tiles']} tiles" in err
+    assert f"{giver['shown_by']['node_00']} shown by node_00" in err
+    assert json.loads((tmp_path / "d" / "config.json").read_text())["leave_out_seen"]
+    assert f"{found['tiles']} tiles" in (tmp_path / "d" / "delivery.html").read_text()
+    assert "left_out" not in delivered[1]
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
+        (("--leave-out-seen", "--coding", "jpeg"), "coding exact only"),
+        (("--leave-out-seen", "--down", "node_01"), "Only one camera"),
+        (("--leave-out-seen", "--preset", "ble"), "Over ble"),
         (("--preset", "street-grid"), "cameras that stand still"),
         (("--coding", "zip"), "layered"),
         (("--moments", "0"), "moments"),

@@ -95,7 +95,7 @@ VALUES = {
     "nodes.buffer_packets": ["3"],
 }
 """Other values of settings whose type does not suggest them."""
-REFUSED = ("scenario", "mac.kind")
+REFUSED = ("scenario", "mac.kind", "nodes.first_bytes_by_node", "nodes.request_bytes_by_node")
 """Settings whose other values need further settings, which the refusal names."""
 ROWS = [(0.1 * row, 0.05 + 0.01 * (row % 7), 20 + row % 5, 0.02 * (row % 3)) for row in range(40)]
 
@@ -119,7 +119,7 @@ def others(key: str, value: str, config: NetworkConfig) -> list[str]:
     kind, count = HINTS[key], config.nodes.count
     if key in VALUES:
         return VALUES[key]
-    if key == "nodes.bytes_by_node":
+    if key.endswith("bytes_by_node"):
         return [",".join(str(400 * (node + 1)) for node in range(count))]
     if key == "nodes.places_m":
         return [",".join(f"{70 * node},{node}" for node in range(count + 1))]

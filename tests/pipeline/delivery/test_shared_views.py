@@ -11,7 +11,7 @@ from pipeline.delivery import tiled
 from pipeline.delivery.base_points import BaseView, block_centers, surface_at
 from pipeline.delivery.coding import Images
 from pipeline.delivery.left_out import base_view, pixels_of, tile_bytes, whole_tiles, without_tiles
-from pipeline.delivery.shared_views import STRICT, shared_views
+from pipeline.delivery.shared_views import STRICT, request_bytes, shared_views
 from pipeline.types import CameraIntrinsics, DepthNoise
 
 CAMERA = CameraIntrinsics.pinhole(260.0, 260.0, 159.5, 127.5, 320, 256)
@@ -158,7 +158,7 @@ def test_a_camera_that_looks_away_or_measures_nothing_replaces_nothing():
     nothing = replace(view, z_m=np.full(BLOCKS, np.nan))
     for other in (away, nothing):
         assert not any(mask.any() for mask in left_out(other, view))
-    assert shared_views([nothing, nothing]).request_bytes == (0, 0)
+    assert request_bytes(shared_views([nothing, nothing]).leave_out) == (0, 0)
 
 
 def test_tiles_with_missing_blocks_are_sent_unless_the_limits_allow_them():
@@ -186,7 +186,7 @@ def test_no_camera_and_one_camera():
 
 
 def test_the_request_takes_a_bit_a_tile():
-    assert shared_views([wall(pose())] * 2).request_bytes == (0, 10)
+    assert request_bytes(shared_views([wall(pose())] * 2).leave_out) == (0, 10)
 
 
 def test_sizes_at_which_tiles_and_blocks_are_cut_off():

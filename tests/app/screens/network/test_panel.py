@@ -22,7 +22,7 @@ from app.screens.network.delivery_numbers import legend, moment_table
 from app.screens.network.delivery_view import DeliveryView, PacketView
 from app.screens.network.draw import STREET, ground_of
 from app.screens.network.inspector import Inspector
-from app.screens.network.labels import ANSWER, NETWORKS, ORIGIN, PICK
+from app.screens.network.labels import ANSWER, CODINGS, NETWORKS, ORIGIN, PICK
 from app.screens.network.lesson import CROSSING, KIND, LOST_PACKET, numbers
 from app.screens.network.packets import Frames
 from app.screens.network.panel import NetworkPanel
@@ -30,7 +30,7 @@ from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import What
 from app.screens.network.what_if import WhatIf
 from network_sim.presets import PRESETS
-from network_sim.types import Cause
+from network_sim.types import Cause, PacketKind
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings
 from pipeline.io.rigs import save_rig
@@ -93,7 +93,7 @@ class Screen(Bench):
 def spec(tmp_path_factory):
     """A room whose images are small, so that a moment is soon rebuilt."""
     folder = tmp_path_factory.mktemp("rigs") / "small room"
-    save_rig(folder, small_rig(nodes=3, scene="box-on-table"))
+    save_rig(folder, small_rig(nodes=3))
     return Spec(RigFolder(str(folder)), config=CONFIG)
 
 
@@ -277,6 +277,52 @@ def test_a_node_switched_off_is_not_heard_and_the_difference_is_told(screen):
     screen.gui.set("Switch off", "none")
 
 
+LEAVE_OUT = "Leave out what another camera showed"
+
+
+def test_tiles_that_another_camera_showed_are_left_out_and_counted(screen):
+    before = screen.view
+    assert not screen.gui.find(LEAVE_OUT).disabled
+    assert "Left out" not in screen.gui.text()
+    screen.gui.set(LEAVE_OUT, True)
+    view = screen.view
+    assert view.sent.leave_out_seen
+    assert 0 < view.left_out_bytes == before.total_bytes - view.total_bytes
+    assert sum(node.left_out_tiles for node in view.nodes) > 0
+    assert view.moments[-1].delivered_bytes == view.total_bytes
+    asked_ns = view.run.pieces.start_ns[view.run.pieces.carries == PacketKind.REQUEST].min()
+    assert view.times_ns[0] > asked_ns > 1e9  # the sink computes for a second; few bytes come before
+    screen.dock.seek(view.moments[-1].t_ns)
+    text = screen.gui.text()
+    assert f"with {view.left_out_bytes:,} bytes" in text
+    assert "shown tiles left out" in text
+    assert "node_01: left out" in text
+    assert "--leave-out-seen" in screen.panel.command.split()
+    assert "leave-out=true" in screen.panel.in_address["net"].read()
+    screen.gui.set(LEAVE_OUT, False)
+    assert "Left out" not in screen.gui.text()
+    assert "--leave-out-seen" not in screen.panel.command
+
+
+def test_what_cannot_be_left_out_cannot_be_chosen(screen):
+    gui, box = screen.gui, screen.gui.find(LEAVE_OUT)
+    screen.refuse = "not yet"
+    box.value = True
+    for name, value in (
+        ("Coding", CODINGS["jpeg"]),
+        ("Preset", NETWORKS["ble"].title),
+        ("Medium access", "IEEE 802.11b"),
+    ):
+        before = gui.find(name).value
+        gui.set(name, value)
+        assert box.disabled == (name != "Medium access")
+        assert screen.spec.sent.leave_out_seen == (name == "Medium access")
+        gui.set(name, before)
+    assert not box.disabled
+    box.value, screen.refuse = False, ""
+    gui.set("Preset", NETWORKS["office"].title)
+
+
 def test_losses_that_nobody_repairs_cost_bytes(screen):
     gui, screen.refuse = screen.gui, "not yet"
     gui.set("Send lost packets again", False)
@@ -416,11 +462,13 @@ def test_bursts_are_put_back_and_in_the_address_as_all_other_controls():
     assert setup.place() == ""
     ui.gui.set("Lose packets (%)", 10.0)
     ui.gui.set("in bursts of (frames)", 20)
+    ui.gui.set(LEAVE_OUT, True)
     sent, place = setup.sent(), setup.place()
     setup.reset()
     setup.take_place(place)
     assert setup.sent() == sent
     assert sent.network.loss.burst_packets == 20.0
+    assert sent.leave_out_seen
 
 
 def test_a_wrong_key_names_the_nearest_and_keeps_what_was(screen):
