@@ -17,6 +17,14 @@ from pipeline.types import FloatArray
 if TYPE_CHECKING:
     import viser
 
+STANDS_ON = {
+    "walls": "wall",
+    "ceiling": "ceiling",
+    "furniture": "furniture",
+    "tripods": "tripod",
+    "by hand": "by hand",
+}
+"""Names of the kinds of places of ``pipeline.planning.plan.PlannedCamera``."""
 FRUSTUM_M, HANDLE_M, POINT_M = 0.22, 0.32, 0.016
 """viser's ``scale`` of a frustum, length of the handle's arrows, and size of a point."""
 LEAST_CHANCE = 0.1
