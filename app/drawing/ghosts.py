@@ -17,8 +17,20 @@ from pipeline.types import FloatArray
 if TYPE_CHECKING:
     import viser
 
-FRUSTUM_M, HANDLE_M, POINT_M = 0.22, 0.32, 0.016
-"""viser's ``scale`` of a frustum, length of the handle's arrows, and size of a point."""
+STANDS_ON = {
+    "walls": "wall",
+    "ceiling": "ceiling",
+    "furniture": "furniture",
+    "tripods": "tripod",
+    "by hand": "by hand",
+}
+"""Names of the kinds of places of ``pipeline.planning.plan.PlannedCamera``."""
+HANDLE, HANDLE_M = 0.12, (0.3, 0.9)
+"""Length of the handle's arrows, as a share of the diagonal of the targets' box; its least and most."""
+FRUSTUM = 0.7
+"""viser's ``scale`` of a frustum, as a share of that length."""
+POINT_M = 0.016
+"""Size of a point."""
 LEAST_CHANCE = 0.1
 """Points that are less likely measured are not drawn."""
 PALE = 0.6
@@ -53,6 +65,7 @@ class Ghosts:
         self._cloud: viser.PointCloudHandle | None = None
         self._targets_m: FloatArray = np.zeros((0, 3), np.float32)
         self._chosen = 0
+        self._size_m = HANDLE_M[0]
 
     def draw(
         self, T_world_camera: Sequence[FloatArray], fov_rad: float, aspect: float, targets_m: FloatArray
@@ -67,13 +80,16 @@ class Ghosts:
         """
         self.clear()
         self._targets_m = targets_m
+        diagonal_m = float(np.linalg.norm(np.ptp(targets_m, axis=0))) if len(targets_m) else 0.0
+        self._size_m = float(np.clip(HANDLE * diagonal_m, *HANDLE_M))
         for row, T in enumerate(T_world_camera):
             name = f"{self._below}/{row + 1}"
             frustum = self._scene.add_camera_frustum(
-                name, fov=fov_rad, aspect=aspect, scale=FRUSTUM_M, thickness=0.008, color=GHOST
+                name, fov=fov_rad, aspect=aspect, scale=FRUSTUM * self._size_m, thickness=0.008, color=GHOST
             )
             place(frustum, T)
-            self._scene.add_label(f"{name}/name", f"new {row + 1}", anchor="center-right")
+            ahead_m = (0.0, 0.0, FRUSTUM * self._size_m)  # where no arrow is, and no name of a present camera
+            self._scene.add_label(f"{name}/name", str(row + 1), position=ahead_m, anchor="center-center")
             if self._on_pick is not None:
                 frustum.on_click(lambda _, row=row: self._on_pick(row))
             self._frusta.append(frustum)
@@ -97,7 +113,7 @@ class Ghosts:
             self._handle.remove()
         frustum = self._frusta[row]
         handle = self._handle = self._scene.add_transform_controls(
-            f"{self._below}/handle-{row + 1}", scale=HANDLE_M, disable_sliders=True, depth_test=False
+            f"{self._below}/handle-{row + 1}", scale=self._size_m, disable_sliders=True, depth_test=False
         )
         place(handle, _pose(frustum))
         handle.on_update(partial(self._dragged, row, handle))

@@ -9,13 +9,13 @@ from itertools import count
 import numpy as np
 
 from app.drawing.colors import DELIVERED, LOSS, TARGET
+from app.drawing.ghosts import STANDS_ON
 from app.reports.floor_plan_table import TABLE_MM, legend, table
 from app.reports.labels import Labels
 from app.reports.paper import Area, Color, Line, Paper, Shape, Words, box, disc
 from pipeline.planning.calls import RigPlan
 from pipeline.planning.floor import TALLEST_M, aim_deg, footprint, wedge_m
 from pipeline.planning.places import floor_m
-from pipeline.planning.plan import BY_HAND
 from pipeline.planning.sensors import AS_PRESENT
 from pipeline.planning.walls import DAMPING_DB
 from pipeline.types import FloatArray
@@ -32,13 +32,6 @@ AIM_MM = 9.0
 """Length of the line in the direction of a new camera's view."""
 TICK_MM = 12.0
 """Least distance of two numbers on an axis."""
-STANDS_ON = {
-    "walls": "wall",
-    "ceiling": "ceiling",
-    "furniture": "furniture",
-    "tripods": "tripod",
-    BY_HAND: "by hand",
-}
 PRESENT = "present"
 FLOOR, THINGS, WALL, GRID, INK = (238, 240, 242), (176, 184, 192), (60, 66, 72), (216, 222, 228), (20, 24, 28)
 

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from app.drawing.colors import DELIVERED, INFERRED, LOSS, css
-from app.reports.floor_plan import STANDS_ON, floor_plan
+from app.drawing.ghosts import STANDS_ON
+from app.reports.floor_plan import floor_plan
 from app.reports.html import picture, pictures, table, write_page
 from app.reports.paper import pdf_of, svg_of
 from app.reports.plan_pictures import plan_pictures

@@ -42,7 +42,7 @@ def targets_of(views: Sequence[PresentView]) -> Targets:
     points_m, normals = (np.concatenate(column) for column in zip(*parts, strict=True))
     view = np.repeat(np.arange(len(views)), [len(part[0]) for part in parts])
     rays = sum(int((view.meets != Meets.NO_RAY).sum()) for view in views)
-    return Targets(points_m, normals, view, _dark_returns(points_m, views), step * step / rays)
+    return Targets(points_m, normals, view, dark_returns(points_m, views), step * step / rays)
 
 
 def _targets_in(view: PresentView, step: int) -> tuple[FloatArray, FloatArray]:
@@ -55,7 +55,8 @@ def _targets_in(view: PresentView, step: int) -> tuple[FloatArray, FloatArray]:
     return apply(T, at_m), view.normals[v, u] @ T[:3, :3].T
 
 
-def _dark_returns(points_m: FloatArray, views: Sequence[PresentView]) -> FloatArray:
+def dark_returns(points_m: FloatArray, views: Sequence[PresentView]) -> FloatArray:
+    """Return (T,) ``Targets.dark_return`` of (T, 3) points."""
     largest = np.zeros(len(points_m))
     for view in views:
         depth_m, rows, u, v = pixels_of(points_m, view.camera)

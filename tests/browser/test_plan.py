@@ -9,7 +9,6 @@ import pytest
 from playwright.sync_api import expect
 from viser.transforms import SO3
 
-from app.drawing.ghosts import HANDLE_M
 from pipeline.kernels.geometry import apply, inverse, rigid
 from tests.browser.hands import PATIENCE_MS, dismiss_notifications, go, press, unfold
 
@@ -67,7 +66,7 @@ def test_a_hand_drags_the_ghost_and_its_promise_follows_and_then_its_picture(pla
     page, session = planned
     before, pose = promise(page), pose_of(node(session, "handle-1"))
     start = on_page(page, session, pose[:3, 3])
-    tip = on_page(page, session, pose[:3, 3] + 0.85 * HANDLE_M * pose[:3, 0])
+    tip = on_page(page, session, pose[:3, 3] + 0.85 * node(session, "handle-1").scale * pose[:3, 0])
     page.mouse.move(*tip)
     page.wait_for_timeout(300)
     page.mouse.down()

@@ -120,7 +120,9 @@ class NetworkPanel(Panel):
         self._dock.show(False)
 
     def on_action(self, action: str) -> None:
-        """Restore the first settings on *Reset*."""
+        """Restore the first settings on *Reset*, and drop the plan."""
+        if action == "Reset":
+            self._plan.forget()
         if action == "Reset" and self._visited:
             self._setup.reset()
             self.ui.post(self._run)

@@ -8,9 +8,11 @@ import numpy as np
 
 from app.compute.cuts import Cut
 from app.drawing.picking import picked_hole
+from app.screens.surface.closing import HoleClosing
 from app.screens.surface.draw_holes import HoleDrawing
 from app.screens.surface.view import ExplainView, FilledView, HoleView, Which
 from app.web.markup import Markdown, Markup
+from app.window.panel import PanelSession
 from app.window.tables import number, table
 from app.window.ui import Ui
 from pipeline.surface.findings import Explanation, RayParts
@@ -40,14 +42,14 @@ class HolesFolder:
 
     def __init__(
         self,
-        ui: Ui,
+        session: PanelSession,
         on_explain: Callable[[Which, int], None],
         on_fill: Callable[[float | None], None],
     ) -> None:
         """Add the folder.
 
         Args:
-            ui: panel to add it to.
+            session: the session.
             on_explain: called with a surface and the index of its hole to explain.
             on_fill: called with the rim length, metres, up to which holes are filled; None fills none.
         """
@@ -57,8 +59,8 @@ class HolesFolder:
         self._which: Which | None = None
         self._index: int | None = None
         self._offset_m: FloatArray = np.zeros(3)
-        self._drawing = HoleDrawing(ui.scene, "/surface/hole")
-        gui = ui.gui
+        self._drawing = HoleDrawing(session.ui.scene, "/surface/hole")
+        ui, gui = session.ui, session.ui.gui
         with gui.add_folder("Holes", expand_by_default=False):
             gui.add_markdown(TEXT)
             self._list = gui.add_dropdown(
@@ -69,6 +71,7 @@ class HolesFolder:
             ui.buttons("Go to", steps, "Choose the previous or the next hole.")
             self._why = gui.add_markdown(Markdown(""))
             self._shares = gui.add_html(Markup(""))
+            self._closing = HoleClosing(session, "/surface/closing")
             self._parts = gui.add_markdown(Markdown(""))
             self._add_filling(ui)
         self.forget()
@@ -191,11 +194,13 @@ class HolesFolder:
         self._list.value = NONE if index is None else names[index]
         self._shares.content = Markup("")
         if index is None or self._which is None:
+            self._closing.offer(None)
             self._drawing.clear()
             self._why.content = self._invitation()
             return
         self._drawing.draw(self._shown[index], names[index].partition(":")[0], self._offset_m)
         self._why.content = LOOKING
+        self._closing.offer((self._which, index), self._shown[index].rim, self._offset_m)
         self._on_explain(self._which, index)
 
     @property

@@ -90,7 +90,7 @@ class SurfacePanel(Panel):
     def _build_folders(self) -> None:
         gui, session = self.gui, self.session
         self._advice = AdviceFolder(self.ui, self._sweep, session.cancel_side_job, self._take_radius)
-        self._holes = HolesFolder(self.ui, self._explain, self._fill)
+        self._holes = HolesFolder(session, self._explain, self._fill)
         self._walks = Walks(session, self._arrange)
         self._rolling = self._walks.folder
         with gui.add_folder("Advanced", expand_by_default=False):

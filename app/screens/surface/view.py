@@ -125,6 +125,41 @@ class ExplainView:
 
 
 @dataclass(frozen=True, slots=True)
+class ClosingCamera:
+    """The camera that would measure most of a hole."""
+
+    T_world_camera: FloatArray
+    where: str
+    """Kind of place, as in ``pipeline.planning.places``."""
+    height_m: float
+    """Above the floor."""
+    share: float
+    """Share of the hole that it would measure."""
+    overlap_share: float
+    """Share of its image on measured surface that one present camera sees, too."""
+    fov_rad: float
+    """Vertical field of view."""
+    aspect: float
+    """Width over height."""
+    points_m: FloatArray
+    """(T, 3) float32 points of the hole, world frame."""
+    chance: FloatArray
+    """(T,) float32 chance that it measures each of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClosingView:
+    """The camera that would close a hole."""
+
+    which: Which
+    index: int
+    """Index in that surface's holes."""
+    camera: ClosingCamera | None
+    why_none: str = ""
+    """Why there is no such camera, and what to try."""
+
+
+@dataclass(frozen=True, slots=True)
 class FilledView:
     """The surface after fusion with its small holes filled."""
 

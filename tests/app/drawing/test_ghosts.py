@@ -60,3 +60,13 @@ def test_only_points_that_are_likely_seen_are_shown_the_chosen_ghosts_in_full_co
     drawn.ghosts.clear()
     assert drawn.node("/plan/seen") is None
     assert drawn.node("/plan") is not None
+
+
+def test_handle_and_frustum_grow_with_the_room_between_two_limits(drawn):
+    sizes = []
+    for diagonal_m in (0.1, 5.0, 100.0):
+        corners_m = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, diagonal_m]], np.float32)
+        drawn.ghosts.draw(POSES, 0.8, 1.5, corners_m)
+        sizes.append(drawn.node("/plan/handle-1").scale)
+        assert np.ravel(drawn.node("/plan/1").scale)[0] == pytest.approx(0.7 * sizes[-1])
+    assert sizes == pytest.approx([0.3, 0.6, 0.9])

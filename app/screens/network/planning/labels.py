@@ -21,15 +21,6 @@ WHERES: Mapping[str, str] = MappingProxyType(
     {"walls": "On walls", "ceiling": "On the ceiling", "furniture": "On furniture", "tripods": "On tripods"}
 )
 """Titles of ``pipeline.planning.places.WHERES``, whose libraries the server process does not load."""
-STANDS_ON: Mapping[str, str] = MappingProxyType(
-    {
-        "walls": "wall",
-        "ceiling": "ceiling",
-        "furniture": "furniture",
-        "tripods": "tripod",
-        "by hand": "by hand",
-    }
-)
 RENDERED = ("as-present", "kinect-v1")
 """Sensors that the demo rooms can be rendered with: the model of their sensor is that of a Kinect v1."""
 

@@ -1,6 +1,7 @@
 """Which hole a click means, and what the folder of the holes says and asks."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -155,10 +156,16 @@ class Screen:
         self.asked, self.requested = [], []
         ui = ui_of(server.scene)
         self.gui = ui.gui
+        self.closed, self.fresh = [], True
+        self.spec = self.results = SimpleNamespace(fresh=lambda *_: self.fresh)
+        self.ui = ui
         self.folder = HolesFolder(
-            ui, lambda which, index: self.asked.append((which, index)), self.requested.append
+            self, lambda which, index: self.asked.append((which, index)), self.requested.append
         )
         self.list = self.gui.find("Hole")
+
+    def quick_job(self, job, *arguments, on_end):
+        self.closed.append((arguments, on_end))
 
     @property
     def why(self):

@@ -4,7 +4,8 @@ import re
 
 import numpy as np
 
-from app.screens.network.planning.labels import SENSORS, STANDS_ON, WHERES
+from app.drawing.ghosts import STANDS_ON
+from app.screens.network.planning.labels import SENSORS, WHERES
 from app.screens.network.planning.numbers import delivery_bars, kept_sentence
 from app.screens.network.planning.view import Arrival, PromiseView, TakenView
 from pipeline.planning.places import WHERES as PLACES
