@@ -31,7 +31,7 @@ LORA_PAYLOAD_BYTES = {7: 222, 8: 222, 9: 115, 10: 51, 11: 51, 12: 51}
 
 STARS: tuple[MacKind, ...] = ("lora", "ble", "lte-m", "nb-iot")
 """Medium accesses whose nodes reach only the sink: no node forwards for another one."""
-NO_DOWNLINK: tuple[MacKind, ...] = ("ble", "lte-m", "nb-iot")
+NO_DOWNLINK: tuple[MacKind, ...] = ("lte-m", "nb-iot")
 """Medium accesses whose model carries packets to the sink only."""
 ANY_DISTANCE: tuple[MacKind, ...] = ("serial", "replay", "lte-m", "nb-iot")
 """Medium accesses that connect a node and the sink wherever they are; an operator's cell covers all nodes."""

@@ -99,7 +99,7 @@ def left_out_sentences(sending: Sending) -> list[str]:
 
 def _left_out_of(left_out: LeftOut, node: int, names: list[str]) -> str:
     if not left_out.base_arrived[node]:
-        return "its base layer was late, so that it was to send all"
+        return "its base layer was late or lost, so that it was to send all"
     if not left_out.placed[node]:
         return "its camera could not be placed by the base layers, so that it was to send all"
     count = left_out.counts[node]

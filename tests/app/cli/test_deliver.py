@@ -119,7 +119,7 @@ def test_what_was_left_out_and_by_whose_decision_is_printed_and_written(
     [
         (("--leave-out-seen", "--coding", "jpeg"), "coding exact only"),
         (("--leave-out-seen", "--down", "node_01"), "Only one camera"),
-        (("--leave-out-seen", "--preset", "ble"), "Over ble"),
+        (("--leave-out-seen", "--preset", "nb-iot"), "Over nb-iot"),
         (("--preset", "street-grid"), "cameras that stand still"),
         (("--coding", "zip"), "layered"),
         (("--moments", "0"), "moments"),

@@ -35,6 +35,7 @@ def requests(trace, kind=EventKind.RECEIVE):
         ("thesis-link", ("mac.kind=ideal", "nodes.retransmit=false")),
         ("office", ("nodes.deadline_s=none",)),
         ("lora", ()),
+        ("ble", ("nodes.deadline_s=none", "loss.share=0.1")),
         ("greenhouse", ("nodes.count=3", "nodes.deadline_s=none")),
     ],
 )
@@ -117,7 +118,7 @@ def test_until_the_request_a_run_does_not_depend_on_what_follows():
         (("nodes.first_bytes_by_node=1,1,1",), "belong together"),
         ((*WAITING, "nodes.images=2"), "nodes.images is 2"),
         ((*WAITING, "nodes.bytes_by_node=9000,8000,2000"), "2001 for node 3, whose image has 2000"),
-        ((*WAITING, "mac.kind=ble"), "mac.kind is ble"),
+        ((*WAITING, "mac.kind=lte-m", "nodes.payload_bytes=100"), "mac.kind is lte-m"),
         ((*WAITING, "mac.kind=lora"), "mac.kind is lora with mac.ack"),
     ],
 )

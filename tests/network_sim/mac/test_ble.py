@@ -115,3 +115,30 @@ def test_too_many_nodes_for_the_interval_are_one_sentence():
 def test_a_connection_interval_is_a_multiple_of_1250_us(interval_s):
     with pytest.raises(InputError, match=r"mac\.connection_interval_s .* multiple of 0\.00125"):
         config(f"mac.connection_interval_s={interval_s}")
+
+
+def test_the_sink_sends_in_the_nodes_event_and_the_node_answers():
+    scene = StarScene(config(), [5.0, 5.0])
+    scene.send_all(2, 0, range(2), 244, to=1)
+    events = scene.run()
+    offset = INTERVAL // 2
+    sent, answers = events.of(EventKind.AIR), events.of(EventKind.ACK)
+    assert sent.t_ns.tolist() == [offset, offset + PAIR]
+    assert (set(sent.node.tolist()), set(sent.peer.tolist())) == ({2}, {1})
+    assert answers.t_ns.tolist() == [offset + 1198 * US, offset + PAIR + 1198 * US]
+    assert set(answers.node.tolist()) == {1}
+    assert [at_ns for at_ns, _, _ in scene.received] == [offset + 1048 * US, offset + PAIR + 1048 * US]
+
+
+@pytest.mark.parametrize("begins_ns", [0, 100 * US, 7 * MS, 30 * MS])
+def test_a_node_and_the_sink_that_both_send_never_overlap_and_all_arrives(begins_ns):
+    scene = StarScene(config("loss.share=0.1"), [5.0, 5.0])
+    scene.send_all(0, 0, range(60), 244)
+    scene.send_all(2, begins_ns, range(100, 120), 100, to=0)
+    events = scene.run()
+    frames = events.of(EventKind.AIR, EventKind.ACK)
+    order = np.argsort(frames.t_ns)
+    ends_ns = (frames.t_ns + frames.duration_ns)[order]
+    assert (frames.t_ns[order][1:] - ends_ns[:-1] >= 150 * US).all()
+    assert sorted(number for _, number, _ in scene.received) == [*range(60), *range(100, 120)]
+    assert (frames.t_ns % INTERVAL + frames.duration_ns <= INTERVAL // 2).all()

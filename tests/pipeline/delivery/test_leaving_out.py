@@ -184,7 +184,7 @@ def test_the_mesh_is_no_worse(rig):
     ("settings", "fields", "names"),
     [
         ((), {"coding": "layered"}, "coding exact only, not of layered"),
-        (("mac.kind=ble",), {}, "Over ble the sink sends nodes no packets"),
+        (("mac.kind=lte-m",), {}, "Over lte-m the sink sends nodes no packets"),
         (("mac.kind=lora",), {}, "Over lora with mac.ack=true"),
         (("mac.kind=ideal", "nodes.payload_bytes=9000"), {}, "at most 8192"),
     ],

@@ -310,7 +310,7 @@ def test_what_cannot_be_left_out_cannot_be_chosen(screen):
     box.value = True
     for name, value in (
         ("Coding", CODINGS["jpeg"]),
-        ("Preset", NETWORKS["ble"].title),
+        ("Preset", NETWORKS["lte-m"].title),
         ("Medium access", "IEEE 802.11b"),
     ):
         before = gui.find(name).value
