@@ -35,8 +35,8 @@ def deliver(
     Args:
         images: Images that the nodes send; of a recording each node sends a keyframe.
         out: Folder for the final result (the files of `reconstruct`), moments.csv and delivery.html.
-        preset: The network: thesis-link, greenhouse, office, lora, ble, lte-m, nb-iot, or the config.json
-            of a finished simulation.
+        preset: The network: thesis-link, greenhouse, office, wifi-n, wifi-ax, wifi-ah, lora, ble, lte-m,
+            nb-iot, or the config.json of a finished simulation.
         coding: How images are encoded: raw, raw-color-first, raw-rows, raw-tiles, png, jpeg, rvl, tiles,
             layered or exact.
         moments: Number of times at which the scene is rebuilt, after equal shares of the bytes.
