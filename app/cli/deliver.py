@@ -26,6 +26,7 @@ def deliver(
     moments: int = 40,
     link_trace: Path | None = None,
     down: tuple[str, ...] = (),
+    every_radio: bool = False,
     chain: PresetName = "packetmesh",
     set: Settings = (),
     json: bool = False,
@@ -43,6 +44,9 @@ def deliver(
         link_trace: A recorded link over which every node sends: columns (s, Mbit/s, round trip ms, loss
             share), a mahimahi trace, or the output of iperf3 --json.
         down: Names of nodes that have failed and send nothing, for example node_02.
+        every_radio: Send the images by every radio, each in a network of its own, and print what each needs
+            for the surface; `--preset` and `--link-trace` then have no effect, and only every_radio.json
+            is written. It takes minutes; fewer `--moments` are quicker.
         chain: Settings of the reconstruction to start from.
         set: Settings of the network or the reconstruction, for example
             `--set nodes.retransmit=false loss.share=0.1 loss.burst_packets=8`.
@@ -51,6 +55,7 @@ def deliver(
     named = images.source()
     before, network, config, of_network = settings_of(preset, chain, set)
 
+    from app.cli.every_radio import every_radio as compare_radios
     from app.cli.reconstruct import imported_notes
     from app.cli.runs import iterate_imported
     from app.reports.hand_out_of import write_hand_out
@@ -64,6 +69,11 @@ def deliver(
 
     check_run_folder(out, named)
     source, imported = drain(iterate_imported(named, out), say_progress)
+    if every_radio:
+        if link_trace is not None:
+            say("--link-trace changes nothing here: --every-radio takes every radio")
+        compare_radios(Spec(source, chain, config), coding, moments, down, of_network, out, json)
+        return
     if link_trace is not None:
         network = _with_link(network, link_trace, of_network)
     say_network(network, before, preset, of_network, {})
