@@ -7,32 +7,18 @@ from typing import Literal
 
 from network_sim.bounds.limits import LARGEST_S, check_limits
 from network_sim.bounds.requests import check_requests
+from network_sim.settings.mac import OFDM_KINDS, WLAN_KINDS, MacConfig, MacKind
 from network_sim.settings.street import SchemeConfig, StreetConfig
-from packetmesh.checks import above, at_least, finite, one_each, one_of, several, share
+from packetmesh.checks import above, at_least, finite, one_each, several, share
 from packetmesh.errors import InputError
 
 Propagation = Literal["friis", "two-ray", "log-distance"]
-MacKind = Literal["ieee80211b", "ieee802154", "ideal", "serial", "replay", "lora", "ble", "lte-m", "nb-iot"]
 Layout = Literal["star", "line", "grid", "random"]
 Keep = Literal["all", "images", "counters"]
 Scenario = Literal["collection", "street-grid"]
 
-MAX_PAYLOAD_BYTES: dict[MacKind, int] = {
-    "ieee802154": 116,
-    "ieee80211b": 2304,
-    "ble": 244,
-    "lte-m": 120,
-    "nb-iot": 121,
-}
-"""Largest payload of a frame: 127 B less 11 B of header and check sum; the limit of IEEE 802.11; 251 B less
-the headers of L2CAP and ATT; a transport block of 1000 bits less the headers of MAC, RLC and PDCP."""
-LORA_PAYLOAD_BYTES = {7: 222, 8: 222, 9: 115, 10: 51, 11: 51, 12: 51}
-"""Largest payload of LoRaWAN by spreading factor (Regional Parameters 1.0.3, EU863-870, N with repeaters)."""
-
 STARS: tuple[MacKind, ...] = ("lora", "ble", "lte-m", "nb-iot")
 """Medium accesses whose nodes reach only the sink: no node forwards for another one."""
-NO_DOWNLINK: tuple[MacKind, ...] = ("lte-m", "nb-iot")
-"""Medium accesses whose model carries packets to the sink only."""
 ANY_DISTANCE: tuple[MacKind, ...] = ("serial", "replay", "lte-m", "nb-iot")
 """Medium accesses that connect a node and the sink wherever they are; an operator's cell covers all nodes."""
 
@@ -83,13 +69,14 @@ class RadioConfig:
     nakagami_m: float | None = None
     """Shape of the fading drawn for each frame; 1 is Rayleigh, larger fades less, None is no fading."""
     range_m: float = 100.0
-    """Nominal range: the receive threshold is the mean power there (IEEE 802.11b: at 11 Mb/s, LoRa: with
-    spreading factor 7)."""
+    """Nominal range: the receive threshold is the mean power there (IEEE 802.11b: at 11 Mb/s; 802.11n and
+    ah: with MCS 7; ax: with MCS 11; LoRa: with spreading factor 7)."""
     sense_range_m: float = 220.0
     """Distance up to which a transmission keeps others silent."""
     capture_db: float | None = None
     """Least ratio of a frame's power to the sum of overlapping ones at which it survives; None is 3 dB in
-    IEEE 802.15.4, 6 dB in LoRa, 10 dB in IEEE 802.11b; -5 dB is IEEE 802.15.4 as ns-3 simulates it."""
+    IEEE 802.15.4, 6 dB in LoRa, 10 dB in IEEE 802.11b, 1 to 34 dB by the MCS in 802.11n, ax and ah; -5 dB is
+    IEEE 802.15.4 as ns-3 simulates it."""
     noise_dbm: float | None = None
     """Power of the noise; None receives everything above the threshold without bit errors."""
     walls_m: tuple[float, ...] = ()
@@ -109,65 +96,6 @@ class RadioConfig:
         at_least("radio.sense_range_m", self.sense_range_m, self.range_m)
         several("radio.walls_m", self.walls_m, 4, "wall")
         finite("radio.walls_m", self.walls_m, "metres")
-
-
-@dataclass(frozen=True, slots=True)
-class MacConfig:
-    """Medium access: who may send when (SPEC 6.1, 6.3)."""
-
-    kind: MacKind = "ieee802154"
-    """Unslotted IEEE 802.15.4, IEEE 802.11b DCF, a link of its own for every node (ideal), a serial line
-    with ten bits a byte, a recorded link for every node (replay), LoRaWAN in the EU's 868 MHz band (lora),
-    Bluetooth LE 2M (ble), or the uplink of a cellular module (lte-m, nb-iot)."""
-    rts: bool = False
-    """Reserve the channel before every packet (RTS/CTS); only IEEE 802.11b can."""
-    ack: bool = True
-    """Acknowledge frames and send lost ones again; IEEE 802.11b, Bluetooth and cellular modules always do."""
-    retries: int | None = None
-    """Retransmissions of an unanswered frame; None is 3 times in IEEE 802.15.4, 6 in IEEE 802.11b, 7 in
-    LoRaWAN, 4 in LTE-M and NB-IoT."""
-    rate_bps: float = 11e6
-    """Rate of IEEE 802.11b's data frames: 1, 2, 5.5 or 11 Mb/s. A slower one reaches farther."""
-    link_bps: float = 250e3
-    """Rate of the ideal link or the serial line."""
-    spreading_factor: int = 7
-    """Spreading factor of LoRa, 7 to 12: each step reaches farther and takes about twice as long."""
-    connection_interval_s: float = 0.03
-    """Time between two connection events of a Bluetooth LE node, which share it equally."""
-    full_duplex: bool = False
-    """Whether LTE-M modules send and receive at once; others send three eighths of the time."""
-    tones: int = 12
-    """Subcarriers of 15 kHz that NB-IoT grants to a node: 1, 3, 6 or 12 (all)."""
-    trace: str | None = None
-    """File of the recorded link: columns of time in s, rate in Mbit/s, round trip in ms, share lost; or a
-    mahimahi trace, or the output of iperf3 --json."""
-
-    def __post_init__(self) -> None:
-        above("mac.link_bps", self.link_bps, 0.0)
-        at_least("mac.retries", self.retries, 0)
-        one_of("mac.rate_bps", self.rate_bps, (1e6, 2e6, 5.5e6, 11e6))
-        one_of("mac.spreading_factor", self.spreading_factor, LORA_PAYLOAD_BYTES)
-        one_of("mac.tones", self.tones, (1, 3, 6, 12))
-        steps = self.connection_interval_s / 0.00125
-        if not (6 <= steps <= 3200 and abs(steps - round(steps)) < 1e-6):
-            raise InputError(
-                f"mac.connection_interval_s is {self.connection_interval_s}; try a multiple of 0.00125 from "
-                "0.0075 to 4"
-            )
-        if self.kind == "replay" and not self.trace:
-            raise InputError("mac.kind is replay, but of which recorded link? Try mac.trace=FILE")
-
-    @property
-    def reaches_nodes(self) -> bool:
-        """Whether the sink can send nodes packets of its own in this model."""
-        return self.kind not in NO_DOWNLINK and not (self.kind == "lora" and self.ack)
-
-    @property
-    def max_payload_bytes(self) -> int | None:
-        """Largest payload of a frame; None if every size is possible."""
-        if self.kind == "lora":
-            return LORA_PAYLOAD_BYTES[self.spreading_factor]
-        return MAX_PAYLOAD_BYTES.get(self.kind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -365,6 +293,11 @@ class NetworkConfig:
                     f"mac.kind is {self.mac.kind}, which joins nodes to one sink, but vehicles pass several "
                     "access points; try ieee80211b"
                 )
+            if self.mac.kind in OFDM_KINDS:
+                raise InputError(
+                    f"mac.kind is {self.mac.kind}, which puts several packets into a frame, but vehicles "
+                    "send one after the other; try ieee80211b"
+                )
             key, size_bytes = "scheme.datagram_bytes", self.scheme.datagram_bytes + self.scheme.headers_bytes
         else:
             key, size_bytes = "nodes.payload_bytes", self.nodes.payload_bytes
@@ -377,13 +310,16 @@ class NetworkConfig:
             )
         most = self.mac.max_payload_bytes
         capture_db = self.radio.capture_db
-        if self.mac.kind in ("ieee80211b", "lora") and capture_db is not None and capture_db < 0.0:
+        if self.mac.kind in (*WLAN_KINDS, "lora") and capture_db is not None and capture_db < 0.0:
             raise InputError(
                 f"radio.capture_db is {capture_db}, with which {self.mac.kind} would receive two frames at "
                 "once; try at least 0"
             )
         if most is not None and size_bytes > most:
-            by = f" with mac.spreading_factor={self.mac.spreading_factor}" if self.mac.kind == "lora" else ""
+            by = {
+                "lora": f" with mac.spreading_factor={self.mac.spreading_factor}",
+                "ieee80211ah": f" with mac.mcs={self.mac.mcs} and mac.bandwidth_hz={self.mac.bandwidth_hz:g}",
+            }.get(self.mac.kind, "")
             raise InputError(
                 f"{key} makes packets of {size_bytes} bytes, but {self.mac.kind} carries {most}{by}"
             )

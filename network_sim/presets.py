@@ -15,6 +15,14 @@ from network_sim.config import (
 
 WAVELAN = EnergyConfig(tx_w=1.346, rx_w=0.901, idle_w=0.739, sleep_w=0.0474)
 """Lucent's WaveLAN at 11 Mb/s: 284, 190, 156, 10 mA at 4.74 V (Feeney and Nilsson 2001, from memory)."""
+ESP32_C6_N = EnergyConfig(tx_w=0.924, rx_w=0.2574, idle_w=0.2574, sleep_w=0.0000231)
+"""Espressif's ESP32-C6 at 3.3 V: 280 mA sending 802.11n at MCS 7 with 18.5 dBm, 78 mA receiving and listening
+(series data sheet v1.4, Table 5-7: peaks), 7 uA in deep sleep (from memory)."""
+ESP32_C6_AX = EnergyConfig(tx_w=0.8316, rx_w=0.2574, idle_w=0.2574, sleep_w=0.0000231)
+"""The same module: 252 mA sending 802.11ax at MCS 9 with 16.5 dBm (Table 5-7)."""
+HALOW_20_DBM = EnergyConfig(tx_w=0.66, rx_w=0.132, idle_w=0.132, sleep_w=0.000033)
+"""Modules of 802.11ah at 3.3 V: 200 mA sending 20 dBm, 40 mA receiving and listening, 10 uA asleep. Round
+figures of their order from memory; no data sheet was at hand."""
 SX1276 = EnergyConfig(tx_w=0.0957, rx_w=0.03795, idle_w=6.6e-7, sleep_w=6.6e-7)
 """Semtech's SX1276 at 3.3 V: 29 mA sending 13 dBm, 11.5 mA receiving, .2 µA asleep (data sheet Rev. 7, Table
 6, from memory). Between its frames a node of class A sleeps; its empty receive windows are not counted."""
@@ -24,6 +32,18 @@ specification, I_RADIO_TX1, I_RADIO_RX0), 3.16 µA asleep (from memory). Between
 MODULE_23_DBM = EnergyConfig(tx_w=0.545, rx_w=0.09, idle_w=0.09, sleep_w=0.000015)
 """A cellular module at 23 dBm: the figures with which 3GPP TR 45.820 judged the battery life of NB-IoT (from
 memory). It listens for grants whenever it does not send; LTE-M has the same power class."""
+
+_FAST_CAMERAS = NodesConfig(
+    spacing_m=8.0,
+    images=0,
+    interval_s=10.0,
+    image_bytes=69_000,
+    depth_bytes=183_000,
+    payload_bytes=1500,
+    header_bytes=36,
+    deadline_s=10.0,
+)
+"""Cameras with the images and datagrams of the office."""
 
 PRESETS: dict[str, NetworkConfig] = {
     "thesis-link": NetworkConfig(),
@@ -70,6 +90,46 @@ PRESETS: dict[str, NetworkConfig] = {
         ),
         uplink=UplinkConfig(rate_bps=10e6),
         energy=WAVELAN,
+        run=RunConfig(horizon_s=600.0),
+    ),
+    "wifi-n": NetworkConfig(
+        radio=RadioConfig(
+            model="log-distance",
+            tx_power_dbm=18.5,
+            range_m=26.0,  # -64 dBm, which every receiver must reach at MCS 7 (IEEE 802.11-2020, Table 19-23)
+            sense_range_m=103.0,  # -82 dBm, at which a preamble must be sensed (19.3.19.5)
+        ),
+        mac=MacConfig(kind="ieee80211n"),
+        nodes=_FAST_CAMERAS,
+        uplink=UplinkConfig(rate_bps=100e6),
+        energy=ESP32_C6_N,
+        run=RunConfig(horizon_s=600.0),
+    ),
+    "wifi-ax": NetworkConfig(
+        radio=RadioConfig(
+            model="log-distance",
+            tx_power_dbm=16.5,
+            range_m=8.88,  # -52 dBm, which every receiver must reach at MCS 11 (802.11ax-2021, Table 27-51)
+            sense_range_m=88.7,  # -82 dBm, at which a preamble must be sensed (27.3.20.6)
+        ),
+        mac=MacConfig(kind="ieee80211ax", mcs=9),
+        nodes=_FAST_CAMERAS,
+        uplink=UplinkConfig(rate_bps=100e6),
+        energy=ESP32_C6_AX,
+        run=RunConfig(horizon_s=600.0),
+    ),
+    "wifi-ah": NetworkConfig(
+        radio=RadioConfig(
+            model="log-distance",
+            frequency_hz=915e6,
+            tx_power_dbm=20.0,
+            range_m=119.5,  # -74 dBm, which every receiver must reach at MCS 7 in 2 MHz (Table 23-35)
+            sense_range_m=475.0,  # -92 dBm, at which a preamble must be sensed (23.3.18.5)
+        ),
+        mac=MacConfig(kind="ieee80211ah"),
+        nodes=_FAST_CAMERAS,
+        uplink=UplinkConfig(rate_bps=10e6),
+        energy=HALOW_20_DBM,
         run=RunConfig(horizon_s=600.0),
     ),
     "lora": NetworkConfig(
@@ -147,5 +207,6 @@ PRESETS: dict[str, NetworkConfig] = {
         run=RunConfig(horizon_s=600.0),
     ),
 }
-"""The scenarios of SPEC 6.1 and 6.2, a lossy multi-hop network, a fast single-hop network, and radios in a
-star with the images of the office: LoRa, which sends one in half a day, Bluetooth LE, LTE-M and NB-IoT."""
+"""The scenarios of SPEC 6.1 and 6.2, a lossy multi-hop network, a fast single-hop network, WLAN with
+aggregation (IEEE 802.11n, 802.11ax, 802.11ah), and radios in a star, all with the images of the office:
+LoRa, which sends one in half a day, Bluetooth LE, LTE-M and NB-IoT."""

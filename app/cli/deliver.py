@@ -27,6 +27,7 @@ def deliver(
     link_trace: Path | None = None,
     down: tuple[str, ...] = (),
     leave_out_seen: bool = False,
+    every_radio: bool = False,
     chain: PresetName = "packetmesh",
     set: Settings = (),
     json: bool = False,
@@ -36,8 +37,8 @@ def deliver(
     Args:
         images: Images that the nodes send; of a recording each node sends a keyframe.
         out: Folder for the final result (the files of `reconstruct`), moments.csv and delivery.html.
-        preset: The network: thesis-link, greenhouse, office, lora, ble, lte-m, nb-iot, or the config.json
-            of a finished simulation.
+        preset: The network: thesis-link, greenhouse, office, wifi-n, wifi-ax, wifi-ah, lora, ble, lte-m,
+            nb-iot, or the config.json of a finished simulation.
         coding: How images are encoded: raw, raw-color-first, raw-rows, raw-tiles, png, jpeg, rvl, tiles,
             layered or exact.
         moments: Number of times at which the scene is rebuilt, after equal shares of the bytes.
@@ -46,6 +47,9 @@ def deliver(
         down: Names of nodes that have failed and send nothing, for example node_02.
         leave_out_seen: Leave out tiles that another camera shows. Every node first sends a coarse image; by
             these the sink tells each node its tiles. Needs the coding exact and two cameras.
+        every_radio: Send the images by every radio, each in a network of its own, and print what each needs
+            for the surface; `--preset` and `--link-trace` then have no effect, and only every_radio.json
+            is written. It takes minutes; fewer `--moments` are quicker.
         chain: Settings of the reconstruction to start from.
         set: Settings of the network or the reconstruction, for example
             `--set nodes.retransmit=false loss.share=0.1 loss.burst_packets=8`.
@@ -54,6 +58,7 @@ def deliver(
     named = images.source()
     before, network, config, of_network = settings_of(preset, chain, set)
 
+    from app.cli.every_radio import every_radio as compare_radios
     from app.cli.reconstruct import imported_notes
     from app.cli.runs import iterate_imported
     from app.reports.hand_out_of import write_hand_out
@@ -72,6 +77,13 @@ def deliver(
 
     check_run_folder(out, named)
     source, imported = drain(iterate_imported(named, out), say_progress)
+    if every_radio:
+        if link_trace is not None:
+            say("--link-trace changes nothing here: --every-radio takes every radio")
+        if leave_out_seen:
+            say("--leave-out-seen changes nothing here: --every-radio sends all tiles")
+        compare_radios(Spec(source, chain, config), coding, moments, down, of_network, out, json)
+        return
     if link_trace is not None:
         network = _with_link(network, link_trace, of_network)
     say_network(network, before, preset, of_network, {})

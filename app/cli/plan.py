@@ -61,7 +61,7 @@ def plan(
         cameras: Number of cameras to add, up to 20.
         sensor: Their depth camera: as-present, kinect-v1, kinect-v2, azure-kinect or realsense-d435.
         where: Where they may stand, separated by commas: walls, ceiling, furniture, tripods.
-        preset: The network: thesis-link, greenhouse, office, or the config.json of a finished simulation.
+        preset: The network: a preset of `deliver`, or the config.json of a finished simulation.
         coding: How images are encoded; `deliver` lists the codings.
         walls: Material of the walls, which damp the radio: plaster, wood, brick or concrete.
         sink: Place of the sink in metres, or "best": where its weakest link to a camera is strongest; without

@@ -32,8 +32,8 @@ def simulate(
     """Simulate the camera network: packets from the cameras to the sink, and the energy that they cost.
 
     Args:
-        preset: thesis-link, street-grid, greenhouse, office, lora, ble, lte-m, nb-iot, or the config.json of
-            a finished run.
+        preset: thesis-link, street-grid, greenhouse, office, wifi-n, wifi-ax, wifi-ah, lora, ble, lte-m,
+            nb-iot, or the config.json of a finished run.
         out: Folder for config.json, metrics.json and, without --sweep, the trace of the first run
             (trace.ndjson, trace.csv and trace.json).
         set: Settings to change, for example `--set nodes.images=5 radio.shadowing_db=4`.

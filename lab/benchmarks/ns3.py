@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from network_sim.config import LEAST_CAPTURE_DB, MacConfig, MacKind, NetworkConfig, NodesConfig, RadioConfig
-from network_sim.mac import dcf, ieee802154
+from network_sim.mac import ieee802154, physical_layer
 from network_sim.mac.saturation import saturation
 from packetmesh.errors import PacketMeshError
 
@@ -48,6 +48,7 @@ CONFIGS: dict[MacKind, NetworkConfig] = {
         nodes=NodesConfig(payload_bytes=1000 + UDP_IP_BYTES, header_bytes=UDP_IP_BYTES, spacing_m=RADIUS_M),
     ),
 }
+DSSS = physical_layer(CONFIGS["ieee80211b"].mac)
 CONSTANTS: dict[MacKind, dict[str, float]] = {
     "ieee802154": {
         "backoff": ieee802154.BACKOFF_NS / 1e3,
@@ -60,16 +61,16 @@ CONSTANTS: dict[MacKind, dict[str, float]] = {
         "retries": ieee802154.MAX_FRAME_RETRIES,
     },
     "ieee80211b": {
-        "slot": dcf.SLOT_NS / 1e3,
-        "SIFS": dcf.SIFS_NS / 1e3,
-        "DIFS": dcf.DIFS_NS / 1e3,
-        "EIFS": dcf.EIFS_NS / 1e3,
-        "data frame": dcf.data_ns(1000 + UDP_IP_BYTES) / 1e3,
-        "ACK": dcf.ACK_NS / 1e3,
-        "ACK wait": dcf.REPLY_WAIT_NS / 1e3,
-        "CW at first": dcf.MIN_WINDOW - 1,
-        "CW at most": dcf.MAX_WINDOW - 1,
-        "attempts": dcf.ATTEMPTS,
+        "slot": DSSS.slot_ns / 1e3,
+        "SIFS": DSSS.sifs_ns / 1e3,
+        "DIFS": DSSS.difs_ns / 1e3,
+        "EIFS": DSSS.eifs_ns / 1e3,
+        "data frame": DSSS.data_ns(1000 + UDP_IP_BYTES) / 1e3,
+        "ACK": DSSS.ack.duration_ns / 1e3,
+        "ACK wait": DSSS.reply_wait_ns / 1e3,
+        "CW at first": DSSS.min_window - 1,
+        "CW at most": DSSS.max_window - 1,
+        "attempts": DSSS.attempts,
     },
 }
 """Constants of network_sim, times in microseconds, by the names that ``ns3_runs.py`` uses for ns-3's."""

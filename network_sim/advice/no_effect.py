@@ -6,22 +6,25 @@ the radio or of the nodes' places may also leave all links as they were; to find
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from network_sim.config import ANY_DISTANCE, STARS, MacKind, NetworkConfig
+from network_sim.config import ANY_DISTANCE, OFDM_KINDS, STARS, WLAN_KINDS, MacKind, NetworkConfig
+from network_sim.settings.mac import GUARDS_US
 from packetmesh.settings import settings, with_settings
 
 if TYPE_CHECKING:
     from network_sim.radio.propagation import Radio
 
-CHANNELS = ("ieee802154", "ieee80211b", "lora")
+CHANNELS = ("ieee802154", *WLAN_KINDS, "lora")
 """Medium accesses whose nodes share a channel."""
 CELLULAR = ("lte-m", "nb-iot")
 _OWN: dict[str, MacKind] = {
+    "mac.rate_bps": "ieee80211b",
+    "mac.bandwidth_hz": "ieee80211ah",
     "mac.spreading_factor": "lora",
     "mac.connection_interval_s": "ble",
     "mac.full_duplex": "lte-m",
@@ -75,8 +78,17 @@ def idle_settings(config: NetworkConfig) -> dict[str, str]:
 def _of_medium_access(config: NetworkConfig) -> Reasons:
     mac, loss = config.mac, config.loss
     kind = f"mac.kind is {mac.kind}"
-    if mac.kind != "ieee80211b":
-        yield ("mac.rts", "mac.rate_bps"), f"{kind}, and only ieee80211b uses it"
+    if mac.kind not in WLAN_KINDS:
+        yield ("mac.rts",), f"{kind}, and only {_names(WLAN_KINDS)} use it"
+    if mac.kind not in OFDM_KINDS:
+        yield (
+            ("mac.mcs", "mac.ampdu_packets", "mac.ampdu_bytes"),
+            f"{kind}, and only {_names(OFDM_KINDS)} use it",
+        )
+    elif mac.ampdu_packets == 1:
+        yield ("mac.ampdu_bytes",), "mac.ampdu_packets is 1, so a frame has one packet whatever its size"
+    if mac.kind not in GUARDS_US:
+        yield ("mac.guard_us",), f"{kind}, and only {_names(tuple(GUARDS_US))} use it"
     for key, only in _OWN.items():
         if mac.kind != only:
             yield (key,), f"{kind}, and only {only} uses it"
@@ -103,6 +115,11 @@ def _of_medium_access(config: NetworkConfig) -> Reasons:
     elif loss.burst_packets <= 1.0 / (1.0 - loss.share):
         shortest = f"independent losses of loss.share {loss.share:g} already have longer bursts"
         yield ("loss.burst_packets",), f"{shortest}; try more than {1.0 / (1.0 - loss.share):.3g}"
+
+
+def _names(kinds: Sequence[str]) -> str:
+    """Return the names as part of a sentence."""
+    return f"{', '.join(kinds[:-1])} and {kinds[-1]}"
 
 
 def _of_radio(config: NetworkConfig) -> Reasons:

@@ -27,6 +27,7 @@ class OnAir(NamedTuple):
     image: int
     first_byte: int
     size_bytes: int
+    duration_ns: int
 
 
 def header_bytes(config: NetworkConfig) -> int:

@@ -1,4 +1,4 @@
-"""Frames of IEEE 802.11 as bytes, with their check sums, behind a radiotap header.
+"""Frames of IEEE 802.11 as bytes, with their check sums.
 
 Fields are those of IEEE 802.11-2007, 7.2; all numbers are little-endian. The stations form an ad-hoc network:
 each frame goes straight from sender to receiver.
@@ -6,6 +6,7 @@ each frame goes straight from sender to receiver.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from struct import Struct
 from zlib import crc32
 
@@ -18,26 +19,22 @@ EXPERIMENTAL = 0x88B5
 
 _NETWORK = bytes.fromhex("02504dffffff")
 """Identifier of the network (BSSID), locally administered."""
-_DATA, _RTS, _CTS, _ACK = 0x0008, 0x00B4, 0x00C4, 0x00D4
+_DATA, _QOS_DATA, _BLOCK_ACK, _RTS, _CTS, _ACK = 0x0008, 0x0088, 0x0094, 0x00B4, 0x00C4, 0x00D4
 """Frame control of each kind of frame."""
 _RETRY = 0x0800
+_COMPRESSED = 0x0004
+"""Control field of a compressed block acknowledgement of best effort."""
+_SHORT_BLOCK_ACK_BYTES = 32
+_WIDE_BITMAP = 4
+"""Fragment number of a bitmap of 256 packets."""
 _SNAP = bytes.fromhex("aaaa03000000")
 """LLC and SNAP header before the EtherType."""
-_RADIOTAP = Struct("<BBHIBB").pack
-_FLAGS_AND_RATE = 0b110
-_WITH_CHECK_SUM = 0x10
-_RATE_STEP_BPS = 500_000
 _TWO = Struct("<HH").pack
 
 
 def address(node: int) -> bytes:
     """Return the locally administered MAC address 02:50:4d:00:xx:xx of a node, from its number there."""
     return b"\x02\x50\x4d\x00" + node.to_bytes(2, "big")
-
-
-def radiotap(rate_bps: float) -> bytes:
-    """Return the radiotap header of a frame that ends with its check sum and is sent at this rate."""
-    return _RADIOTAP(0, 0, 10, _FLAGS_AND_RATE, _WITH_CHECK_SUM, round(rate_bps / _RATE_STEP_BPS))
 
 
 def data_frame(
@@ -49,7 +46,7 @@ def data_frame(
     ether_type: int,
     payload: bytes,
 ) -> bytes:
-    """Return a data frame without radiotap header.
+    """Return a data frame.
 
     Args:
         sender: address of the station that sends.
@@ -60,9 +57,52 @@ def data_frame(
         ether_type: what the payload is.
         payload: what the frame carries after LLC and SNAP.
     """
-    control = _DATA | _RETRY if retry else _DATA
+    return _data(_DATA, sender, receiver, sequence, retry, reserved_us, b"", ether_type, payload)
+
+
+def qos_data_frame(
+    sender: bytes,
+    receiver: bytes,
+    sequence: int,
+    retry: bool,
+    reserved_us: int,
+    ether_type: int,
+    payload: bytes,
+) -> bytes:
+    """Return a data frame of best effort, to be acknowledged at once; arguments as for ``data_frame``."""
+    return _data(_QOS_DATA, sender, receiver, sequence, retry, reserved_us, b"\0\0", ether_type, payload)
+
+
+def _data(
+    kind: int,
+    sender: bytes,
+    receiver: bytes,
+    sequence: int,
+    retry: bool,
+    reserved_us: int,
+    qos: bytes,
+    ether_type: int,
+    payload: bytes,
+) -> bytes:
+    control = kind | _RETRY if retry else kind
     header = _TWO(control, reserved_us) + receiver + sender + _NETWORK + (sequence << 4).to_bytes(2, "little")
-    return _with_check_sum(header + _SNAP + ether_type.to_bytes(2, "big") + payload)
+    return _with_check_sum(header + qos + _SNAP + ether_type.to_bytes(2, "big") + payload)
+
+
+def block_ack(sender: bytes, receiver: bytes, received: Mapping[int, bool], size_bytes: int) -> bytes:
+    """Return a compressed block acknowledgement.
+
+    Args:
+        sender: address of the station that answers.
+        receiver: address of the station that sent the packets.
+        received: whether each packet arrived, by sequence number, in the order of the numbers.
+        size_bytes: 32 for a bitmap of 64 packets, 56 for one of 256 (IEEE 802.11ax-2021, 9.3.1.8.2).
+    """
+    first, wide = next(iter(received)), size_bytes > _SHORT_BLOCK_ACK_BYTES
+    bitmap = sum(1 << (number - first) % SEQUENCES for number, well in received.items() if well)
+    start = first << 4 | (_WIDE_BITMAP if wide else 0)
+    body = _TWO(_COMPRESSED, start) + bitmap.to_bytes(32 if wide else 8, "little")
+    return _with_check_sum(_TWO(_BLOCK_ACK, 0) + receiver + sender + body)
 
 
 def acknowledgement(receiver: bytes) -> bytes:

@@ -7,20 +7,33 @@ from typing import Any, Protocol
 
 import simpy
 
-from network_sim.config import MacKind, NetworkConfig
-from network_sim.mac import ble, dcf, ieee802154, lora, lte_m, nb_iot
+from network_sim.config import OFDM_KINDS, MacConfig, MacKind, NetworkConfig
+from network_sim.mac import (
+    ble,
+    ieee80211ah,
+    ieee80211ax,
+    ieee80211b,
+    ieee80211n,
+    ieee802154,
+    lora,
+    lte_m,
+    nb_iot,
+)
+from network_sim.mac.aggregating import Aggregating
 from network_sim.mac.ble import Ble
 from network_sim.mac.cellular import Cellular
 from network_sim.mac.context import MacContext
 from network_sim.mac.dcf import Dcf
 from network_sim.mac.ieee802154 import Ieee802154
 from network_sim.mac.lora import Lora
+from network_sim.mac.phy import DELIMITER_BYTES, QOS_HEADER_BYTES, PhysicalLayer
 from network_sim.mac.replay import RecordedLink
 from network_sim.mac.simple import OwnLink
 from network_sim.types import Delivery, Packet
 
 FRAME_HEADER_BYTES: dict[MacKind, int] = {
-    "ieee80211b": dcf.HEADER_BYTES,
+    "ieee80211b": ieee80211b.HEADER_BYTES,
+    **dict.fromkeys(OFDM_KINDS, QOS_HEADER_BYTES + DELIMITER_BYTES),
     "ieee802154": ieee802154.PHY_BYTES + ieee802154.HEADER_BYTES,
     "lora": lora.HEADER_BYTES,
     "ble": ble.HEADER_BYTES,
@@ -55,7 +68,25 @@ def make_mac(context: MacContext) -> Mac:
         return Ble(context)
     if kind in ("lte-m", "nb-iot"):
         return Cellular(context, (lte_m if kind == "lte-m" else nb_iot).carrier(context.config.mac))
-    return Ieee802154(context) if kind == "ieee802154" else Dcf(context)
+    if kind == "ieee802154":
+        return Ieee802154(context)
+    return make_wlan(context)
+
+
+def make_wlan(context: MacContext, wait_after_loss: bool = True) -> Mac:
+    """Create the medium access of an IEEE 802.11 network; ``wait_after_loss`` is that of ``Contention``."""
+    layer = physical_layer(context.config.mac)
+    return (Dcf if layer.aggregation is None else Aggregating)(context, layer, wait_after_loss)
+
+
+def physical_layer(mac: MacConfig) -> PhysicalLayer:
+    """Return the physical layer of an IEEE 802.11 network."""
+    return {
+        "ieee80211b": ieee80211b,
+        "ieee80211n": ieee80211n,
+        "ieee80211ax": ieee80211ax,
+        "ieee80211ah": ieee80211ah,
+    }[mac.kind].physical_layer(mac)
 
 
 def pace_ns(config: NetworkConfig) -> int:

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 from scipy.optimize import brentq
 
+from network_sim.mac.phy import PhysicalLayer
+
 
 @dataclass(frozen=True, slots=True)
 class Timing:
@@ -43,6 +45,29 @@ DSSS_11 = Timing(
     delay_us=1,
 )
 """IEEE 802.11b at 11 Mb/s, 1000 bytes over UDP, long preambles."""
+
+
+def timing_of(layer: PhysicalLayer, payload_bytes: int, header_bytes: int, packets: int = 1) -> Timing:
+    """Return the timing of frames that each carry a number of equal packets.
+
+    Args:
+        layer: physical layer of an IEEE 802.11 network.
+        payload_bytes: payload of the medium access in each packet.
+        header_bytes: bytes of the payload that are headers of higher layers, which are no throughput.
+        packets: packets in a frame, 1 or more; the frame of several is answered by a block acknowledgement.
+    """
+    return Timing(
+        payload_bits=8.0 * packets * (payload_bytes - header_bytes),
+        header_us=layer.data.preamble_ns / 1e3,
+        payload_us=(layer.frame_ns([payload_bytes] * packets) - layer.data.preamble_ns) / 1e3,
+        ack_us=layer.answer(packets).duration_ns / 1e3,
+        rts_us=layer.rts_ns / 1e3,
+        cts_us=layer.cts.duration_ns / 1e3,
+        slot_us=layer.slot_ns / 1e3,
+        sifs_us=layer.sifs_ns / 1e3,
+        difs_us=layer.difs_ns / 1e3,
+        delay_us=layer.propagation_ns / 1e3,
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -72,6 +72,19 @@ class Transmission:
             )
             for instant_ns in instants_ns
         )
+
+
+def peak_w(frames: Sequence[tuple[Transmission, float]], start_ns: int, end_ns: int) -> float:
+    """Return the largest sum of the powers of frames at any instant from ``start_ns`` to ``end_ns``."""
+    present = [(one, power_w) for one, power_w in frames if one.start_ns < end_ns and one.end_ns > start_ns]
+    instants_ns = [max(one.start_ns, start_ns) for one, _ in present]
+    return max(
+        (
+            sum(power_w for one, power_w in present if one.start_ns <= instant_ns < one.end_ns)
+            for instant_ns in instants_ns
+        ),
+        default=0.0,
+    )
 
 
 @dataclass(slots=True, eq=False)
@@ -267,6 +280,44 @@ class Medium:
             if self._rng.random() < radio.error_rate(sinr, frame.size_bytes, frame.modulation):
                 return Cause.NOISE
         return _NONE
+
+    def outcomes(
+        self, frame: Transmission, preamble_ns: int, instants_ns: Sequence[int], parts_bytes: Sequence[int]
+    ) -> list[Cause]:
+        """Determine which parts of a frame that ends now are received; call once, as ``outcome``.
+
+        A part is lost to the frames that overlap it, or to bit errors in it; all are if the preamble is.
+
+        Args:
+            frame: the frame.
+            preamble_ns: duration of its preamble, which is in the first part.
+            instants_ns: (P + 1,) start of each part, and end of the last one.
+            parts_bytes: (P,) bytes of each part.
+
+        Returns:
+            (P,) causes, as those of ``outcome``.
+        """
+        radio, receiver, power_w, count = self.radio, frame.receiver, frame.power_w, len(parts_bytes)
+        if power_w < self._rx_w:
+            return [Cause.RANGE] * count
+        if not frame.overlaps and radio.noise_w is None:
+            return [_NONE] * count
+        if any(other.sender == receiver for other in frame.overlaps):
+            return [Cause.COLLISION] * count
+        others = [(one, radio.faded_w(self.power_w(one.sender, receiver))) for one in frame.overlaps]
+        most_w, begins_ns = power_w / radio.capture_ratio, frame.start_ns
+        if others and peak_w(others, begins_ns, begins_ns + preamble_ns) >= most_w:
+            return [Cause.COLLISION] * count
+        causes = []
+        for k, part_bytes in enumerate(parts_bytes):
+            interference_w = peak_w(others, instants_ns[k], instants_ns[k + 1])
+            cause = Cause.COLLISION if interference_w >= most_w else _NONE
+            if not cause and radio.noise_w is not None:
+                sinr = power_w / (radio.noise_w + interference_w)
+                if self._rng.random() < radio.error_rate(sinr, part_bytes, frame.modulation):
+                    cause = Cause.NOISE
+            causes.append(cause)
+        return causes
 
     def _lost_in_overlap(self, frame: Transmission, powers_w: list[float], interference_w: float) -> bool:
         """Return whether an 802.15.4 receiver loses a frame to the frames that overlap it.

@@ -13,19 +13,19 @@ from typing import Any
 import numpy as np
 import simpy
 
-from network_sim.config import NetworkConfig, RunConfig
-from network_sim.mac import Mac, make_mac
+from network_sim.config import WLAN_KINDS, NetworkConfig, RunConfig
+from network_sim.mac import Mac, make_mac, make_wlan
 from network_sim.mac.context import MacContext
-from network_sim.mac.dcf import Dcf
 from network_sim.mac.medium import Medium
 from network_sim.radio.places import place_nodes
 from network_sim.radio.propagation import Radio
 from network_sim.trace.counters import Counters
 from network_sim.trace.log import Recorder
-from network_sim.types import BEGIN_WITHIN_NS, Cause, EventKind, Packet, PacketKind, to_ns
+from network_sim.types import BEGIN_WITHIN_NS, Cause, Delivery, EventKind, Packet, PacketKind, to_ns
 
 WARM_UP = 0.05
 """Share of the duration that is not counted, at the start: the nodes all start within 10 ms."""
+_ARRIVED = Cause.NONE, Cause.ACK_LOST
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +58,10 @@ def saturation(
         nodes: number of sending nodes.
         duration_s: simulated time, warm-up included.
         seed: random seed; the same seed gives the same result.
-        wait_after_loss: False makes IEEE 802.11b wait only a DIFS after a collision, as in Bianchi's model.
+        wait_after_loss: False makes IEEE 802.11 wait only a DIFS after a collision, as in Bianchi's model.
 
     Raises:
-        ValueError: ``wait_after_loss`` is False for a medium access other than IEEE 802.11b.
+        ValueError: ``wait_after_loss`` is False for a medium access other than IEEE 802.11.
     """
     config = replace(
         config,
@@ -75,12 +75,20 @@ def saturation(
         env, Radio(config.radio, config.mac, rngs[1]), place_nodes(config.nodes, rngs[0]), rngs[2]
     )
     recorder = Recorder(config.run.keep, nodes + 1, to_ns(config.run.warmup_s))
-    if not wait_after_loss and config.mac.kind != "ieee80211b":
+    if not wait_after_loss and config.mac.kind not in WLAN_KINDS:
         raise ValueError(f"{config.mac.kind} has no EIFS")
-    context = MacContext(env, medium, config, recorder, rngs[3], lambda node: True, lambda packet, node: None)
-    mac = make_mac(context) if wait_after_loss else Dcf(context, wait_after_loss=False)
     ids = count()
+    warmup_ns = to_ns(config.run.warmup_s)
     tallies = [_Tally() for _ in range(nodes)]
+
+    def report(packet: Packet, sender: int, receiver: int, delivery: Delivery) -> None:
+        if env.now >= warmup_ns:
+            tallies[sender].count(delivery)
+
+    context = MacContext(
+        env, medium, config, recorder, rngs[3], lambda node: True, lambda packet, node: None, report
+    )
+    mac = make_mac(context) if wait_after_loss else make_wlan(context, wait_after_loss=False)
     begin_ns = rngs[4].integers(BEGIN_WITHIN_NS, size=nodes).tolist()
     for node, tally in enumerate(tallies):
         env.process(_saturate(env, mac, config, node, ids, tally, begin_ns[node]))
@@ -97,6 +105,11 @@ class _Tally:
 
     packets: int = 0
     arrived: int = 0
+
+    def count(self, delivery: Delivery) -> None:
+        """Count a packet by its outcome."""
+        self.packets += 1
+        self.arrived += delivery.cause in _ARRIVED
 
 
 def _summary(
@@ -130,10 +143,9 @@ def _saturate(
 ) -> Generator[simpy.Event, Any, None]:
     """Send the next packet of a node as soon as the last is delivered or dropped, without end."""
     sink, size_bytes, warmup_ns = config.nodes.count, config.nodes.payload_bytes, to_ns(config.run.warmup_s)
-    kind, arrived = PacketKind.IMAGE, (Cause.NONE, Cause.ACK_LOST)  # slow to look up for every packet
+    kind = PacketKind.IMAGE  # slow to look up for every packet
     yield env.timeout(begin_ns)
     while True:
         delivery = yield from mac.send(Packet(next(ids), kind, node, sink, size_bytes), node, sink)
-        if env.now >= warmup_ns:
-            tally.packets += 1
-            tally.arrived += delivery.cause in arrived
+        if env.now >= warmup_ns and not delivery.under_way:
+            tally.count(delivery)

@@ -14,11 +14,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from network_sim.config import MacConfig, NetworkConfig, RadioConfig
+from network_sim.config import OFDM_KINDS, MacConfig, NetworkConfig, RadioConfig
+from network_sim.radio import ofdm
+from network_sim.radio.ofdm import OfdmModulation
 from network_sim.radio.places import Places
 
-Modulation = Literal["dbpsk", "dqpsk", "cck5.5", "cck11", "oqpsk", "lora", "gfsk"]
-"""Modulations: IEEE 802.11b at 1, 2, 5.5 and 11 Mb/s, IEEE 802.15.4 at 250 kb/s, LoRa, Bluetooth LE."""
+Modulation = Literal["dbpsk", "dqpsk", "cck5.5", "cck11", "oqpsk", "lora", "gfsk"] | OfdmModulation
+"""Modulations: IEEE 802.11b at 1, 2, 5.5 and 11 Mb/s, IEEE 802.15.4 at 250 kb/s, LoRa, Bluetooth LE, and
+those of IEEE 802.11n, 802.11ax and 802.11ah."""
 IEEE80211B: dict[float, tuple[Modulation, float]] = {
     1e6: ("dbpsk", 9.0),
     2e6: ("dqpsk", 6.0),
@@ -243,12 +246,32 @@ def modulation(mac: MacConfig) -> Modulation:
     """Return the modulation of a medium access's data frames."""
     if mac.kind == "ieee80211b":
         return IEEE80211B[mac.rate_bps][0]
+    if mac.kind in OFDM_KINDS:
+        return ofdm_modulation(mac)
     return "lora" if mac.kind == "lora" else "gfsk" if mac.kind == "ble" else "oqpsk"
 
 
+def ofdm_modulation(mac: MacConfig) -> OfdmModulation:
+    """Return the modulation of the MCS of IEEE 802.11n, 802.11ax or 802.11ah."""
+    twice = mac.kind == "ieee80211ah" and mac.mcs == ofdm.MCS_TWICE
+    return "2 x bpsk 1/2" if twice else ofdm.BY_MCS[mac.mcs]
+
+
+def _ofdm_less_db(mac: MacConfig) -> float:
+    """Return the decibels by which an MCS needs less power than the fastest of its standard at its full
+    width."""
+    fastest: OfdmModulation = "1024-qam 5/6" if mac.kind == "ieee80211ax" else "64-qam 5/6"
+    widest_hz = 2e6 if mac.kind == "ieee80211ah" else 20e6
+    own_hz = mac.bandwidth_hz if mac.kind == "ieee80211ah" else 20e6
+    own_dbm = ofdm.sensitivity_dbm(ofdm_modulation(mac), own_hz)
+    return ofdm.sensitivity_dbm(fastest, widest_hz) - own_dbm
+
+
 def _threshold_w(config: RadioConfig, mac: MacConfig) -> float:
-    """Return the power at the nominal range, or less for slower rates of IEEE 802.11b and LoRa."""
+    """Return the power at the nominal range, or less for slower rates of IEEE 802.11 and LoRa."""
     less_db = IEEE80211B[mac.rate_bps][1] if mac.kind == "ieee80211b" else 0.0
+    if mac.kind in OFDM_KINDS:
+        less_db = _ofdm_less_db(mac)
     if mac.kind == "lora":
         less_db = LORA[mac.spreading_factor][0]
     return path_loss(config).power_w(config.range_m) * ratio(-less_db)
@@ -276,7 +299,7 @@ class Radio:
         """Carrier-sense threshold; never above the receive threshold."""
         capture_db = config.capture_db
         if capture_db is None:
-            capture_db = _CAPTURE_DB.get(modulation(mac), DSSS_CAPTURE_DB)
+            capture_db = _capture_db(mac)
         self.capture_ratio = ratio(capture_db)
         """Least ratio of a frame's power to the sum of overlapping powers with which it survives."""
         noise_dbm = None if mac.kind == "ble" else config.noise_dbm
@@ -339,10 +362,21 @@ class Radio:
             return _one_wrong(cck11_symbol_error_rate(sinr), size_bytes)
         if kind == "cck5.5":
             return _one_wrong(cck5_symbol_error_rate(sinr), 2 * size_bytes)
+        if kind in ofdm.SCHEMES:
+            return _one_wrong(ofdm.bit_error_rate(sinr, ofdm.SCHEMES[kind]), 8 * size_bytes)
         return _one_wrong(_BIT_ERROR_RATES[kind](sinr), 8 * size_bytes)
 
 
 _CAPTURE_DB: dict[Modulation, float] = {"oqpsk": OQPSK_CAPTURE_DB, "lora": LORA_CAPTURE_DB}
+
+
+def _capture_db(mac: MacConfig) -> float:
+    """Return the capture ratio if ``radio.capture_db`` is None; OFDM needs what it needs over noise."""
+    if mac.kind in OFDM_KINDS:
+        return ofdm.SCHEMES[ofdm_modulation(mac)].needed_db
+    return _CAPTURE_DB.get(modulation(mac), DSSS_CAPTURE_DB)
+
+
 _BIT_ERROR_RATES: dict[Modulation, Callable[[float], float]] = {
     "dbpsk": dbpsk_bit_error_rate,
     "dqpsk": dqpsk_bit_error_rate,

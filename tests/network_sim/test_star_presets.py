@@ -33,7 +33,7 @@ def test_three_images_take_the_time_of_the_guide(preset, time, unit):
     assert f"{arrived.t_ns.max() / {'s': 1e9, 'h': 3600e9}[unit]:.{decimals}f}" == time
 
 
-@pytest.mark.parametrize("preset", ["lora", "ble", "lte-m", "nb-iot"])
+@pytest.mark.parametrize("preset", ["wifi-n", "wifi-ax", "wifi-ah", "lora", "ble", "lte-m", "nb-iot"])
 @pytest.mark.parametrize(
     "changes",
     [

@@ -9,7 +9,16 @@ from types import MappingProxyType
 from app.drawing.colors import INFERRED, SOURCE, TARGET
 from app.web.markup import Markdown
 from network_sim.config import STARS, EnergyConfig, NetworkConfig
-from network_sim.presets import MODULE_23_DBM, NRF52840, PRESETS, SX1276, WAVELAN
+from network_sim.presets import (
+    ESP32_C6_AX,
+    ESP32_C6_N,
+    HALOW_20_DBM,
+    MODULE_23_DBM,
+    NRF52840,
+    PRESETS,
+    SX1276,
+    WAVELAN,
+)
 from network_sim.types import Cause, PacketKind
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings
@@ -34,6 +43,20 @@ NETWORKS: Mapping[str, Preset] = MappingProxyType(
             "Office: WLAN to one access point",
             "IEEE 802.11b at 11 Mbit/s, the sink 8 m away, an uplink to the cloud; the deadline is 10 "
             "seconds.",
+        ),
+        "wifi-n": Preset(
+            "802.11n: 65 Mbit/s, many packets in a frame",
+            "IEEE 802.11n at MCS 7: up to 64 packets in a frame, of which only the lost ones are sent again; "
+            "the deadline is 10 seconds.",
+        ),
+        "wifi-ax": Preset(
+            "802.11ax: 115 Mbit/s nearby",
+            "IEEE 802.11ax at MCS 9, which reaches 13 m: many packets in a frame; the deadline is 10 "
+            "seconds.",
+        ),
+        "wifi-ah": Preset(
+            "802.11ah: WLAN for 100 m",
+            "IEEE 802.11ah at 915 MHz, 6.5 Mbit/s: up to 16 packets in a frame; the deadline is 10 seconds.",
         ),
         "thesis-link": Preset(
             "Thesis: 250 kbit/s to one sink",
@@ -110,12 +133,26 @@ def _power(of: EnergyConfig) -> tuple[str, ...]:
 
 CC2420_POWER, WAVELAN_POWER = _power(EnergyConfig()), _power(WAVELAN)
 SX1276_POWER, NRF52840_POWER, MODULE_POWER = _power(SX1276), _power(NRF52840), _power(MODULE_23_DBM)
+N_POWER, AX_POWER, AH_POWER = _power(ESP32_C6_N), _power(ESP32_C6_AX), _power(HALOW_20_DBM)
 ACCESS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "IEEE 802.15.4": ("mac.kind=ieee802154", *CC2420_POWER),
         "IEEE 802.15.4 without ACK": ("mac.kind=ieee802154", "mac.ack=false", *CC2420_POWER),
         "IEEE 802.11b": ("mac.kind=ieee80211b", *WAVELAN_POWER),
         "IEEE 802.11b with RTS/CTS": ("mac.kind=ieee80211b", "mac.rts=true", *WAVELAN_POWER),
+        "IEEE 802.11n, MCS 7": ("mac.kind=ieee80211n", "mac.mcs=7", *N_POWER),
+        "IEEE 802.11n, MCS 0": ("mac.kind=ieee80211n", "mac.mcs=0", *N_POWER),
+        "IEEE 802.11n, one packet in a frame": (
+            *("mac.kind=ieee80211n", "mac.mcs=7", "mac.ampdu_packets=1"),
+            *N_POWER,
+        ),
+        "IEEE 802.11ax, MCS 9": ("mac.kind=ieee80211ax", "mac.mcs=9", *AX_POWER),
+        "IEEE 802.11ax, MCS 11": ("mac.kind=ieee80211ax", "mac.mcs=11", *AX_POWER),
+        "IEEE 802.11ah, 2 MHz, MCS 7": ("mac.kind=ieee80211ah", "mac.mcs=7", *AH_POWER),
+        "IEEE 802.11ah, 1 MHz, MCS 7": (
+            *("mac.kind=ieee80211ah", "mac.mcs=7", "mac.bandwidth_hz=1000000"),
+            *AH_POWER,
+        ),
         "a separate link for each node, 250 kbit/s": ("mac.kind=ideal", "mac.link_bps=250000"),
         "a separate link for each node, 1 Mbit/s": ("mac.kind=ideal", "mac.link_bps=1000000"),
         "a separate link for each node, 10 Mbit/s": ("mac.kind=ideal", "mac.link_bps=10000000"),

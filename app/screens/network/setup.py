@@ -57,7 +57,7 @@ class NetworkSetup:
             "Coding", list(CODING_NAMES), hint="How images are encoded, and which bytes are sent first."
         )
         self._leave_out = gui.add_checkbox(
-            "Leave out what another camera showed",
+            "Leave out seen tiles",
             False,
             hint="Every camera first sends a coarse image. The sink then tells each the tiles that another "
             "camera shows, and these are not sent. Needs two cameras, the coding with AVIF colour, and a "

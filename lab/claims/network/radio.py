@@ -13,7 +13,7 @@ from lab.claims.network.tasks import Crowd, saturated
 from lab.trials import iterate_trials
 from network_sim.config import NodesConfig
 from network_sim.mac.bianchi import bianchi
-from network_sim.mac.dcf import EIFS_NS
+from network_sim.mac.ieee80211b import EIFS_NS
 from network_sim.presets import PRESETS
 from network_sim.radio.propagation import crossover_m, ground_reflection, wavelength_m
 from packetmesh.progress import Progress

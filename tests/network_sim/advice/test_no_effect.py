@@ -26,6 +26,11 @@ LARGE = [
     *(*RELAYED, "nodes.interval_s=0.7", "nodes.image_bytes=20000", "nodes.depth_bytes=9000"),
     *("nodes.deadline_s=2", "run.horizon_s=4"),
 ]
+WIFI = [
+    *("nodes.layout=line", "nodes.count=5", "nodes.images=0", "nodes.interval_s=0.2"),
+    *("nodes.image_bytes=40000", "nodes.depth_bytes=9000", "nodes.deadline_s=0.3", "run.horizon_s=1.2"),
+    *("radio.shadowing_db=2", "radio.capture_db=6", "nodes.duty_period_s=1"),
+]
 STREET = [
     *("run.horizon_s=24", "run.warmup_s=5", "street.vehicles=40", "street.blocks=2"),
     *("scheme.image_bytes=6000", "scheme.summary_interval_s=2"),
@@ -63,6 +68,18 @@ CASES = {
     "lossy": ("office", [*LARGE, "loss.share=0.3", "nodes.duty_cycle=0.5", "nodes.duty_period_s=1.5"]),
     "log-distance": ("office", [*LARGE, "radio.model=log-distance"]),
     "friis": ("office", [*LARGE, "radio.model=friis", *WALLS]),
+    "wifi-n, lossy": (
+        "wifi-n",
+        [*WIFI, "nodes.spacing_m=18", "loss.share=0.3", "mac.retries=1", "mac.ampdu_packets=1"],
+    ),
+    "wifi-ax": (
+        "wifi-ax",
+        [*WIFI, "nodes.spacing_m=8", "radio.noise_dbm=-84", "radio.sense_range_m=14"],
+    ),
+    "wifi-ah": (
+        "wifi-ah",
+        [*WIFI, "nodes.spacing_m=90", "nodes.interval_s=1", "run.horizon_s=4", "nodes.deadline_s=0.9"],
+    ),
     "lora": ("lora", [*STAR, *CROWDED]),
     "lora with noise and acknowledgements": (
         "lora",
@@ -82,6 +99,11 @@ VALUES = {
     "mac.connection_interval_s": ["0.1"],
     "mac.tones": ["3"],
     "mac.rate_bps": ["2e6"],
+    "mac.mcs": ["3"],
+    "mac.guard_us": ["0.4", "1.6"],
+    "mac.bandwidth_hz": ["1e6"],
+    "mac.ampdu_packets": ["3"],
+    "mac.ampdu_bytes": ["5000"],
     "mac.trace": ["SLOWER"],
     "uplink.trace": ["SLOWER"],
     "radio.walls_m": ["130,-9,130,9", "-20,-10,420,430"],

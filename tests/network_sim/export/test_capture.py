@@ -15,10 +15,10 @@ import pytest
 
 from network_sim.config import NetworkConfig
 from network_sim.export.capture import check_capture, write_capture
-from network_sim.mac import dcf
+from network_sim.mac import ieee80211b
 from network_sim.presets import PRESETS
 from network_sim.simulate import simulate
-from network_sim.trace.log import NetworkTrace, Recorder
+from network_sim.trace.log import Events, NetworkTrace, Recorder
 from network_sim.types import Cause, EventKind, PacketKind
 from packetmesh.errors import InputError
 from packetmesh.settings import with_settings
@@ -29,6 +29,7 @@ RELAYS = ("greenhouse", "nodes.images=1", "nodes.header_bytes=10", "run.horizon_
 WLAN = ("office", "run.horizon_s=4", "nodes.count=8", "nodes.interval_s=2", "nodes.depth_bytes=0")
 RTS = (*WLAN, "mac.rts=true")
 STREET = ("street-grid", "run.keep=all", "run.horizon_s=30", "run.warmup_s=0")
+MANY = ("run.horizon_s=3", "nodes.count=3", "nodes.interval_s=2", "nodes.depth_bytes=0", "loss.share=0.2")
 CASES = {
     "wpan": WPAN,
     "wpan without acknowledgements": (*WPAN, "mac.ack=false"),
@@ -38,6 +39,12 @@ CASES = {
     "rts": RTS,
     "slow": (*WLAN, "mac.rate_bps=1e6", "nodes.header_bytes=0"),
     "street": STREET,
+    "n": ("wifi-n", *MANY),
+    "n, rts": ("wifi-n", *MANY, "mac.rts=true", "mac.guard_us=0.4", "nodes.header_bytes=0"),
+    "ax": ("wifi-ax", *MANY, "mac.guard_us=1.6", "nodes.count=6", "run.horizon_s=6"),
+    "ax, wide": ("wifi-ax", *MANY, "mac.ampdu_packets=256", "mac.mcs=0", "nodes.payload_bytes=100"),
+    "ah": ("wifi-ah", *MANY),
+    "ah, rts": ("wifi-ah", *MANY, "mac.rts=true"),
     "ideal": ("thesis-link", "mac.kind=ideal", "nodes.header_bytes=30", "nodes.image_bytes=3000"),
 }
 
@@ -67,6 +74,7 @@ def written(case: str, folder: Path) -> tuple[NetworkTrace, list[bytes]]:
     write_capture(trace, path)
     found = list(records(path))
     on_air = trace.events.of(EventKind.AIR, EventKind.ACK)
+    on_air = on_air.where(on_air.size_bytes > 0)  # without the answers that are preambles only
     assert [t_ns for t_ns, _ in found] == on_air.t_ns.tolist()
     assert len(found) > 50
     return trace, [frame for _, frame in found]
@@ -131,7 +139,7 @@ def test_ieee80211_frames_have_the_sizes_rates_and_numbers_of_the_run(case: str,
         assert frame[:9] == bytes.fromhex("00000a000600000010")
         body, node, peer = frame[10:], int(events.node[index]), int(events.peer[index])
         assert len(body) == events.size_bytes[index]
-        assert dcf.air_ns(len(body), frame[9] * 500e3) == events.duration_ns[index]
+        assert ieee80211b.waveform(frame[9] * 500e3).air_ns(len(body)) == events.duration_ns[index]
         assert crc32(body[:-4]) == int.from_bytes(body[-4:], "little")
         assert body[4:10] == b"\x02PM\0" + (peer + 1).to_bytes(2, "big")
         kinds[body[0]] += 1
@@ -151,6 +159,52 @@ def test_ieee80211_frames_have_the_sizes_rates_and_numbers_of_the_run(case: str,
     if case == "wlan":
         assert sum(resent(trace)) > 0
         assert kinds[0x08] - kinds[0xD4] == failed
+
+
+@pytest.mark.parametrize("case", ["n", "n, rts", "ax", "ax, wide", "ah", "ah, rts"])
+def test_block_acknowledgements_say_what_arrived(case: str, tmp_path: Path) -> None:
+    trace, frames = written(case, tmp_path)
+    events = trace.events.of(EventKind.AIR, EventKind.ACK)
+    events = events.where(events.size_bytes > 0)
+    lost = {
+        (node, packet, t_ns)
+        for node, packet, t_ns, cause in _columns(trace.events.of(EventKind.LOSS), "node packet t_ns cause")
+        if cause != Cause.ACK_LOST
+    }
+    sent: dict[int, list[tuple[int, int, int]]] = {}
+    """Number, packet and end of each packet of the latest data frame of each node."""
+    numbers: dict[tuple[int, int], int] = {}
+    answers = 0
+    columns = _columns(events, "kind node peer packet t_ns duration_ns size_bytes")
+    for frame, (kind, node, peer, packet, t_ns, duration_ns, size) in zip(frames, columns, strict=True):
+        body = frame[int.from_bytes(frame[2:4], "little") :]
+        assert crc32(body[:-4]) == int.from_bytes(body[-4:], "little")
+        assert body[4:10] == b"\x02PM\0" + (peer + 1).to_bytes(2, "big")
+        if kind == EventKind.AIR:
+            assert body[0] == 0x88
+            assert 0 <= size - len(body) <= 4 + 3  # delimiter and padding
+            number = int.from_bytes(body[22:24], "little") >> 4
+            assert (body[1] == 8) == ((node, packet) in numbers)
+            assert numbers.setdefault((node, packet), number) == number
+            parts = sent.setdefault(node, [])
+            if parts and parts[-1][2] != t_ns:
+                parts.clear()
+            parts.append((number, packet, t_ns + duration_ns))
+        elif body[0] == 0x94:
+            answers += 1
+            assert len(body) == size
+            first, wide = int.from_bytes(body[18:20], "little"), size == 56
+            assert first & 15 == (4 if wide else 0)
+            bitmap = int.from_bytes(body[20:-4], "little")
+            end_ns = sent[peer][-1][2]
+            arrived = [number for number, one, _ in sent[peer] if (peer, one, end_ns) not in lost]
+            assert first >> 4 == sent[peer][0][0]
+            assert bitmap == sum(1 << (number - (first >> 4)) for number in arrived)
+    assert (answers > 5) == (not case.startswith("ah"))
+
+
+def _columns(events: Events, names: str) -> list[tuple[int, ...]]:
+    return list(zip(*(getattr(events, name).tolist() for name in names.split()), strict=True))
 
 
 @pytest.mark.parametrize("kind", ["ieee802154", "ieee80211b"])
@@ -264,3 +318,30 @@ def test_tshark_finds_nothing_wrong(case: str, tmp_path: Path) -> None:
         assert udp in ("", "1", "2", "Good", "Unverified")
     if trace.config.mac.kind != "ideal":
         assert all(wpan or wlan for _, _, wpan, wlan, _ in rows)
+
+
+@pytest.mark.skipif(shutil.which("tshark") is None, reason="tshark is not installed")
+@pytest.mark.parametrize(
+    ("preset", "field", "of_data", "of_answer"),
+    [
+        # wlan_radio.duration, us: as the simulated frames, without the signal extension of 6 us
+        ("wifi-n", "wlan_radio.duration", "228", "28"),
+        ("wifi-n", "radiotap.mcs.index", "7", ""),
+        ("wifi-ax", "radiotap.he.data_3.data_mcs", "0x0009", ""),
+        ("wifi-ah", "radiotap.s1g.mcs", "7", None),
+    ],
+)
+def test_tshark_reads_how_frames_were_sent(
+    preset: str, field: str, of_data: str, of_answer: str | None, tmp_path: Path
+) -> None:
+    changes = ["run.horizon_s=3", "nodes.interval_s=2", "nodes.payload_bytes=1498", "mac.ampdu_packets=1"]
+    trace, path = simulate(with_settings(PRESETS[preset], changes)), tmp_path / "trace.pcap"
+    write_capture(trace, path)
+    words = ["tshark", "-r", str(path), "-c", "2", "-T", "fields", "-e", field]
+    lines = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split("\n")
+    assert lines[0] == of_data
+    if of_answer is not None:
+        assert lines[1] == of_answer
+    if preset == "wifi-n":
+        assert trace.events.of(EventKind.AIR).duration_ns[0] == (228 + 6) * 1000
+        assert trace.events.of(EventKind.ACK).duration_ns[0] == (28 + 6) * 1000

@@ -5,6 +5,7 @@ from __future__ import annotations
 from network_sim.export import ieee80211_frames as wlan
 from network_sim.export import ieee802154_frames as wpan
 from network_sim.export.datagrams import ipv4_datagram, lowpan_datagram, padded
+from network_sim.export.radiotap import rate_header
 
 DATA = b"#hello"
 DATAGRAM = "4500002200054000401126c20a0000010a000004f0b0f0b0000e15282368656c6c6f"
@@ -40,7 +41,7 @@ def test_ieee80211_frames_are_those_of_scapy() -> None:
 
 
 def test_radiotap_says_the_rate_in_half_megabits_and_that_the_check_sum_is_there() -> None:
-    assert wlan.radiotap(5.5e6).hex() == "00000a0006000000100b"
+    assert rate_header(5.5e6).hex() == "00000a0006000000100b"
 
 
 def test_datagrams_are_those_of_scapy() -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from network_sim.config import MacConfig, NetworkConfig, NodesConfig
 from network_sim.mac.bianchi import Timing, bianchi
-from network_sim.mac.dcf import EIFS_NS
+from network_sim.mac.ieee80211b import EIFS_NS
 from network_sim.mac.saturation import saturation
 from network_sim.types import Cause
 

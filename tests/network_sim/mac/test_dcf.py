@@ -10,8 +10,8 @@ import pytest
 import simpy
 
 from network_sim.config import MacConfig, NetworkConfig, RadioConfig
+from network_sim.mac import make_wlan, physical_layer
 from network_sim.mac.context import MacContext
-from network_sim.mac.dcf import Dcf, data_ns
 from network_sim.mac.medium import Medium
 from network_sim.radio.places import FixedPlaces
 from network_sim.radio.propagation import Radio
@@ -68,7 +68,7 @@ class Scene:
             lambda node: node not in self.down,
             lambda packet, node: self.received.append((packet.id, node)),
         )
-        self.mac = Dcf(context)
+        self.mac = make_wlan(context)
 
     def send(self, sender: int, *starts_ns: int, receiver: int = SINK) -> None:
         """Packets that are ready at these times, or when the one before is done."""
@@ -104,7 +104,11 @@ class Scene:
 
 
 def test_a_data_frame_lasts_what_the_standard_says() -> None:
-    assert data_ns(1028) == DATA == round(192e3 + 8 * 1064 * 1000 / 11)
+    assert (
+        physical_layer(MacConfig(kind="ieee80211b")).data_ns(1028)
+        == DATA
+        == round(192e3 + 8 * 1064 * 1000 / 11)
+    )
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from network_sim.config import LORA_PAYLOAD_BYTES, MacConfig, NetworkConfig, NodesConfig, RadioConfig
+from network_sim.config import MacConfig, NetworkConfig, NodesConfig, RadioConfig
 from network_sim.mac.lora import ACK_BYTES, HEADER_BYTES, airtime_ns
 from network_sim.presets import PRESETS
 from network_sim.radio.propagation import Radio, reach_m, watts
+from network_sim.settings.mac import LORA_PAYLOAD_BYTES
 from network_sim.simulate import simulate
 from network_sim.types import NS_PER_S, Cause, EventKind
 from packetmesh.errors import InputError

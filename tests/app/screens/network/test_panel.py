@@ -277,7 +277,7 @@ def test_a_node_switched_off_is_not_heard_and_the_difference_is_told(screen):
     screen.gui.set("Switch off", "none")
 
 
-LEAVE_OUT = "Leave out what another camera showed"
+LEAVE_OUT = "Leave out seen tiles"
 
 
 def test_tiles_that_another_camera_showed_are_left_out_and_counted(screen):
