@@ -34,6 +34,11 @@ CASES = {
     "wpan": WPAN,
     "wpan without acknowledgements": (*WPAN, "mac.ack=false"),
     "relays": RELAYS,
+    "requests": (
+        *RELAYS,
+        f"nodes.first_bytes_by_node={','.join(12 * ['1000'])}",
+        f"nodes.request_bytes_by_node={','.join(12 * ['38'])}",
+    ),
     "sleeping relays": (*RELAYS, "nodes.duty_cycle=0.3", "nodes.duty_period_s=0.3"),
     "wlan": WLAN,
     "rts": RTS,
@@ -253,8 +258,9 @@ def test_payloads_say_what_they_carry(tmp_path: Path) -> None:
     assert first[9:-2].rstrip(b"\0").endswith(b"fragment 0 bytes 0-115")
     third = b"fragment 2 bytes 232-347"  # 116 bytes each
     assert any(frame[9:-2].rstrip(b"\0").endswith(third) for frame in frames)
-    trace, frames = written("relays", tmp_path)
+    trace, frames = written("requests", tmp_path)
     events = trace.events.of(EventKind.AIR, EventKind.ACK)
+    assert PacketKind.REQUEST in events.packet_kind
     taken = trace.events.of(EventKind.CAPTURE)
     cameras = dict(zip(taken.image.tolist(), taken.node.tolist(), strict=True))
     forwarded = 0
@@ -263,7 +269,7 @@ def test_payloads_say_what_they_carry(tmp_path: Path) -> None:
             continue
         camera = cameras[int(events.image[index])]
         ends = unpack(">HH", frame[11:15])
-        if events.packet_kind[index] == PacketKind.STATUS:
+        if events.packet_kind[index] in (PacketKind.STATUS, PacketKind.REQUEST):
             assert ends == (len(trace.names), camera + 1)
         else:
             assert ends == (camera + 1, len(trace.names))
