@@ -1,6 +1,6 @@
 """Saturated nodes around one sink in network_sim and in ns-3: throughput and computing time.
 
-ns-3 runs ``ns3_runs.py`` in its own interpreter, IEEE 802.11b twice: with ns-3's defaults, and strict, which
+ns-3 runs ``ns3_runs.py`` in its own interpreter, IEEE 802.11 twice: with ns-3's defaults, and strict, which
 means that a receiver notices every frame.
 """
 
@@ -16,7 +16,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from network_sim.config import LEAST_CAPTURE_DB, MacConfig, MacKind, NetworkConfig, NodesConfig, RadioConfig
+from network_sim.config import (
+    LEAST_CAPTURE_DB,
+    WLAN_KINDS,
+    MacConfig,
+    MacKind,
+    NetworkConfig,
+    NodesConfig,
+    RadioConfig,
+)
 from network_sim.mac import ieee802154, physical_layer
 from network_sim.mac.saturation import saturation
 from packetmesh.errors import PacketMeshError
@@ -36,17 +44,22 @@ PYTHON_VARIABLE = "PACKETMESH_NS3_PYTHON"
 Counts = Mapping[MacKind, tuple[int, ...]]
 """Numbers of nodes by medium access."""
 
-NODES: Counts = {"ieee802154": (1, 2, 3, 4, 5), "ieee80211b": (1, 2, 3, 5, 10, 20, 50)}
+NODES: Counts = {
+    "ieee802154": (1, 2, 3, 4, 5),
+    "ieee80211b": (1, 2, 3, 5, 10, 20, 50),
+    "ieee80211n": (1, 3, 10),
+    "ieee80211ax": (1, 3, 10),
+}
+_DATAGRAMS = NodesConfig(payload_bytes=1000 + UDP_IP_BYTES, header_bytes=UDP_IP_BYTES, spacing_m=RADIUS_M)
 CONFIGS: dict[MacKind, NetworkConfig] = {
     "ieee802154": NetworkConfig(
         mac=MacConfig(kind="ieee802154"),
         nodes=NodesConfig(payload_bytes=116, spacing_m=RADIUS_M),
         radio=RadioConfig(capture_db=LEAST_CAPTURE_DB),  # overlapping frames as in ns-3 (SPEC 6.3)
     ),
-    "ieee80211b": NetworkConfig(
-        mac=MacConfig(kind="ieee80211b"),
-        nodes=NodesConfig(payload_bytes=1000 + UDP_IP_BYTES, header_bytes=UDP_IP_BYTES, spacing_m=RADIUS_M),
-    ),
+    "ieee80211b": NetworkConfig(mac=MacConfig(kind="ieee80211b"), nodes=_DATAGRAMS),
+    "ieee80211n": NetworkConfig(mac=MacConfig(kind="ieee80211n", mcs=7), nodes=_DATAGRAMS),
+    "ieee80211ax": NetworkConfig(mac=MacConfig(kind="ieee80211ax", mcs=9), nodes=_DATAGRAMS),
 }
 DSSS = physical_layer(CONFIGS["ieee80211b"].mac)
 CONSTANTS: dict[MacKind, dict[str, float]] = {
@@ -165,7 +178,7 @@ def run_ns3(python: str, counts: Counts, seconds: float) -> tuple[Theirs, dict[s
         (mac, nodes, strict)
         for mac, node_counts in counts.items()
         for nodes in node_counts
-        for strict in ((False, True) if mac == "ieee80211b" else (False,))
+        for strict in ((False, True) if mac in WLAN_KINDS else (False,))
     ]
     scenarios = [
         {

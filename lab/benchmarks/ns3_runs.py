@@ -12,6 +12,8 @@ import json
 import math
 import sys
 import time
+from dataclasses import dataclass
+from functools import partial
 
 from ns import ns
 
@@ -25,6 +27,14 @@ WARM_UP = 0.05
 MAX_DELAY_S = 3600.0
 """Longest time of a packet in a buffer; ns-3's default, half a second, is too short with 20 stations."""
 PAN = 5
+SETTINGS = {
+    "WifiMac::MpduBufferSize": ns.UintegerValue(64),
+    "WifiMac::BE_MaxAmpduSize": ns.UintegerValue(6_500_631),
+    "HeConfiguration::GuardInterval": ns.TimeValue(ns.NanoSeconds(800)),
+    "QosTxop::UseExplicitBarAfterMissedBlockAck": ns.BooleanValue(False),
+}
+"""As in network_sim: the standards' limits of an A-MPDU, the shortest guard interval, and no request for a
+block acknowledgement that did not come."""
 
 NODES = r"""
 #include <unordered_set>
@@ -74,7 +84,7 @@ void zigbee(Ptr<NetDevice> device, uint16_t pan, bool sink, double start_s) {
   start_at(device, start_s, MakeBoundCallback(&zigbee_hand, mac, pan));
 }
 
-// IEEE 802.11b: one packet waits behind the one that is being sent.
+// IEEE 802.11: so many packets wait that the next frame is never short of them.
 void wifi_hand(Ptr<NetDevice> device, Address sink) {
   device->Send(Create<Packet>(tally.bytes), sink, 0x0800);
 }
@@ -93,16 +103,16 @@ bool wifi_arrived(Ptr<NetDevice>, Ptr<const Packet>, uint16_t, const Address&) {
   count(tally.arrived);
   return true;
 }
-void wifi(Ptr<NetDevice> device, Ptr<NetDevice> sink, double start_s) {
+void wifi(Ptr<NetDevice> device, Ptr<NetDevice> sink, double start_s, std::string basic, int waiting) {
   auto wifi = DynamicCast<WifiNetDevice>(device);
-  wifi->GetRemoteStationManager()->AddBasicMode(WifiMode("DsssRate2Mbps"));
+  wifi->GetRemoteStationManager()->AddBasicMode(WifiMode(basic));
   if (device == sink) { device->SetReceiveCallback(MakeCallback(&wifi_arrived)); return; }
   auto mac = wifi->GetMac();
   Address to = sink->GetAddress();
   mac->TraceConnectWithoutContext("AckedMpdu", MakeBoundCallback(&wifi_acked, device, to));
   mac->TraceConnectWithoutContext("DroppedMpdu", MakeBoundCallback(&wifi_dropped, device, to));
   wifi->GetPhy()->TraceConnectWithoutContext("PhyTxBegin", MakeCallback(&wifi_begin));
-  for (int i = 0; i < 2; i++) start_at(device, start_s, MakeBoundCallback(&wifi_hand, device, to));
+  for (int i = 0; i < waiting; i++) start_at(device, start_s, MakeBoundCallback(&wifi_hand, device, to));
 }
 }
 """
@@ -139,17 +149,38 @@ def install_802154(
     return devices, helper
 
 
-def install_80211b(
-    nodes: ns.NodeContainer, starts_s: list[float], strict: bool
+@dataclass(frozen=True)
+class Wlan:
+    """One of the standards of IEEE 802.11, at 2.4 GHz."""
+
+    standard: int
+    width_mhz: int
+    data: str
+    """Rate of data frames."""
+    basic: str
+    """Rate of answers."""
+    waiting: int
+    """Packets that wait at each station: the window of the block acknowledgement, twice."""
+
+
+WLANS = {
+    "ieee80211b": Wlan(ns.WIFI_STANDARD_80211b, 22, "DsssRate11Mbps", "DsssRate2Mbps", 2),
+    "ieee80211n": Wlan(ns.WIFI_STANDARD_80211n, 20, "HtMcs7", "ErpOfdmRate24Mbps", 128),
+    "ieee80211ax": Wlan(ns.WIFI_STANDARD_80211ax, 20, "HeMcs9", "ErpOfdmRate24Mbps", 128),
+}
+
+
+def install_wlan(
+    wlan: Wlan, nodes: ns.NodeContainer, starts_s: list[float], strict: bool
 ) -> tuple[ns.NetDeviceContainer, ns.WifiHelper]:
-    """Install IEEE 802.11b at 11 Mb/s; with ``strict`` a receiver notices every frame, even among equally
-    strong ones.
+    """Install IEEE 802.11; with ``strict`` a receiver notices every frame, even among equally strong ones.
 
     The sink is an access point, because stations of an ad hoc network answer at 11 Mb/s; it beacons once.
     """
     wifi, mac, phy = ns.WifiHelper(), ns.WifiMacHelper(), ns.YansWifiPhyHelper()
-    wifi.SetStandard(ns.WIFI_STANDARD_80211b)
-    rates = [ns.StringValue("DsssRate11Mbps"), ns.StringValue("DsssRate2Mbps")]
+    wifi.SetStandard(wlan.standard)
+    phy.Set("ChannelSettings", ns.StringValue(f"{{0, {wlan.width_mhz}, BAND_2_4GHZ, 0}}"))
+    rates = [ns.StringValue(wlan.data), ns.StringValue(wlan.basic)]
     wifi.SetRemoteStationManager(
         "ns3::ConstantRateWifiManager", "DataMode", rates[0], "ControlMode", rates[1]
     )
@@ -165,7 +196,7 @@ def install_80211b(
         mac.SetType(*(station if node else access_point))
         devices.Add(wifi.Install(phy, mac, nodes.Get(node)))
     for node, start_s in enumerate([0.0, *starts_s]):
-        ns.cppyy.gbl.saturated.wifi(devices.Get(node), devices.Get(0), start_s)
+        ns.cppyy.gbl.saturated.wifi(devices.Get(node), devices.Get(0), start_s, wlan.basic, wlan.waiting)
     return devices, wifi
 
 
@@ -179,7 +210,7 @@ def run(
     tally.bytes, tally.from_ns = payload_bytes, round(1e9 * (START_S + WARM_UP * seconds))
     draw = ns.CreateObject[ns.UniformRandomVariable]()
     starts_s = [START_S + draw.GetValue(0.0, SPREAD_S) for _ in range(nodes)]
-    install = install_802154 if mac == "ieee802154" else install_80211b
+    install = install_802154 if mac == "ieee802154" else partial(install_wlan, WLANS[mac])
     devices, helper = install(place(nodes, radius_m), starts_s, strict)
     ns.Simulator.Stop(ns.Seconds(START_S))
     ns.Simulator.Run()
@@ -226,7 +257,7 @@ def constants_80211b() -> dict[str, float]:
 
     A data frame carries 1000 bytes over UDP.
     """
-    devices, _ = install_80211b(place(1, 10.0), [0.0], False)
+    devices, _ = install_wlan(WLANS["ieee80211b"], place(1, 10.0), [0.0], False)
     phy, mac = devices.Get(1).GetPhy(), devices.Get(1).GetMac()
     slot_us, sifs_us = (time_.GetNanoSeconds() / 1e3 for time_ in (phy.GetSlot(), phy.GetSifs()))
     vectors = {}
@@ -260,6 +291,8 @@ def main() -> None:
     """Run the scenarios in the argument, ``ROUNDS`` times each, and print those of median time."""
     ns.cppyy.cppdef(NODES)
     ns.Config.SetDefault("ns3::WifiMacQueue::MaxDelay", ns.TimeValue(ns.Seconds(MAX_DELAY_S)))
+    for name, value in SETTINGS.items():
+        ns.Config.SetDefault(f"ns3::{name}", value)
     runs = [median([run(**scenario) for _ in range(ROUNDS)]) for scenario in json.loads(sys.argv[1])]
     constants = {"ieee802154": constants_802154(), "ieee80211b": constants_80211b()}
     json.dump({"runs": runs, "constants": constants}, sys.stdout)
