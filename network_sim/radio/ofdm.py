@@ -113,7 +113,7 @@ _SPECTRA: dict[tuple[int, int], tuple[float, dict[int, float]]] = {
     ),
 }
 """By code rate: the factor and the numbers of wrong bits by distance d of the convolutional code of length 7
-with 133 and 171 (octal), punctured (Frenger et al. 1999; rate 5/6: Haccoun and Begin 1989)."""
+with 133 and 171 (octal), punctured (Frenger et al. 1998; rate 5/6: Haccoun and Begin 1989)."""
 
 
 def bit_error_rate(sinr: float, scheme: Scheme) -> float:
