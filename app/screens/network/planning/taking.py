@@ -19,6 +19,7 @@ from app.screens.network.planning.view import Pose, TakenView
 from app.web.markup import Markdown
 from app.window.panel import PanelSession
 from pipeline.sources import Demo, Source
+from pipeline.spec import key
 
 
 class Taking:
@@ -29,8 +30,10 @@ class Taking:
         self._session = session
         self._rooms: dict[Source, tuple[str, int]] = {}
         """By the rigs that were made here: their demo room, and how many cameras were added to it."""
-        self._told: Source = session.spec.source
-        """Rig to which the sentence belongs."""
+        self._told = key(session.spec, "truth")
+        """The surface to which the sentence belongs."""
+        self._awaited = False
+        """Whether a camera is being added."""
         self._pose: Pose | None = None
         self._sensor = ""
         gui = session.ui.gui
@@ -44,17 +47,20 @@ class Taking:
         self._text = gui.add_markdown(Markdown(""))
 
     def on_spec(self, spec: Spec) -> None:
-        """Remove the sentence on a camera that another scene does not have."""
-        if spec.source != self._told:
-            self._told, self._text.content = spec.source, Markdown("")
+        """Remove the sentence on a camera when the surface is another one."""
+        if key(spec, "truth") != self._told:
+            self._told, self._text.content = key(spec, "truth"), Markdown("")
 
     def offer(self, pose: Pose | None, sensor: str) -> None:
         """Offer a ghost with this sensor, if it can be rendered; None offers none."""
         self._pose, self._sensor = pose, sensor
         known = self._room is not None
-        self._button.visible = pose is not None and known and sensor in RENDERED
-        if pose is not None and not self._button.visible:
+        able = known and sensor in RENDERED
+        self._button.visible = pose is not None and able and not self._awaited
+        if pose is not None and not able:
             self._text.content = OTHER_SENSOR if known else NO_TRUTH
+        elif self._text.content in (OTHER_SENSOR, NO_TRUTH):
+            self._text.content = Markdown("")
 
     @property
     def _room(self) -> tuple[str, int] | None:
@@ -68,18 +74,21 @@ class Taking:
         if room is None or self._pose is None:
             return
         spec, (demo, added) = session.spec, room
-        self._text.content, self._button.visible = TAKING, False
+        self._text.content, self._button.visible, self._awaited = TAKING, False, True
         folder = session.new_folder() / f"{demo}-with-{added + 1}-more"
 
         def came(taken: TakenView | None) -> None:
-            if session.spec.source != spec.source:
+            self._awaited = False
+            if key(session.spec, "truth") != key(spec, "truth"):
                 return
             if taken is None:
-                self._text.content, self._button.visible = NOT_TAKEN, True
+                self.offer(self._pose, self._sensor)
+                self._text.content = NOT_TAKEN
                 return
             self._rooms[taken.source] = demo, added + 1
-            self._told = taken.source
-            session.want(replace(session.spec, source=taken.source))
+            larger = replace(session.spec, source=taken.source)
+            self._told = key(larger, "truth")
+            session.want(larger)
             self._text.content = kept_sentence(taken)
 
         job = "network.planning.take_job:take_job"

@@ -215,6 +215,29 @@ def test_a_camera_that_is_taken_stands_in_a_larger_rig_and_its_promise_is_beside
     assert "Promised" not in screen.gui.text("Plan")
 
 
+def test_a_camera_that_cannot_be_taken_is_explained_and_one_at_a_time_is_taken(screen):
+    taking = screen.panel.plan._taking
+    taking._rooms[screen.spec.source] = "box-on-table", 0
+    screen.gui.set("Sensor", "Kinect v2")
+    assert "renders demo rooms with a Kinect v1" in screen.suggest()
+    assert not screen.gui.find("Take it").seen
+    screen.gui.set("Sensor", "Kinect v1")
+    assert "renders demo rooms" not in screen.suggest()
+    answers = []
+    screen.side_job = lambda *_, on_end: answers.append(on_end)
+    screen.gui.press("Take it")
+    screen.drag((0.0, 0.0, 0.1))
+    assert not screen.gui.find("Take it").seen
+    answers.pop()(None)
+    assert screen.gui.find("Take it").seen
+    assert "The camera was not added" in screen.gui.text("Plan")
+    screen.gui.press("Take it")
+    screen.want(replace(screen.spec, config=with_settings(CONFIG, ["surface.max_points=2000"])))
+    before = screen.spec
+    answers.pop()(SimpleNamespace(source=RigFolder("elsewhere")))
+    assert screen.spec == before, "the settings have changed since"
+
+
 def test_the_controls_are_in_the_address_and_wrong_values_are_named():
     ui = ui_of()
     controls = PlanControls(ui)
