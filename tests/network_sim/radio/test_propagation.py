@@ -201,14 +201,14 @@ def test_oqpsk_without_a_signal_is_a_coin() -> None:
 @pytest.mark.parametrize("kind", sorted(set(get_args(r.Modulation)) - {"gfsk"}))  # its noise is not modelled
 def test_packet_errors_fall_with_the_signal_and_grow_with_the_size(kind: r.Modulation) -> None:
     here = radio()
-    sinrs = np.concatenate([[0.0], np.geomspace(1e-3, 1e3, 400)]).tolist()
+    sinrs = np.concatenate([[0.0], np.geomspace(1e-3, 1e5, 400)]).tolist()
     sizes = (1, 14, 127, 1064)
     rates = np.array([[here.error_rate(sinr, size, kind) for sinr in sinrs] for size in sizes])
     assert np.all((rates >= 0.0) & (rates <= 1.0))
     assert np.all(np.diff(rates, axis=1) <= 0.0)
     assert np.all(np.diff(rates, axis=0) >= 0.0)
     assert rates[0, 0] > 0.99
-    assert rates[-1, -1] == 0.0
+    assert rates[-1, -1] < 1e-12
     assert here.error_rate(1.0, 0, kind) == 0.0
 
 
