@@ -19,7 +19,7 @@ from network_sim.radio import ofdm
 from network_sim.radio.ofdm import OfdmModulation
 from network_sim.radio.places import Places
 
-Modulation = Literal["dbpsk", "dqpsk", "cck5.5", "cck11", "oqpsk", "lora", "gfsk"] | OfdmModulation
+Modulation = Literal["dbpsk", "dqpsk", "cck5.5", "cck11", "oqpsk", "lora", "gfsk", OfdmModulation]
 """Modulations: IEEE 802.11b at 1, 2, 5.5 and 11 Mb/s, IEEE 802.15.4 at 250 kb/s, LoRa, Bluetooth LE, and
 those of IEEE 802.11n, 802.11ax and 802.11ah."""
 IEEE80211B: dict[float, tuple[Modulation, float]] = {

@@ -18,6 +18,7 @@ SHORT = {
     "ble": ["run.horizon_s=25"],
     "lte-m": ["run.horizon_s=25"],
     "nb-iot": ["run.horizon_s=60"],
+    **{key: ["run.horizon_s=20"] for key in ("wifi-n", "wifi-ax", "wifi-ah")},
 }
 
 

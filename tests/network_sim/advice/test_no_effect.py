@@ -31,6 +31,7 @@ WIFI = [
     *("nodes.image_bytes=40000", "nodes.depth_bytes=9000", "nodes.deadline_s=0.3", "run.horizon_s=1.2"),
     *("radio.shadowing_db=2", "radio.capture_db=6", "nodes.duty_period_s=1"),
 ]
+LOSSY = ["loss.share=0.3", "mac.retries=1", "mac.ampdu_packets=1"]
 STREET = [
     *("run.horizon_s=24", "run.warmup_s=5", "street.vehicles=40", "street.blocks=2"),
     *("scheme.image_bytes=6000", "scheme.summary_interval_s=2"),
@@ -70,7 +71,7 @@ CASES = {
     "friis": ("office", [*LARGE, "radio.model=friis", *WALLS]),
     "wifi-n, lossy": (
         "wifi-n",
-        [*WIFI, "nodes.spacing_m=18", "loss.share=0.3", "mac.retries=1", "mac.ampdu_packets=1"],
+        [*WIFI, *LOSSY, "nodes.spacing_m=18", "nodes.image_bytes=15000"],
     ),
     "wifi-ax": (
         "wifi-ax",

@@ -25,6 +25,7 @@ SHORT = {
     "ble": ["run.horizon_s=12", "uplink.loss=0.1"],
     "lte-m": ["run.horizon_s=12", "nodes.failures_per_h=100"],
     "nb-iot": ["run.horizon_s=30"],
+    **{key: ["run.horizon_s=20"] for key in ("wifi-n", "wifi-ax", "wifi-ah")},
 }
 
 
