@@ -128,6 +128,11 @@ class Ghosts:
         if row < len(self._frusta):
             move(self._frusta[row], T_world_camera)
 
+    def hold(self, T_world_camera: FloatArray) -> None:
+        """Move the handle to where the chosen ghost was put without it."""
+        if self._handle is not None:
+            move(self._handle, T_world_camera)
+
     def show_newly(self, newly: Sequence[FloatArray]) -> None:
         """Show for each ghost the (T,) chances that it newly measures each target, the chosen one's full.
 

@@ -10,6 +10,7 @@ import viser
 
 from app.compute.state import Sent, Spec
 from app.drawing.ghosts import Ghosts
+from app.screens.network.planning.by_number import PoseByNumber
 from app.screens.network.planning.controls import PlanControls
 from app.screens.network.planning.export import plan_offers
 from app.screens.network.planning.labels import BEFORE, DRAG, NONE_YET, PICTURE, PLANNING, STOPPED, TEXT
@@ -80,6 +81,7 @@ class PlanFolder:
                 visible=False,
             )
             session.ui.when_changed(self._chosen, self._choose)
+            self._numbers = PoseByNumber(session.ui, self._entered)
             self._picture = gui.add_image(EMPTY, format="jpeg", jpeg_quality=QUALITY, visible=False)
             self._caption = gui.add_markdown(Markdown(""))
             self._bars = gui.add_html(Markup(""))
@@ -118,6 +120,7 @@ class PlanFolder:
         self._table.content = self._bars.content = Markup("")
         for handle in (self._chosen, self._picture, self._files):
             handle.visible = False
+        self._numbers.hide()
         self._taking.offer(None, "")
 
     def offers(self) -> tuple[Offers, ...]:
@@ -174,6 +177,7 @@ class PlanFolder:
         self._table.content = ghost_table(ghosts, self._arrivals)
         self._drawn.show_newly([one.newly for one in ghosts.ghosts])
         self._taking.offer(self._poses[self._row], plan.request.sensor)
+        self._numbers.show(np.reshape(self._poses[self._row], (4, 4)), plan.floor_m)
 
     @property
     def _where(self) -> Poses:
@@ -207,6 +211,11 @@ class PlanFolder:
     def _dragged(self, row: int, T_world_camera: FloatArray, ended: bool) -> None:
         """Note a dragged ghost's pose, on the thread of the browser's messages."""
         self._ui.post(self._moved, self._plan, row, T_world_camera, ended)
+
+    def _entered(self, T_world_camera: FloatArray) -> None:
+        """Move the chosen ghost and its handle to a pose that was entered as numbers."""
+        self._drawn.hold(T_world_camera)
+        self._moved(self._plan, self._row, T_world_camera, True)
 
     def _moved(self, plan: PlanView | None, row: int, T_world_camera: FloatArray, ended: bool) -> None:
         """Move a ghost; judge it as soon as the last judgement is there, and at the end send its image."""

@@ -32,8 +32,8 @@ NONE_YET = Markdown("No plan yet.")
 PLANNING = Markdown("Planning; the bar at the top shows the progress. *Cancel* stops it.")
 STOPPED = Markdown("The planning was stopped or replaced; press *Suggest* again.")
 DRAG = Markdown(
-    """**Drag a ghost by its arrows and rings**: promise and pink points follow. When you let go, its picture
-and the time of its image follow, too."""
+    """**Drag a ghost by its arrows and rings**, or change the numbers below: promise and pink points
+follow. When you let go, its picture and the time of its image follow, too."""
 )
 PICTURE = Markdown(
     "What it would see, on the surface known today. Green: newly measured, the stronger the likelier; "

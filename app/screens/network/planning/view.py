@@ -88,6 +88,8 @@ class PlanView:
     """Width over height of their images."""
     measured_share: float
     """Share of the present cameras' rays on measured surface."""
+    floor_m: float
+    """z of the floor, world frame."""
     at_least_of_best: float
     candidates: int
     image_bytes: int
