@@ -325,6 +325,34 @@ def test_the_mark_of_a_choice_follows_what_is_computed(tmp_path):
     assert "**Not quite, and many think so.** green." in ui.gui.text()
 
 
+def test_a_clause_whose_number_does_not_exist_gives_way_to_its_second_wording(tmp_path):
+    written = "x\n\n{{Yours: {own}.||None is yours.}}{{ There {2:own}.}}{{ Last {2:own}|| Never there}}"
+    (tmp_path / "lesson.md").write_text(f"# A\n## One\n{written}\n\n## Two\ny\n")
+    ui, now = ui_of(), {SCENE: "noon", "own": UNKNOWN}
+    folder = LessonFolder(
+        ui, read_lesson(tmp_path / "lesson.md", kind_of("own")), lambda look: None, lambda: now
+    )
+    ui.gui.press("Go", "Next")
+    assert "\nNone is yours. Never there\n" in ui.gui.text()
+    now["own"] = "3"
+    folder.refresh()
+    assert "\nYours: 3. Never there\n" in ui.gui.text()
+    ui.gui.press("Go", "Next")
+    ui.gui.press("Go", "Back")
+    assert "\nYours: 3. There 3. Last 3\n" in ui.gui.text()
+
+
+def test_the_screen_hears_when_its_lesson_is_left(tmp_path):
+    ui, left = ui_of(), []
+    LessonFolder(
+        ui, lesson(tmp_path, ASKED), lambda look: None, on_end=lambda: left.append(ui.gui.find("Stop").value)
+    )
+    ui.gui.press("Go", "Next")
+    assert left == []
+    ui.gui.press("Go", "End")
+    assert left == [OFF]
+
+
 def test_what_a_lost_packet_costs_is_told_by_what_is_left_of_the_cameras():
     def cost(depth_shares, missed):
         view = SimpleNamespace(lossless=SimpleNamespace(no_hit_share=0.1))
