@@ -318,8 +318,8 @@ class LessonFolder(Generic[Look]):
             self._known = {index: now, **same}
 
         def exists(stop: str, name: str) -> bool:
-            known = self._known.get(int(stop) - 1) if stop else now
-            return known is not None and known.get(name) != UNKNOWN
+            known = self._known.get(int(stop) - 1, {}) if stop else now
+            return known.get(name, UNKNOWN if stop else TO_COME) != UNKNOWN
 
         def clause(found: re.Match[str]) -> str:
             ways = found[1].split(OTHERWISE, 1)

@@ -73,6 +73,7 @@ KINDS = {
     surface.SHIPPED: surface.KIND,
     network.CROSSING: network.KIND,
     network.LOST_PACKET: network.KIND,
+    network.PLACING: network.KIND,
     SHIPPED: fuse.KIND,
     walk.SHIPPED: walk.KIND,
 }
@@ -82,7 +83,7 @@ KINDS = {
 def test_every_stop_that_ships_differs_and_asks_what_cannot_be_guessed_by_its_place(path):
     shipped = read_lesson(path, KINDS[path])
     assert len({stop.title for stop in shipped.stops}) == len(shipped.stops) >= 5
-    assert len({stop.look for stop in shipped.stops}) == len(shipped.stops)
+    assert len({(stop.look, stop.sees) for stop in shipped.stops}) == len(shipped.stops)
     rights = []
     for stop in shipped.stops:
         assert stop.question is not None
@@ -189,6 +190,7 @@ def test_reset_leaves_the_lesson_and_takes_back_what_its_stop_had_set(tmp_path):
 PLAIN = (
     r"3-D|k[12]|802\.11b?|1,500 bytes|only 1\.5 m|1\.25 m|20 µs|0\.02 ms|\b11? Mbit/s|250 kbit/s"
     r"|0\.1 to the|node_02|32 × 32|32 pixels|√3|\+ 1, 2 and 4|from 0 to 2|within 5 %"
+    r"|30 cm|8 dB|95 %|95 of 100|99 %"
 )
 """Numbers that no scene changes: of formulas, standards and settings."""
 
@@ -372,13 +374,14 @@ def test_what_a_lost_packet_costs_is_told_by_what_is_left_of_the_cameras():
         (surface.SHIPPED, surface),
         (network.CROSSING, network),
         (network.LOST_PACKET, network),
+        (network.PLACING, network),
         (SHIPPED, fuse),
         (walk.SHIPPED, walk),
     ],
     ids=lambda value: getattr(value, "stem", ""),
 )
 def test_the_folders_that_lessons_unfold_are_on_their_screens(path, screen):
-    sources = "".join(one.read_text() for one in Path(screen.__file__).parent.glob("*.py"))
+    sources = "".join(one.read_text() for one in Path(screen.__file__).parent.rglob("*.py"))
     folders = set(re.findall(r'add_(?:folder|tab)\(\s*"([^"]+)"', sources))
     named = set(re.findall(r"^open: (.+)$", path.read_text(), re.MULTILINE))
     assert named <= folders

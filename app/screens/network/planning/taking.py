@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import viser
@@ -24,9 +25,11 @@ from pipeline.sources import Demo, Source
 class Taking:
     """Adds the chosen ghost to a demo room."""
 
-    def __init__(self, session: PanelSession) -> None:
-        """Add button and sentence to the current container."""
-        self._session = session
+    def __init__(self, session: PanelSession, on_change: Callable[[], None]) -> None:
+        """Add button and sentence to the current container; ``on_change`` hears of an added camera."""
+        self._session, self._on_change = session, on_change
+        self.taken: TakenView | None = None
+        """The camera to which the sentence belongs; None if there is none."""
         self._rooms: dict[Source, tuple[str, int]] = {}
         """By the rigs that were made here: their demo room, and how many cameras were added to it."""
         self._told: Source = session.spec.source
@@ -46,7 +49,7 @@ class Taking:
     def on_spec(self, spec: Spec) -> None:
         """Remove the sentence on a camera that another scene does not have."""
         if spec.source != self._told:
-            self._told, self._text.content = spec.source, Markdown("")
+            self._told, self._text.content, self.taken = spec.source, Markdown(""), None
 
     def offer(self, pose: Pose | None, sensor: str) -> None:
         """Offer a ghost with this sensor, if it can be rendered; None offers none."""
@@ -78,9 +81,10 @@ class Taking:
                 self._text.content, self._button.visible = NOT_TAKEN, True
                 return
             self._rooms[taken.source] = demo, added + 1
-            self._told = taken.source
+            self._told, self.taken = taken.source, taken
             session.want(replace(session.spec, source=taken.source))
             self._text.content = kept_sentence(taken)
+            self._on_change()
 
         job = "network.planning.take_job:take_job"
         session.side_job(job, demo, self._sensor, self._pose, str(folder), on_end=came)
