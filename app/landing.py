@@ -31,6 +31,7 @@ SHIPPED = (
     "what-one-lost-packet-costs",
     "how-good-is-my-calibration",
     "how-a-walk-becomes-a-room",
+    "where-should-the-camera-stand",
 )
 """Names of the lessons that ship, in the order in which they are offered."""
 OwnCards = Sequence[tuple[Lesson[Any], str]]
@@ -90,7 +91,7 @@ def landing_html(lecture: bool = False, own: OwnCards = ()) -> Markup:
         "<header><div><h1>PacketMesh</h1><p>From a camera network's packets to a surface mesh.</p></div>"
         "<label data-languages>Lessons in <select>{}</select></label>"
         '<button type="button" data-explore>Explore <kbd>Esc</kbd></button></header>'
-        "<article><div>{}<h2>Seven lessons, each about one question</h2><section>{}</section></div>{}"
+        "<article><div>{}<h2>Eight lessons, each about one question</h2><section>{}</section></div>{}"
         "</article></main>"
     ).format(shared, _languages(own), teachers, lessons, "" if lecture else others)
 

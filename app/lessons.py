@@ -176,7 +176,7 @@ def _unknown_names(path: Path, text: str, kind: Kind[Any]) -> list[Fault]:
 def names_on(screen: str) -> tuple[frozenset[str], frozenset[str]]:
     """Return the titles of a screen's folders and tabs, and all texts in its code, labels included."""
     folders, texts = set[str](), set[str]()
-    for path in (path for place in (f"screens/{screen}", *_SHARED) for path in (_HERE / place).glob("*.py")):
+    for path in (path for place in (f"screens/{screen}", *_SHARED) for path in (_HERE / place).rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Constant) and isinstance(node.value, str):
                 texts.add(node.value)

@@ -12,7 +12,7 @@ from app.drawing.clouds import clear
 from app.drawing.colors import BACKGROUND, GHOST
 from app.drawing.poses import move, place
 from pipeline.kernels.geometry import rigid
-from pipeline.types import FloatArray
+from pipeline.types import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     import viser
@@ -128,17 +128,30 @@ class Ghosts:
         if row < len(self._frusta):
             move(self._frusta[row], T_world_camera)
 
+    def hold(self, T_world_camera: FloatArray) -> None:
+        """Move the handle to where the chosen ghost was put without it."""
+        if self._handle is not None:
+            move(self._handle, T_world_camera)
+
     def show_newly(self, newly: Sequence[FloatArray]) -> None:
         """Show for each ghost the (T,) chances that it newly measures each target, the chosen one's full.
 
         A target belongs to the ghost that measures it most likely.
         """
-        if self._cloud is None:
-            return
         chances = np.stack([*newly])
         best = chances.argmax(axis=0)
-        seen = chances.max(axis=0) >= LEAST_CHANCE
-        pale = np.where(best == self._chosen, 0.0, PALE)[:, None]
+        self._show_points(chances.max(axis=0) >= LEAST_CHANCE, np.where(best == self._chosen, 0.0, PALE))
+
+    def show_targets(self) -> None:
+        """Show all places that a camera might newly see."""
+        count = len(self._targets_m)
+        self._show_points(np.ones(count, bool), np.zeros(count))
+
+    def _show_points(self, seen: BoolArray, pale: FloatArray) -> None:
+        """Show the (T,) targets that are ``seen``, with these shares of the background in their colours."""
+        if self._cloud is None:
+            return
+        pale = pale[:, None]
         colors = (1.0 - pale) * np.array(GHOST) + pale * np.array(BACKGROUND)
         self._cloud.points = np.where(seen[:, None], self._targets_m, np.array(AWAY_M, np.float32))
         self._cloud.colors = np.rint(colors).astype(np.uint8)

@@ -7,7 +7,8 @@ does not set has its default, so that each stop can be shown alone. The folders 
 opened; they, the controls and the numbers are framed, and the page scrolls to the first. A text may have
 emphasis, lists and web links; tags and images in it are shown as plain text. ``{name}`` is replaced by a
 number that the screen has computed. ``{{, and was {3:name}}}`` gives the number at the third stop, and is
-left out for users who have not been there.
+left out for users who have not been there and where the number does not exist; ``{{yours is {own}||you have
+none}}`` says something else instead.
 After its text a section may ask a question::
 
     ask: What does it cost?
@@ -42,6 +43,8 @@ NUMBER = r"(\d+(?:\.\d+)?)"
 CHOICES = 3
 """Number of choices in every question; the keys are 1, 2 and 3."""
 FIELD = re.compile(r"\{(?:(\d+):)?([a-z_0-9]+)\}")
+OTHERWISE = "||"
+"""Between the two wordings of a clause: the second is for readers without the numbers of the first."""
 CLAUSE = re.compile(r"\{\{((?:[^{}]|\{[^{}]*\})*)\}\}")
 SCENE = "scene"
 """Key of ``Numbers`` whose value identifies the scene; texts cannot use it."""

@@ -30,6 +30,7 @@ class ScreenLessons(Generic[Look]):
         shipped: Mapping[str, Path],
         on_stop: Callable[[Look], None],
         numbers: Callable[[], Numbers] = dict,
+        on_end: Callable[[], None] = lambda: None,
     ) -> None:
         """Add a folder for each lesson, and the sentence for screen readers.
 
@@ -39,12 +40,13 @@ class ScreenLessons(Generic[Look]):
             shipped: files of the lessons that ship, by their keys in the address.
             on_stop: called with the state that a stop shows.
             numbers: returns the texts for the fields; empty while they are computed.
+            on_end: called when a lesson is left.
         """
         self._kind, self._on_stop, self._numbers = kind, on_stop, numbers
         lessons = {key: shipped_lesson(path, kind) for key, path in shipped.items()}
         lessons |= {f"{OWN}{one.name}": one for one in ui.teaching.own.get(kind.name, ())}
         self._folders = {
-            key: LessonFolder(ui, lesson, partial(self._take_stop, key), numbers)
+            key: LessonFolder(ui, lesson, partial(self._take_stop, key), numbers, on_end)
             for key, lesson in lessons.items()
         }
         self._stated = ""

@@ -9,10 +9,22 @@ from functools import partial
 from typing import Any, Generic, TypeVar
 
 from app.lesson.ballot import Ballot, votes_csv
-from app.lesson.files import CHOICES, CLAUSE, FIELD, SCENE, Lesson, Look, Numbers, Question, settled
+from app.lesson.files import (
+    CHOICES,
+    CLAUSE,
+    FIELD,
+    OTHERWISE,
+    SCENE,
+    Lesson,
+    Look,
+    Numbers,
+    Question,
+    settled,
+)
 from app.lesson.languages import PHRASES, Phrases, phrases_of
 from app.web.markup import Markup, escape, shipped_markdown
 from app.window.page import page_call
+from app.window.tables import UNKNOWN
 from app.window.teaching import ENGLISH
 from app.window.ui import Ui
 from packetmesh.errors import InputError
@@ -41,6 +53,7 @@ class LessonFolder(Generic[Look]):
         lesson: Lesson[Look],
         on_stop: Callable[[Look], None],
         numbers: Callable[[], Numbers] = dict,
+        on_end: Callable[[], None] = lambda: None,
     ) -> None:
         """Add the folder to the panel.
 
@@ -49,8 +62,9 @@ class LessonFolder(Generic[Look]):
             lesson: the lesson.
             on_stop: called with the state that the stop shows.
             numbers: returns the texts for the fields; empty until the screen shows the stop.
+            on_end: called when the user leaves the lesson.
         """
-        self._written, self._on_stop, self._numbers = lesson, on_stop, numbers
+        self._written, self._on_stop, self._numbers, self._on_end = lesson, on_stop, numbers, on_end
         self._teaching, self._lecture = ui.teaching, ui.lecture
         self._known: dict[int, Numbers] = {}
         """Numbers by the index of the stop."""
@@ -197,6 +211,7 @@ class LessonFolder(Generic[Look]):
             self._text.content, self._guess.visible = shipped_markdown(self._phrases.begin), False
             self._poll()
             self._point_out()
+            self._on_end()
             return
         self._known.pop(index, None)
         self._on_stop(self._lesson.stops[index].look)
@@ -294,17 +309,21 @@ class LessonFolder(Generic[Look]):
     def _filled(self, text: str, index: int, fill: Callable[..., Text]) -> Text:
         """Replace the text's fields by the numbers of this stop, or those stored at another stop in the same
         scene; while this stop's numbers are computed, the scene may be another one, and all are to come.
-        Clauses about stops that the user has not visited are left out. ``fill`` returns its text with each
-        match of a pattern replaced.
+        A clause with a number that does not exist, or of a stop that the user has not visited, gives way to
+        its second wording or is left out. ``fill`` returns its text with each match of a pattern replaced.
         """
         now = self._numbers()
         if now:
             same = {at: known for at, known in self._known.items() if known[SCENE] == now[SCENE]}
             self._known = {index: now, **same}
 
+        def exists(stop: str, name: str) -> bool:
+            known = self._known.get(int(stop) - 1, {}) if stop else now
+            return known.get(name, UNKNOWN if stop else TO_COME) != UNKNOWN
+
         def clause(found: re.Match[str]) -> str:
-            stops = {int(stop) - 1 for stop, _ in FIELD.findall(found[1]) if stop}
-            return found[1] if stops <= self._known.keys() else ""
+            ways = found[1].split(OTHERWISE, 1)
+            return next((way for way in ways if all(exists(*one) for one in FIELD.findall(way))), "")
 
         def value(found: re.Match[str]) -> str:
             if found[2] is None:

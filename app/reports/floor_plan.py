@@ -13,8 +13,9 @@ from app.drawing.ghosts import STANDS_ON
 from app.reports.floor_plan_table import TABLE_MM, legend, table
 from app.reports.labels import Labels
 from app.reports.paper import Area, Color, Line, Paper, Shape, Words, box, disc
+from pipeline.kernels.geometry import aim_deg
 from pipeline.planning.calls import RigPlan
-from pipeline.planning.floor import TALLEST_M, aim_deg, footprint, wedge_m
+from pipeline.planning.floor import TALLEST_M, footprint, wedge_m
 from pipeline.planning.places import floor_m
 from pipeline.planning.sensors import AS_PRESENT
 from pipeline.planning.walls import DAMPING_DB

@@ -23,8 +23,8 @@ from pipeline.folders.plan import (
     times_sentence,
 )
 from pipeline.io.textures import Texture
+from pipeline.kernels.geometry import aim_deg
 from pipeline.planning.calls import RigPlan
-from pipeline.planning.floor import aim_deg
 from pipeline.planning.places import floor_m
 
 COLUMNS = 2

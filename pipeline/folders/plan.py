@@ -10,8 +10,8 @@ from packetmesh.files import delete_unfinished, file_trouble
 from packetmesh.settings import settings
 from pipeline.folders.inputs import check_inputs_stay
 from pipeline.folders.run import IMPORTED, check_no_images, is_imported
+from pipeline.kernels.geometry import aim_deg
 from pipeline.planning.calls import RigPlan
-from pipeline.planning.floor import aim_deg
 from pipeline.planning.places import floor_m
 from pipeline.planning.promise import Promise
 from pipeline.sources import FileSource

@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike
 from pipeline.kernels.lens import distorted, reach, straightened
 from pipeline.types import BoolArray, CameraIntrinsics, FloatArray
 
+STEEPEST_DEG = 89.0
+"""Largest tilt of ``aimed``."""
+
 
 def rigid(rotation: FloatArray, translation_m: FloatArray) -> FloatArray:
     """Return the (4, 4) transform x -> rotation @ x + translation."""
@@ -62,6 +65,29 @@ def look_at(eye_m: ArrayLike, target_m: ArrayLike, up: ArrayLike = (0.0, 0.0, 1.
     right = np.cross(forward, np.asarray(up, float))
     right /= np.linalg.norm(right)
     return rigid(np.stack([right, np.cross(forward, right), forward], axis=1), eye_m)
+
+
+def aim_deg(T_world_camera: FloatArray) -> tuple[float, float]:
+    """Return a camera's pan and tilt.
+
+    Pan is the angle of its view on the floor plan, from the x axis counter-clockwise, 0 to 360 degrees; tilt
+    the angle above the horizon, negative for a view downwards.
+    """
+    ahead = T_world_camera[:3, 2]
+    pan_deg = np.degrees(np.arctan2(ahead[1], ahead[0])) % 360.0
+    return float(pan_deg), float(np.degrees(np.arcsin(np.clip(ahead[2], -1.0, 1.0))))
+
+
+def aimed(eye_m: ArrayLike, pan_deg: float, tilt_deg: float) -> FloatArray:
+    """Return T_world_camera of a level camera at ``eye_m`` with the pan and tilt of ``aim_deg``.
+
+    Tilts beyond ``STEEPEST_DEG`` are cut there, because a camera that looks straight up or down has no pan.
+    """
+    eye_m = np.asarray(eye_m, float)
+    pan = math.radians(pan_deg)
+    tilt = math.radians(min(max(tilt_deg, -STEEPEST_DEG), STEEPEST_DEG))
+    ahead = (math.cos(tilt) * math.cos(pan), math.cos(tilt) * math.sin(pan), math.sin(tilt))
+    return look_at(eye_m, eye_m + ahead)
 
 
 LEVEL_POSE = look_at(np.zeros(3), np.array([0.0, 1.0, 0.0]))

@@ -74,14 +74,3 @@ def wedge_m(T_world_camera: FloatArray, intrinsics: CameraIntrinsics, radius_m: 
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-9)
     eye_m = T_world_camera[:2, 3]
     return np.vstack([eye_m, eye_m + radius_m * ahead])
-
-
-def aim_deg(T_world_camera: FloatArray) -> tuple[float, float]:
-    """Return a camera's pan and tilt.
-
-    Pan is the angle of its view on the floor plan, from the x axis counter-clockwise, 0 to 360 degrees; tilt
-    the angle above the horizon, negative for a view downwards.
-    """
-    ahead = T_world_camera[:3, 2]
-    pan_deg = np.degrees(np.arctan2(ahead[1], ahead[0])) % 360.0
-    return float(pan_deg), float(np.degrees(np.arcsin(np.clip(ahead[2], -1.0, 1.0))))

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from PIL import Image, ImageFile
 
+from app.drawing.colors import GHOST
 from app.landing import PICTURES
 from packetmesh.progress import drain
 from pipeline.io.demos import DEMO_SCENES, DEMO_WALKS, SCENES
@@ -55,6 +56,14 @@ def half_depth(scene: str) -> Image.Image:
     return Image.fromarray(both)
 
 
+def missed(scene: str) -> Image.Image:
+    """The photograph, with the colour of ghosts where the depth sensor measured nothing."""
+    depth = cv2.imread(str(SCENES / scene / "node_00" / "depth.png"), cv2.IMREAD_UNCHANGED)
+    picture = np.array(photograph(scene).resize((depth.shape[1], depth.shape[0])))
+    picture[depth == 0] = GHOST
+    return Image.fromarray(picture)
+
+
 def cut_short(scene: str) -> Image.Image:
     """The photograph as a JPEG whose last packets never came."""
     whole = io.BytesIO()
@@ -91,6 +100,7 @@ def main() -> None:
     pictures |= {name: Image.open(DOCS / f"{doc}.jpg").crop(box) for name, (doc, box) in CUTS_PX.items()}
     pictures["can-a-picture-measure"] = half_depth("living-room")
     pictures["what-one-lost-packet-costs"] = cut_short("living-room")
+    pictures["where-should-the-camera-stand"] = missed("workshop")
     PICTURES.mkdir(exist_ok=True)
     for name, picture in pictures.items():
         width, height = picture.size

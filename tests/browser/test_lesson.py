@@ -17,6 +17,7 @@ LESSONS = {
     "Which ball radius?": ("Surface", 10),
     "How images cross a sensor network": ("Network", 10),
     "What one lost packet costs": ("Network", 8),
+    "Where should the camera stand?": ("Network", 6),
 }
 NEXT_MS = 20_000
 """For the next stop on a busy machine."""

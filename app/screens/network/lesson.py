@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -15,11 +15,17 @@ from app.screens.network.delivery_view import DeliveryView, MomentView
 from app.screens.network.labels import ACCESS, CAUSES, CODINGS, NETWORKS, SCHEMES
 from app.screens.network.numbers import verdict
 from app.screens.network.packets import Frames
+from app.screens.network.planning import lesson as plan_lesson
+from app.screens.network.planning.lesson import PlanLook
 from app.screens.network.view import FAILURES, NetworkView, What
+from app.window.in_address import STOP
 from app.window.tables import UNKNOWN, number
 from network_sim.types import Cause
 
 CROSSING, LOST_PACKET = LESSONS / "how-images-cross-a-network.md", LESSONS / "what-one-lost-packet-costs.md"
+PLACING = LESSONS / "where-should-the-camera-stand.md"
+SHIPPED = {STOP: CROSSING, f"{STOP}-lost": LOST_PACKET, f"{STOP}-camera": PLACING}
+"""The lessons by their keys in the address."""
 _ON_OFF = {"on": True, "off": False}
 _CAUSES = {words: cause for cause, words in CAUSES.items()}
 
@@ -55,6 +61,7 @@ class NetworkLook:
     at: Place = Place()
     window_s: float | None = None
     """Length of the shown part of the timeline; None is all."""
+    plan: PlanLook = field(default_factory=PlanLook)
 
 
 def find(place: Place, run: NetworkView, frames: Frames) -> tuple[int, int]:
@@ -123,6 +130,7 @@ SETTINGS: dict[str, Setting[NetworkLook]] = {
     "setting": _setting,
     "at": sets("at", _place),
     "window": sets("window_s", quantity("ms", 60_000.0, per_unit=1000.0, above_zero=True)),
+    **plan_lesson.SETTINGS,
 }
 """The settings of a stop, by their names in the file."""
 
@@ -145,14 +153,16 @@ NUMBERS = (
     *SHARES,
     "cost",
 )
-"""Fields of the texts and choices of both lessons."""
+"""Fields of the texts and choices of all lessons that are of a delivery."""
 LEFT_SHARE, SEEN_SHARE = 0.05, 0.005
 """Share of arrived depth below which a camera counts as lost, and least increase of the share of rays without
 a surface that counts."""
 
 
-def numbers(scene: str, view: DeliveryView, frames: Frames) -> Numbers:
-    """Return the fields' values for a delivery of a scene; empty until its last moment is there."""
+def numbers(scene: str, view: DeliveryView, frames: Frames, planned: Numbers) -> Numbers:
+    """Return the fields' values for a delivery of a scene and those of its plan; empty until the delivery's
+    last moment is there.
+    """
     end = view.moment_at(view.times_ns[-1])
     if end is None or end.t_ns != view.times_ns[-1]:
         return {}
@@ -180,6 +190,7 @@ def numbers(scene: str, view: DeliveryView, frames: Frames) -> Numbers:
         "other": number(end.energy_j - end.radio_j, 1, "J"),
         **_worst(view, end),
         "cost": _cost(view, end),
+        **planned,
     }
 
 
@@ -232,7 +243,8 @@ def _cost(view: DeliveryView, end: MomentView) -> str:
 
 def street_numbers(scene: str, runs: tuple[NetworkView, ...]) -> Numbers:
     """Return the fields' values for runs on streets."""
-    return {**dict.fromkeys(NUMBERS, UNKNOWN), SCENE: scene, "verdict": verdict(runs)}
+    names = (*NUMBERS, *plan_lesson.NUMBERS)
+    return {**dict.fromkeys(names, UNKNOWN), SCENE: scene, "verdict": verdict(runs)}
 
 
 def statement(values: Mapping[str, str]) -> str:
@@ -248,4 +260,4 @@ def statement(values: Mapping[str, str]) -> str:
 
 
 WORDS = {"cost": ("camera", "spread", "nothing")}
-KIND = Kind("network", SETTINGS, NetworkLook(), NUMBERS, statement, WORDS)
+KIND = Kind("network", SETTINGS, NetworkLook(), (*NUMBERS, *plan_lesson.NUMBERS), statement, WORDS)

@@ -30,7 +30,7 @@ from app.screens.network.export import delivery_offers, network_offers
 from app.screens.network.inspector import Inspector
 from app.screens.network.labels import NETWORKS, ORIGIN, RUNNING, STREET_TEXT, TEXT, WALK_TEXT
 from app.screens.network.lanes import lanes_of, stops_ns
-from app.screens.network.lesson import CROSSING, KIND, LOST_PACKET, NetworkLook, find, numbers, street_numbers
+from app.screens.network.lesson import KIND, SHIPPED, NetworkLook, find, numbers, street_numbers
 from app.screens.network.measures import MomentMeasures
 from app.screens.network.numbers import metric_tables, runs_summary, verdict
 from app.screens.network.packets import Frames, legend_html
@@ -38,12 +38,10 @@ from app.screens.network.planning.folder import PlanFolder
 from app.screens.network.setup import NetworkSetup
 from app.screens.network.view import NetworkView
 from app.web.markup import Markdown, Markup
-from app.window.in_address import STOP, CallbackState
+from app.window.in_address import CallbackState
 from app.window.panel import Offers, Panel
 from packetmesh.errors import InputError
 
-LESSONS = {STOP: CROSSING, f"{STOP}-lost": LOST_PACKET}
-"""Lessons by their keys in the address."""
 REST_S = 0.6
 """Time that the settings must be unchanged before a run begins, seconds."""
 HAND_S = 0.15
@@ -83,7 +81,9 @@ class NetworkPanel(Panel):
         """The moment that an address asks for, until its run is there."""
         self._text = gui.add_markdown(TEXT)
         self._difference = gui.add_markdown(Markdown(""))
-        self._lessons = ScreenLessons(ui, KIND, LESSONS, self._take_look, self._lesson_numbers)
+        self._lessons = ScreenLessons(
+            ui, KIND, SHIPPED, self._take_look, self._lesson_numbers, lambda: self._plan.give_back()
+        )
         self._setup = NetworkSetup(ui, self._resting.restart)
         self._about = gui.add_markdown(Markdown(""))
         self._status = gui.add_markdown(Markdown("Nothing is sent yet."))
@@ -91,7 +91,8 @@ class NetworkPanel(Panel):
         with gui.add_folder("What if"):
             self._setup.add_what_if(f"{self.drawn_below}/what-if")
         setup = self._setup
-        self._plan = PlanFolder(self.session, f"{self.drawn_below}/plan", setup.sent, lambda: setup.preset)
+        plan = f"{self.drawn_below}/plan"
+        self._plan = PlanFolder(self.session, plan, setup.sent, lambda: setup.preset, self._lessons.refresh)
         self._inspector = Inspector(ui, self.session)
         self._legend = gui.add_html(Markup(""))
         self._measures = MomentMeasures(self.session)
@@ -121,9 +122,10 @@ class NetworkPanel(Panel):
 
     def on_action(self, action: str) -> None:
         """Restore the first settings on *Reset*, and drop the plan."""
-        if action == "Reset":
-            self._plan.forget()
-        if action == "Reset" and self._visited:
+        if action != "Reset":
+            return
+        self._plan.reset()
+        if self._visited:
             self._setup.reset()
             self.ui.post(self._run)
 
@@ -315,6 +317,8 @@ class NetworkPanel(Panel):
         self._run()
         if self._delivery is not None and self._delivery.sent == self.session.spec.sent:
             self._aim(self._delivery.run)  # it is already being computed
+        if not self._setup.street:
+            self._plan.show_look(look.plan)
 
     def _lesson_numbers(self) -> Numbers:
         """Return the numbers of what is shown; empty while something else is computed."""
@@ -324,7 +328,7 @@ class NetworkPanel(Panel):
             return {}
         if self._delivery is None:
             return street_numbers(scene.title, self._runs) if self._runs else {}
-        return numbers(scene.title, self._delivery, self._frames[0])
+        return numbers(scene.title, self._delivery, self._frames[0], self._plan.numbers())
 
     def _aim(self, run: NetworkView) -> None:
         """Go to the place of the lesson's stop and describe the frame there."""

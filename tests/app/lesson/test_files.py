@@ -73,6 +73,7 @@ KINDS = {
     surface.SHIPPED: surface.KIND,
     network.CROSSING: network.KIND,
     network.LOST_PACKET: network.KIND,
+    network.PLACING: network.KIND,
     SHIPPED: fuse.KIND,
     walk.SHIPPED: walk.KIND,
 }
@@ -82,7 +83,7 @@ KINDS = {
 def test_every_stop_that_ships_differs_and_asks_what_cannot_be_guessed_by_its_place(path):
     shipped = read_lesson(path, KINDS[path])
     assert len({stop.title for stop in shipped.stops}) == len(shipped.stops) >= 5
-    assert len({stop.look for stop in shipped.stops}) == len(shipped.stops)
+    assert len({(stop.look, stop.sees) for stop in shipped.stops}) == len(shipped.stops)
     rights = []
     for stop in shipped.stops:
         assert stop.question is not None
@@ -189,6 +190,7 @@ def test_reset_leaves_the_lesson_and_takes_back_what_its_stop_had_set(tmp_path):
 PLAIN = (
     r"3-D|k[12]|802\.11b?|1,500 bytes|only 1\.5 m|1\.25 m|20 µs|0\.02 ms|\b11? Mbit/s|250 kbit/s"
     r"|0\.1 to the|node_02|32 × 32|32 pixels|√3|\+ 1, 2 and 4|from 0 to 2|within 5 %"
+    r"|30 cm|8 dB|95 %|95 of 100|99 %"
 )
 """Numbers that no scene changes: of formulas, standards and settings."""
 
@@ -325,6 +327,34 @@ def test_the_mark_of_a_choice_follows_what_is_computed(tmp_path):
     assert "**Not quite, and many think so.** green." in ui.gui.text()
 
 
+def test_a_clause_whose_number_does_not_exist_gives_way_to_its_second_wording(tmp_path):
+    written = "x\n\n{{Yours: {own}.||None is yours.}}{{ There {2:own}.}}{{ Last {2:own}|| Never there}}"
+    (tmp_path / "lesson.md").write_text(f"# A\n## One\n{written}\n\n## Two\ny\n")
+    ui, now = ui_of(), {SCENE: "noon", "own": UNKNOWN}
+    folder = LessonFolder(
+        ui, read_lesson(tmp_path / "lesson.md", kind_of("own")), lambda look: None, lambda: now
+    )
+    ui.gui.press("Go", "Next")
+    assert "\nNone is yours. Never there\n" in ui.gui.text()
+    now["own"] = "3"
+    folder.refresh()
+    assert "\nYours: 3. Never there\n" in ui.gui.text()
+    ui.gui.press("Go", "Next")
+    ui.gui.press("Go", "Back")
+    assert "\nYours: 3. There 3. Last 3\n" in ui.gui.text()
+
+
+def test_the_screen_hears_when_its_lesson_is_left(tmp_path):
+    ui, left = ui_of(), []
+    LessonFolder(
+        ui, lesson(tmp_path, ASKED), lambda look: None, on_end=lambda: left.append(ui.gui.find("Stop").value)
+    )
+    ui.gui.press("Go", "Next")
+    assert left == []
+    ui.gui.press("Go", "End")
+    assert left == [OFF]
+
+
 def test_what_a_lost_packet_costs_is_told_by_what_is_left_of_the_cameras():
     def cost(depth_shares, missed):
         view = SimpleNamespace(lossless=SimpleNamespace(no_hit_share=0.1))
@@ -344,13 +374,14 @@ def test_what_a_lost_packet_costs_is_told_by_what_is_left_of_the_cameras():
         (surface.SHIPPED, surface),
         (network.CROSSING, network),
         (network.LOST_PACKET, network),
+        (network.PLACING, network),
         (SHIPPED, fuse),
         (walk.SHIPPED, walk),
     ],
     ids=lambda value: getattr(value, "stem", ""),
 )
 def test_the_folders_that_lessons_unfold_are_on_their_screens(path, screen):
-    sources = "".join(one.read_text() for one in Path(screen.__file__).parent.glob("*.py"))
+    sources = "".join(one.read_text() for one in Path(screen.__file__).parent.rglob("*.py"))
     folders = set(re.findall(r'add_(?:folder|tab)\(\s*"([^"]+)"', sources))
     named = set(re.findall(r"^open: (.+)$", path.read_text(), re.MULTILINE))
     assert named <= folders

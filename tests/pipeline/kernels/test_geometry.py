@@ -108,3 +108,24 @@ def test_rounding_errors_of_a_rotation_go_and_its_position_stays():
     np.testing.assert_allclose(found[:3, :3] @ found[:3, :3].T, np.eye(3), atol=1e-14)
     np.testing.assert_allclose(found, T, atol=2e-5)
     np.testing.assert_array_equal(found[:, 3], T[:, 3])
+
+
+@pytest.mark.parametrize(
+    ("target", "pan_deg", "tilt_deg"),
+    [((1, 0, 0), 0, 0), ((0, 1, 0), 90, 0), ((-1, 0, 1), 180, 45), ((0, -1, -1), 270, -45)],
+)
+def test_pan_is_counter_clockwise_from_x_and_tilt_is_up(target, pan_deg, tilt_deg):
+    assert geometry.aim_deg(geometry.look_at((0, 0, 0), target)) == pytest.approx((pan_deg, tilt_deg))
+
+
+@pytest.mark.parametrize(("pan_deg", "tilt_deg"), [(0.0, 0.0), (135.0, -30.0), (270.0, 60.0)])
+def test_a_camera_that_is_aimed_has_that_pan_and_tilt_and_stands_level(pan_deg, tilt_deg):
+    T = geometry.aimed((1.0, 2.0, 3.0), pan_deg, tilt_deg)
+    assert geometry.aim_deg(T) == pytest.approx((pan_deg, tilt_deg))
+    assert np.allclose(T[:3, 3], (1.0, 2.0, 3.0))
+    assert T[2, 0] == pytest.approx(0.0), "the image's rows are level"
+    assert T[2, 1] < 0.0, "the image's columns run down"
+
+
+def test_a_camera_that_would_look_straight_down_still_has_its_pan():
+    assert geometry.aim_deg(geometry.aimed((0.0, 0.0, 0.0), 90.0, -90.0)) == pytest.approx((90.0, -89.0))

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.planning.floor import aim_deg, footprint, wedge_m
+from pipeline.planning.floor import footprint, wedge_m
 from tests.pipeline.planning.rooms import LENS, at, box_room, place, sheet, targets_at
 
 
@@ -28,14 +28,6 @@ def test_ceilings_and_guesses_are_not_drawn():
     sheets = [box_room()[0], box_room()[5]]
     found = footprint(place(sheets, targets_at([(1, 1, 1)], (0, 0, 1)), guessed_sheets=[guess]))
     assert found.things_m == ()
-
-
-@pytest.mark.parametrize(
-    ("target", "pan_deg", "tilt_deg"),
-    [((1, 0, 0), 0, 0), ((0, 1, 0), 90, 0), ((-1, 0, 1), 180, 45), ((0, -1, -1), 270, -45)],
-)
-def test_pan_is_counter_clockwise_from_x_and_tilt_is_up(target, pan_deg, tilt_deg):
-    assert aim_deg(at((0, 0, 0), target)) == pytest.approx((pan_deg, tilt_deg))
 
 
 def test_the_wedge_has_the_lenss_angle_and_its_radius():

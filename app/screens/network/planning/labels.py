@@ -30,10 +30,14 @@ there would newly measure; pink ghosts show the best. Walls found in the surface
 )
 NONE_YET = Markdown("No plan yet.")
 PLANNING = Markdown("Planning; the bar at the top shows the progress. *Cancel* stops it.")
+JUDGING = Markdown("The ghost is being judged where it stands now.")
 STOPPED = Markdown("The planning was stopped or replaced; press *Suggest* again.")
+MISSED = Markdown(
+    "**Pink: {:.1f} % of the present cameras' rays meet no measured surface.** They meet a guess or nothing."
+)
 DRAG = Markdown(
-    """**Drag a ghost by its arrows and rings**: promise and pink points follow. When you let go, its picture
-and the time of its image follow, too."""
+    """**Drag a ghost by its arrows and rings**, or change the numbers below: promise and pink points
+follow. When you let go, its picture and the time of its image follow, too."""
 )
 PICTURE = Markdown(
     "What it would see, on the surface known today. Green: newly measured, the stronger the likelier; "

@@ -70,7 +70,7 @@ def ghost_table(ghosts: GhostsView, arrivals: Sequence[Arrival]) -> Markup:
     """Return HTML of a table with a column for each ghost; without arrivals, times are being computed."""
     columns = [f"new {row}" for row in range(1, len(ghosts.ghosts) + 1)]
     sent = [
-        (_time(one.seconds_to_90_s), _time(one.seconds_to_99_s), number(one.joules, 2, "J"))
+        (seconds_text(one.seconds_to_90_s), seconds_text(one.seconds_to_99_s), number(one.joules, 2, "J"))
         for one in arrivals
     ] or [("…", "…", "…")] * len(columns)
     rows: list[Row] = [
@@ -110,7 +110,8 @@ def ghost_table(ghosts: GhostsView, arrivals: Sequence[Arrival]) -> Markup:
     return table(rows, columns, [GHOST] * len(columns))
 
 
-def _time(seconds: float) -> str:
+def seconds_text(seconds: float) -> str:
+    """Return a time with its unit; infinite times are never."""
     return number(seconds, 2, "s") if math.isfinite(seconds) else "never"
 
 

@@ -15,12 +15,13 @@ from app.screens.network.planning.planned import (
     plan_of_request,
     sending_of,
 )
-from app.screens.network.planning.view import NoPlan, PlanRequest, PlanView
+from app.screens.network.planning.view import NoPlan, PlanRequest, PlanView, Pose
 from packetmesh.errors import PacketMeshError
 from packetmesh.progress import Progress
 from pipeline.folders.plan import fewer_sentence, level_sentence
 from pipeline.planning.calls import RigPlan
 from pipeline.planning.plan import LEAST_OVERLAP
+from pipeline.types import FloatArray
 
 
 def plan_job(store: Store, spec: Spec, request: PlanRequest) -> Generator[Progress, None, PlanView | NoPlan]:
@@ -33,7 +34,7 @@ def plan_job(store: Store, spec: Spec, request: PlanRequest) -> Generator[Progre
 
 def _view(store: Store, spec: Spec, request: PlanRequest) -> Generator[Progress, None, PlanView]:
     place, plan, delivery = yield from plan_of_request(store, spec, request)
-    poses = tuple(tuple(camera.T_world_camera.ravel().tolist()) for camera in plan.cameras)
+    poses = tuple(_pose(camera.T_world_camera) for camera in plan.cameras)
     plan, judged = moved(place, plan, poses)
     rig, radio = sending_of(place, request)
     whole = RigPlan(place.seen, rig, plan, radio, delivery)
@@ -47,12 +48,20 @@ def _view(store: Store, spec: Spec, request: PlanRequest) -> Generator[Progress,
         2.0 * float(np.arctan2(0.5 * lens.height_px, lens.fy_px)),
         lens.width_px / lens.height_px,
         plan.measured_share,
+        place.floor_m,
+        {frame.name: _pose(frame.T_world_camera) for frame in rig.frames},
+        len(delivery.walls_m),
         plan.at_least_of_best,
         plan.candidates,
         delivery.image_bytes,
         LEAST_OVERLAP,
         tuple(filter(None, notes)),
     )
+
+
+def _pose(T_world_camera: FloatArray | None) -> Pose:
+    assert T_world_camera is not None, "registered cameras have poses"
+    return tuple(T_world_camera.ravel().tolist())
 
 
 def _ignored(request: PlanRequest) -> list[str]:

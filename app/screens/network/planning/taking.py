@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import viser
@@ -25,9 +26,11 @@ from pipeline.spec import key
 class Taking:
     """Adds the chosen ghost to a demo room."""
 
-    def __init__(self, session: PanelSession) -> None:
-        """Add button and sentence to the current container."""
-        self._session = session
+    def __init__(self, session: PanelSession, on_change: Callable[[], None]) -> None:
+        """Add button and sentence to the current container; ``on_change`` hears of an added camera."""
+        self._session, self._on_change = session, on_change
+        self.taken: TakenView | None = None
+        """The camera to which the sentence belongs; None if there is none."""
         self._rooms: dict[Source, tuple[str, int]] = {}
         """By the rigs that were made here: their demo room, and how many cameras were added to it."""
         self._told = key(session.spec, "truth")
@@ -49,7 +52,7 @@ class Taking:
     def on_spec(self, spec: Spec) -> None:
         """Remove the sentence on a camera when the surface is another one."""
         if key(spec, "truth") != self._told:
-            self._told, self._text.content = key(spec, "truth"), Markdown("")
+            self._told, self._text.content, self.taken = key(spec, "truth"), Markdown(""), None
 
     def offer(self, pose: Pose | None, sensor: str) -> None:
         """Offer a ghost with this sensor, if it can be rendered; None offers none."""
@@ -87,9 +90,10 @@ class Taking:
                 return
             self._rooms[taken.source] = demo, added + 1
             larger = replace(session.spec, source=taken.source)
-            self._told = key(larger, "truth")
+            self._told, self.taken = key(larger, "truth"), taken
             session.want(larger)
             self._text.content = kept_sentence(taken)
+            self._on_change()
 
         job = "network.planning.take_job:take_job"
         session.side_job(job, demo, self._sensor, self._pose, str(folder), on_end=came)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -88,6 +89,12 @@ class PlanView:
     """Width over height of their images."""
     measured_share: float
     """Share of the present cameras' rays on measured surface."""
+    floor_m: float
+    """z of the floor, world frame."""
+    present: Mapping[str, Pose]
+    """Poses of the present cameras that are registered and switched on, by their names."""
+    walls: int
+    """Number of walls that damp the radio."""
     at_least_of_best: float
     candidates: int
     image_bytes: int

@@ -20,7 +20,7 @@ from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from packetmesh.settings import with_settings
 from pipeline.io.rigs import load_rig, save_rig
-from pipeline.kernels.geometry import rigid
+from pipeline.kernels.geometry import aim_deg, rigid
 from pipeline.sources import RigFolder
 from tests.app.fakes import Bench, Impatient, ui_of
 from tests.pipeline.delivery.small import CONFIG, small_rig
@@ -112,6 +112,30 @@ def test_a_dragged_ghost_promises_what_it_sees_there_and_its_image_is_sent_from_
     assert "No present camera sees that there is free space" in far
     assert not len(screen.newly())
     assert "…" not in far
+
+
+def test_a_ghost_is_moved_by_numbers_as_by_hand(screen):
+    assert not screen.gui.find("Place (m)").seen
+    screen.suggest()
+    pose = screen.poses[0]
+    place, aim = screen.gui.find("Place (m)"), screen.gui.find("Pan, tilt (°)")
+    height = float(re.search(r"Height.*?([\d.]+) m", screen.gui.text("Plan"), re.DOTALL)[1])
+    assert place.value == pytest.approx((*pose[:2, 3], height), abs=0.006)
+    assert aim.value == pytest.approx(aim_deg(pose), abs=0.06)
+    x_m, y_m, height_m = place.value
+    screen.gui.set("Place (m)", (x_m, y_m, height_m + 0.3))
+    there = rigid(pose[:3, :3], (x_m, y_m, pose[2, 3] + 0.3))
+    assert np.allclose(screen.poses[0], there, atol=0.006)
+    (name,) = (one for one in screen.ui.scene.names("/network/plan") if "/handle-" in one)
+    for drawn in (screen.drawn(name), screen.drawn("/network/plan/1")):
+        assert np.allclose(drawn.position, screen.poses[0][:3, 3])
+    text = screen.gui.text("Plan")
+    assert "by hand" in text
+    assert "…" not in text, "its image is sent from there"
+    screen.gui.set("Pan, tilt (°)", (40.0, -20.0))
+    assert aim_deg(screen.poses[0]) == pytest.approx((40.0, -20.0))
+    screen.drag((0.2, 0.0, 0.0))
+    assert place.value == pytest.approx((x_m + 0.2, y_m, height_m + 0.3), abs=0.011)
 
 
 def test_an_answer_of_a_plan_that_is_gone_changes_nothing(screen):
