@@ -29,7 +29,8 @@ TITLES = {preset.title: name for name, preset in NETWORKS.items()}
 CODING_NAMES = {title: name for name, title in CODINGS.items()}
 NOTHING = "nothing"
 FIRST = next(iter(NETWORKS))
-MOMENTS = 20
+MOMENTS, FEWEST = 20, 4
+"""Moments of a delivery, and their least number: where a lesson looks at a plan, the last one is enough."""
 BURST_FRAMES = NetworkLook().burst_frames
 OF_NODES = ("off", "wall", "moved")
 FREE = Markdown(
@@ -120,7 +121,7 @@ class NetworkSetup:
         )
         self._moments = gui.add_slider(
             "Moments",
-            4,
+            FEWEST,
             40,
             1,
             MOMENTS,
@@ -245,7 +246,7 @@ class NetworkSetup:
         self._coding.value, self._leave_out.value = CODINGS[look.coding], False
         self._share.value, self._burst.value = look.lose_percent, look.burst_frames
         self._retransmit.value = look.again and self._retransmit.value
-        self._moments.value = MOMENTS
+        self._moments.value = FEWEST if look.plan.show else MOMENTS
         self.what_if.forget()
         self._pending = {"off": look.off} if look.off else {}
         self.grant()
