@@ -4,11 +4,11 @@ A lesson begins with a ``# title`` and lines ``screen: name``, ``scene: name`` a
 which a teacher's own lesson needs the first. Then come sections. A section is a ``## title``, lines ``set:
 name = value``, lines ``open: folder or tab``, lines ``see: control or number``, and its text. What a section
 does not set has its default, so that each stop can be shown alone. The folders and tabs that it names are
-opened; they, the controls and the numbers are framed, and the page scrolls to the first. A text may have
-emphasis, lists and web links; tags and images in it are shown as plain text. ``{name}`` is replaced by a
-number that the screen has computed. ``{{, and was {3:name}}}`` gives the number at the third stop, and is
-left out for users who have not been there and where the number does not exist; ``{{yours is {own}||you have
-none}}`` says something else instead.
+opened; they, the controls and the numbers are framed, and the page scrolls to the first control or number,
+else to the first folder. A text may have emphasis, lists and web links; tags and images in it are shown as
+plain text. ``{name}`` is replaced by a number that the screen has computed. ``{{, and was {3:name}}}`` gives
+the number at the third stop, and is left out for users who have not been there and where the number does not
+exist; ``{{yours is {own}||you have none}}`` says something else instead.
 After its text a section may ask a question::
 
     ask: What does it cost?

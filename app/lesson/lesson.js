@@ -136,15 +136,20 @@
       .filter(one => titles.includes(one.textContent.trim()) && one.offsetParent !== null && !card.contains(one));
     const heads = [...document.querySelectorAll("svg[class*=tabler-icon-chevron-]")].map(arrow => arrow.parentElement)
       .filter(one => folders.includes(one.textContent.trim()) && one.offsetParent !== null);
+    const named = [
+      ...called("label", names).map(one => one.parentElement.parentElement.parentElement),
+      ...called(".packetmesh-term", names).map(one => one.closest("tr") ?? one),
+      ...called("button", names),
+    ];
     const found = [
       ...heads.map(one => one.parentElement),
       ...called("[role=tab]", folders).map(one => one.closest("[role=tablist]").parentElement),
-      ...called("label", names).map(one => one.parentElement.parentElement.parentElement),
-      ...called(".packetmesh-term", names).map(one => one.closest("tr") ?? one),
+      ...named,
     ];
     found.forEach(one => one.classList.add("packetmesh-here"));
-    found.sort((one, other) => one.compareDocumentPosition(other) & Node.DOCUMENT_POSITION_FOLLOWING ? -1 : 1);
-    found[0]?.scrollIntoView({block: "start"});
+    const goal = named.length ? named : found;
+    goal.sort((one, other) => one.compareDocumentPosition(other) & Node.DOCUMENT_POSITION_FOLLOWING ? -1 : 1);
+    goal[0]?.scrollIntoView({block: "start"});
   }
 
   new MutationObserver(records => {

@@ -10,7 +10,8 @@ from app.window.ui import Ui
 from pipeline.kernels.geometry import aim_deg, aimed, rigid
 from pipeline.types import FloatArray
 
-STEP_M, STEP_DEG = 0.1, 5.0
+STEP_M, STEP_DEG = 0.05, 2.5
+"""Steps of the arrow keys. They have as many decimals as the shown values, which the page sends back."""
 
 
 class PoseByNumber:
