@@ -159,10 +159,22 @@ LEFT_SHARE, SEEN_SHARE = 0.05, 0.005
 a surface that counts."""
 
 
-def numbers(scene: str, view: DeliveryView, frames: Frames, planned: Numbers) -> Numbers:
-    """Return the fields' values for a delivery of a scene and those of its plan; empty until the delivery's
-    last moment is there.
-    """
+class DeliveryNumbers:
+    """The numbers of the delivery that is shown, kept while a ghost of its plan is dragged."""
+
+    def __init__(self) -> None:
+        self._of: tuple[str, DeliveryView] | None = None
+        self._values: Numbers = {}
+
+    def with_plan(self, scene: str, view: DeliveryView, frames: Frames, planned: Numbers) -> Numbers:
+        """Return ``numbers`` and those of the plan; empty until the delivery's last moment is there."""
+        if self._of is None or self._of[0] != scene or self._of[1] is not view:
+            self._of, self._values = (scene, view), numbers(scene, view, frames)
+        return {**self._values, **planned} if self._values else {}
+
+
+def numbers(scene: str, view: DeliveryView, frames: Frames) -> Numbers:
+    """Return the fields' values for a delivery of a scene; empty until its last moment is there."""
     end = view.moment_at(view.times_ns[-1])
     if end is None or end.t_ns != view.times_ns[-1]:
         return {}
@@ -190,7 +202,6 @@ def numbers(scene: str, view: DeliveryView, frames: Frames, planned: Numbers) ->
         "other": number(end.energy_j - end.radio_j, 1, "J"),
         **_worst(view, end),
         "cost": _cost(view, end),
-        **planned,
     }
 
 

@@ -30,7 +30,7 @@ from app.screens.network.export import delivery_offers, network_offers
 from app.screens.network.inspector import Inspector
 from app.screens.network.labels import NETWORKS, ORIGIN, RUNNING, STREET_TEXT, TEXT, WALK_TEXT
 from app.screens.network.lanes import lanes_of, stops_ns
-from app.screens.network.lesson import KIND, SHIPPED, NetworkLook, find, numbers, street_numbers
+from app.screens.network.lesson import KIND, SHIPPED, DeliveryNumbers, NetworkLook, find, street_numbers
 from app.screens.network.measures import MomentMeasures
 from app.screens.network.numbers import metric_tables, runs_summary, verdict
 from app.screens.network.packets import Frames, legend_html
@@ -77,6 +77,7 @@ class NetworkPanel(Panel):
         self._resting = ui.debounce(REST_S, self._run)
         self._hand = ui.debounce(HAND_S, self._show_moment)
         self._look: NetworkLook | None = None
+        self._numbers = DeliveryNumbers()
         self._requested_ns: int | None = None
         """The moment that an address asks for, until its run is there."""
         self._text = gui.add_markdown(TEXT)
@@ -328,7 +329,7 @@ class NetworkPanel(Panel):
             return {}
         if self._delivery is None:
             return street_numbers(scene.title, self._runs) if self._runs else {}
-        return numbers(scene.title, self._delivery, self._frames[0], self._plan.numbers())
+        return self._numbers.with_plan(scene.title, self._delivery, self._frames[0], self._plan.numbers())
 
     def _aim(self, run: NetworkView) -> None:
         """Go to the place of the lesson's stop and describe the frame there."""

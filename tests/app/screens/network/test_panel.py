@@ -266,7 +266,7 @@ def test_a_node_switched_off_is_not_heard_and_the_difference_is_told(screen):
     assert view.run.names[:2] == ("node_00", "node_02")
     streams = [view.nodes[row].total_bytes for row in (0, 2)]
     assert f"2 nodes sent {1e-6 * sum(streams):.2f} MB" in screen.gui.text()
-    told = numbers("", view, Frames(view.run), {})
+    told = numbers("", view, Frames(view.run))
     assert told["packets"] == f"{view.run.packets:,}"
     assert told["bytes_time"] == time_text(round(8e9 * sum(streams) / view.run.config.mac.rate_bps))
     screen.dock.seek(view.moments[-1].t_ns)
