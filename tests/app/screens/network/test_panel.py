@@ -23,7 +23,7 @@ from app.screens.network.delivery_view import DeliveryView, PacketView
 from app.screens.network.draw import STREET, ground_of
 from app.screens.network.inspector import Inspector
 from app.screens.network.labels import ANSWER, CODINGS, NETWORKS, ORIGIN, PICK
-from app.screens.network.lesson import CROSSING, KIND, LOST_PACKET, numbers
+from app.screens.network.lesson import CROSSING, KIND, LOST_PACKET, PLACING, NetworkLook, numbers
 from app.screens.network.packets import Frames
 from app.screens.network.panel import NetworkPanel
 from app.screens.network.setup import NetworkSetup
@@ -430,6 +430,30 @@ def test_every_stop_of_the_lessons_asks_for_a_network_that_there_is(path):
         if stop.look.off:
             assert asked[-1].down == (stop.look.off,)
     assert len(set(asked)) >= 7
+
+
+def test_a_stop_on_a_plan_rebuilds_the_surface_at_the_fewest_moments():
+    controls = NetworkSetup(ui_of(), lambda: None)
+    controls.add_what_if("/what-if")
+    controls.add_advanced()
+    controls.take(read_lesson(PLACING, KIND).stops[0].look)
+    assert controls.sent().moments == setup.FEWEST
+    controls.take(NetworkLook())
+    assert controls.sent().moments == setup.MOMENTS
+
+
+def test_the_lesson_on_plans_says_the_plans_numbers_and_takes_its_plan_away(screen, monkeypatch):
+    gui, folder, view = screen.gui, "Lesson: Where should the camera stand?", Results.view
+    scene = SimpleNamespace(title="room", has_walk=False)
+    monkeypatch.setattr(Results, "view", lambda self, step: scene if step == "scene" else view(self, step))
+    gui.press("Go", "Next", folder=folder)
+    assert f"{screen.panel._plan.numbers()['unmeasured']} of the rays meet" in gui.text(folder)
+    gui.press("Your guess", "3", folder=folder)
+    gui.press("Go", "Next", folder=folder)
+    assert f"**{screen.panel._plan.numbers()['promise']} points**" in " ".join(gui.text(folder).split())
+    gui.press("Go", "End", folder=folder)
+    assert "No plan yet" in gui.text("Plan")
+    screen.panel.on_action("Reset")
 
 
 @pytest.mark.parametrize(
