@@ -152,9 +152,7 @@ def kept_sentence(taken: TakenView) -> Markdown:
         return text + Markdown("Registration did not find the new camera's pose, so its image was left out.")
     if not low <= real <= high:
         return text + Markdown("That is outside the 95 % interval: the promise was not kept.")
-    if high - low > gain:
-        return text + Markdown(
-            "That is inside the 95 % interval, but the interval is wide: {:.1f} points, more than the "
-            "promise itself. Nearly any outcome is inside it, so this says little about the promise."
-        ).format(100.0 * (high - low))
-    return text + Markdown("That is inside the 95 % interval: the promise was kept.")
+    return text + Markdown(
+        "That is inside the 95 % interval, {:.1f} points from the promise. The interval is wide, {:.1f} points, "
+        "so one camera says little about it."
+    ).format(100.0 * abs(real - gain), 100.0 * (high - low))
