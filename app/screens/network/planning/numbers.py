@@ -153,6 +153,6 @@ def kept_sentence(taken: TakenView) -> Markdown:
     if not low <= real <= high:
         return text + Markdown("That is outside the 95 % interval: the promise was not kept.")
     return text + Markdown(
-        "That is inside the 95 % interval, {:.1f} points from the promise. The interval is wide, {:.1f} points, "
-        "so one camera says little about it."
+        "That is inside the 95 % interval, {:.1f} points from the promise. The interval is wide, "
+        "{:.1f} points, so one camera says little about it."
     ).format(100.0 * abs(real - gain), 100.0 * (high - low))
