@@ -29,7 +29,7 @@ def test_a_good_lesson_and_all_that_ship_have_no_fault(capsys, tmp_path):
         "stops": 1,
         "languages": ["en"],
     }
-    assert [one["languages"] for one in found["lessons"][1:]] == [["en", "de", "es", "th"]] * 7
+    assert [one["languages"] for one in found["lessons"][1:]] == [["en", "de", "es", "th"]] * 8
 
 
 @pytest.mark.parametrize(
