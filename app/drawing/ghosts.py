@@ -17,14 +17,6 @@ from pipeline.types import BoolArray, FloatArray
 if TYPE_CHECKING:
     import viser
 
-STANDS_ON = {
-    "walls": "wall",
-    "ceiling": "ceiling",
-    "furniture": "furniture",
-    "tripods": "tripod",
-    "by hand": "by hand",
-}
-"""Names of the kinds of places of ``pipeline.planning.plan.PlannedCamera``."""
 HANDLE, HANDLE_M = 0.12, (0.3, 0.9)
 """Length of the handle's arrows, as a share of the diagonal of the targets' box; its least and most."""
 FRUSTUM = 0.7

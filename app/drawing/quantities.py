@@ -1,4 +1,4 @@
-"""Lengths, angles and areas with their 95 % intervals as text."""
+"""Lengths, angles and areas with their 95 % intervals, and places of cameras, as text."""
 
 from __future__ import annotations
 
@@ -7,6 +7,14 @@ from collections.abc import Sequence
 
 from app.compute.measures import Quantity
 
+STANDS_ON = {
+    "walls": "wall",
+    "ceiling": "ceiling",
+    "furniture": "furniture",
+    "tripods": "tripod",
+    "by hand": "by hand",
+}
+"""Names of the kinds of places of ``pipeline.planning.plan.PlannedCamera``."""
 SMALL_M, SMALL_M2 = 1.0, 0.1
 """Below these, lengths are in centimetres and areas in square centimetres."""
 MOST_DECIMALS = 3

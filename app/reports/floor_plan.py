@@ -9,7 +9,7 @@ from itertools import count
 import numpy as np
 
 from app.drawing.colors import DELIVERED, LOSS, TARGET
-from app.drawing.ghosts import STANDS_ON
+from app.drawing.quantities import STANDS_ON
 from app.reports.floor_plan_table import TABLE_MM, legend, table
 from app.reports.labels import Labels
 from app.reports.paper import Area, Color, Line, Paper, Shape, Words, box, disc

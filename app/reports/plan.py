@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from app.drawing.colors import DELIVERED, INFERRED, LOSS, css
-from app.drawing.ghosts import STANDS_ON
+from app.drawing.quantities import STANDS_ON
 from app.reports.floor_plan import floor_plan
 from app.reports.html import picture, pictures, table, write_page
 from app.reports.paper import pdf_of, svg_of

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from app.drawing.ghosts import STANDS_ON, Ghosts
+from app.drawing.ghosts import Ghosts
+from app.drawing.quantities import STANDS_ON
 from app.screens.surface.view import ClosingView, Which
 from app.web.markup import Markdown
 from app.window.panel import PanelSession

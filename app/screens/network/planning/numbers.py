@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from app.drawing.colors import BRAND, GHOST, NEUTRAL, css
-from app.drawing.ghosts import STANDS_ON
+from app.drawing.quantities import STANDS_ON
 from app.screens.network.planning.view import Arrival, Ghost, GhostsView, PlanView, PromiseView, TakenView
 from app.web.markup import Markdown, Markup
 from app.window.tables import Row, number, table

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from app.drawing.ghosts import STANDS_ON
+from app.drawing.quantities import STANDS_ON
 from app.screens.network.planning.labels import SENSORS, WHERES
 from app.screens.network.planning.numbers import delivery_bars, kept_sentence
 from app.screens.network.planning.view import Arrival, PromiseView, TakenView
