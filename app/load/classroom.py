@@ -11,13 +11,14 @@ import contextlib
 import http.client
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from math import nan
 from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
+from websockets.exceptions import ConnectionClosed
 
 from app.load.connection import Connection, wait_for
 from app.load.line import Line, line
@@ -46,6 +47,7 @@ class ClassPage(Connection):
         self._hidden: set[str] = set()
         self._held: dict[str, list[dict[str, Any]]] = {}
         self._fetching = ThreadPoolExecutor(AT_ONCE)
+        self._under_way: list[Future[None]] = []
         self.coarse_s: dict[str, float] = {}
         """``time.monotonic()`` at which each surface or its coarse copy was there, by name."""
         self.whole_s: dict[str, float] = {}
@@ -91,9 +93,21 @@ class ClassPage(Connection):
             if content["coarse"] and first:
                 self._get(f"{path}?{COARSE}")
                 self.coarse_s[name] = time.monotonic()
-            self._fetching.submit(self._fetch, name, path)
+            self._under_way = [one for one in self._under_way if not one.done()]
+            self._under_way.append(self._fetching.submit(self._fetch, name, path))
         if not contents:
             self.coarse_s[name] = self.whole_s[name] = time.monotonic()
+
+    def _answer_drawn(self) -> None:
+        """Confirm once the contents of all messages so far are there, as a page that draws them does."""
+        awaited = tuple(self._under_way)
+
+        def answer() -> None:
+            wait(awaited)
+            with contextlib.suppress(ConnectionClosed):
+                super(ClassPage, self)._answer_drawn()
+
+        threading.Thread(target=answer, daemon=True).start()
 
     def _fetch(self, name: str, path: str) -> None:
         self._get(path)

@@ -166,8 +166,7 @@ class Connection:
     def _take_html(self, uuid: str, content: str) -> None:
         """Record the step and whether HTML is dimmed; confirm that all is drawn if the server asks."""
         if DRAWN_QUERY in content:
-            for command in self._drawn:
-                self.send(messages.CommandTriggerMessage(command))
+            self._answer_drawn()
         current = _CURRENT.search(content)
         if current is not None and self.steps:
             step = self.steps[int(current[1]) - 1]
@@ -180,6 +179,11 @@ class Connection:
         elif uuid in self._dimmed:
             self._dimmed.remove(uuid)
             self._note_surface()
+
+    def _answer_drawn(self) -> None:
+        """Confirm that all is drawn."""
+        for command in self._drawn:
+            self.send(messages.CommandTriggerMessage(command))
 
     def _note_surface(self) -> None:
         if self.mark("Surface") == MARKS["fresh"] and not self._dimmed:

@@ -76,7 +76,7 @@ class Answers(ClassPage):
         self.asked = []
         self._hidden, self._held = set(), {}
         self.coarse_s, self.whole_s = {}, {}
-        self._fetching = classroom.ThreadPoolExecutor(1)
+        self._fetching, self._under_way = classroom.ThreadPoolExecutor(1), []
 
     def _get(self, path):
         self.asked.append(path.removeprefix(FOLDER))
@@ -111,6 +111,18 @@ def test_a_page_fetches_what_is_shown_and_the_first_surface_coarse_first():
     page.take(visible("/fuse", False), mesh("/fuse/x", "d"), removal)
     page.take(visible("/fuse", True))
     assert page.asked[4:] == []
+
+
+def test_a_page_says_that_all_is_drawn_once_its_contents_are_there():
+    page, there, answered = Answers(), threading.Event(), threading.Event()
+    page._get = lambda path: there.wait(5.0) and b""
+    page._drawn = {"drawn"}
+    page.send = lambda message: answered.set()
+    page._take_message(mesh(classroom.MESHES + "1", "a", coarse=False))
+    page._answer_drawn()
+    assert not answered.wait(0.2)
+    there.set()
+    assert answered.wait(5.0)
 
 
 def test_a_page_whose_data_are_in_the_messages_has_its_surface_with_them():
