@@ -146,6 +146,11 @@ class Parts:
         return dict(primitive)
 
     @property
+    def vertices(self) -> int:
+        """Number of its vertices."""
+        return int(self.head["accessors"][self.primitive["attributes"]["POSITION"]]["count"])
+
+    @property
     def triangles(self) -> IntArray | None:
         """(F, 3) indices of its triangles; None if it is of lines."""
         if self.primitive["mode"] != _TRIANGLES:

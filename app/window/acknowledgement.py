@@ -27,34 +27,40 @@ class DrawAcknowledgement:
         """Add the hidden controls. ``on_answer`` is called on the session's thread, once per question."""
         self._on_answer = on_answer
         self._calls = 0
+        self._awaited: list[int] = []
         self.waiting = False
+        self.held = False
+        """Whether the page draws only new meshes, unless the user turns the view or 6 s have passed."""
         self._html = ui.gui.add_html(Markup(""))
         command = ui.gui.add_command("Say that all is drawn", hotkey="insert", modifier="cmd/ctrl+alt+shift")
         command.on_trigger(lambda _: ui.post(self._answered))
         self._timeout = ui.debounce(TIMEOUT_S, self._answered)
 
     def hold(self) -> None:
-        """Let the page draw only new meshes until ``ask`` stops this, the user turns the view or 6 s pass."""
+        """Let the page draw only new meshes until ``ask`` stops this; answered once it does."""
         self._call("hold")
 
     def ask(self, vertices: Sequence[int] = (), hold: bool = False) -> None:
-        """Ask now; of two open questions, only the last is answered.
+        """Ask now; of two open questions, only the last is answered, when the meshes of both are drawn.
 
         Args:
-            vertices: vertex counts of the meshes that must be drawn first. Until all have arrived nothing is
-                drawn, so that the meshes they replace can be hidden at once.
-            hold: whether the page draws only new meshes from now on.
+            vertices: vertex counts of the meshes that must be drawn first.
+            hold: whether the page draws only new meshes from now on, and nothing until all of ``vertices``
+                have come, so that the meshes they replace can be hidden at once.
         """
-        self.waiting = True
-        self._call("ask", list(vertices), hold)
-        self._timeout.restart()
+        self._awaited += vertices
+        self._call("ask", self._awaited, hold)  # viser may send the last of two questions only
+        self.held = hold
 
     def _call(self, function: str, *arguments: object) -> None:
         self._calls += 1
+        self.waiting = self.held = True
         self._html.content = page_call(function, *arguments, mark=self._calls)
+        self._timeout.restart()
 
     def _answered(self) -> None:
         if self.waiting:
             self.waiting = False
+            self._awaited = []
             self._timeout.cancel()
             self._on_answer()

@@ -54,7 +54,7 @@
 
   // While anything new arrives, viser draws frame after frame, most of them equal. Without a graphics card
   // that takes the time needed for the next mesh. A held view draws only frames with a new mesh. While a
-  // mesh is awaited its place may be empty, and nothing is drawn.
+  // mesh is awaited whose place is empty, nothing is drawn.
   const HELD_MS = 6000; // longest hold after the last call
   const AWAITED_MS = 3000; // longest wait for meshes before the answer is given without them
   const POLL_MS = 4;
@@ -66,7 +66,8 @@
   let held = false;
   let until = 0; // end of the hold by the page's clock, ms
   let awaited = []; // vertex counts of the awaited meshes
-  let arrived = []; // vertex counts of the meshes that arrived during the hold, since the last answer
+  let empty = false; // whether their place is empty until they come
+  let arrived = []; // vertex counts of the meshes that arrived since the last answer, held or awaited
   let whole = false; // whether the next frame has all awaited meshes
   let asked = 0;
   let frame = null;
@@ -87,7 +88,7 @@
     const late = performance.now() > until;
     const emptied = width !== gl.drawingBufferWidth || height !== gl.drawingBufferHeight; // a new size clears the canvas
     [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
-    skipped = !whole && !late && !emptied && (held || awaited.length > 0);
+    skipped = !whole && !late && !emptied && (held || empty && awaited.length > 0);
     if (whole) queueMicrotask(answerWhenDrawn); // after all drawing calls of this frame
     whole = false;
   }
@@ -106,7 +107,7 @@
 
   // Note a new mesh; three.js uploads its vertices before it clears the frame.
   function uploaded(vertices) {
-    if (held) arrived.push(vertices);
+    if (held || awaited.length > 0) arrived.push(vertices);
     if (!awaited.includes(vertices)) return;
     awaited.splice(awaited.indexOf(vertices), 1);
     whole = awaited.length === 0;
@@ -134,9 +135,11 @@
     before("bufferData", (target, data) => target === gl.ARRAY_BUFFER && uploaded(data?.length / 3));
   }
 
-  // The user's input may turn the view, so it ends the hold. Arrow keys on a slider never reach the camera.
+  // The user's input may turn the view, so it ends the hold; a hand or an arrow key on a slider does not.
+  let sliding = false;
+  window.addEventListener("pointerdown", event => { sliding = event.target.closest(".mantine-Slider-root") !== null; }, true);
   for (const kind of ["pointerdown", "pointerup", "wheel"])
-    window.addEventListener(kind, () => { held = false; }, true);
+    window.addEventListener(kind, () => { held &&= sliding; }, true);
   document.body.onkeydown = event => {
     if (event.target.closest("[role=slider]")) event.stopPropagation();
     else held = false;
@@ -189,21 +192,26 @@
   window.packetmesh = {
     calls,
 
-    // Draw only new meshes from now on.
+    // Draw only new meshes from now on, and press a key.
     hold() {
       watch();
       held = true;
       until = performance.now() + HELD_MS;
+      answer(++asked);
     },
 
-    // Press a key once meshes with these vertex counts and all those still awaited are drawn. If there are
-    // none, press it when the next frame is drawn if the view is or stays held, and else two frames later.
+    // Press a key once meshes with these vertex counts are drawn; without counts, once those still awaited are.
+    // If there are none, press it when the next frame is drawn if the view is or stays held, and else two frames
+    // later. If the view stays held, the place of these meshes is empty until they come.
     ask(vertices, hold) {
       watch();
       const question = ++asked;
       held = hold;
       until = performance.now() + HELD_MS;
-      if (vertices.length > 0) awaited = vertices.filter(count => !arrived.includes(count));
+      if (vertices.length > 0) {
+        awaited = vertices.filter(count => !arrived.includes(count));
+        empty = hold;
+      }
       const nothing = !hold && vertices.length === 0 && awaited.length === 0;
       whole = !nothing && awaited.length === 0;
       if (gl === null || nothing)

@@ -98,8 +98,17 @@ def test_while_the_radius_is_dragged_only_new_surfaces_are_drawn_and_none_blinks
             break
     watched = page.evaluate("watched")
     page.mouse.up()
-    assert watched["surfaces"] > 5
-    assert watched["drawnWhileHeld"] < 3 * watched["surfaces"]
+    surfaces = watched["surfaces"]
+    assert surfaces > 5
+    assert watched["drawnWhileHeld"] < 3 * surfaces
+    while (
+        page.evaluate("[look(), watched.surfaces][1]") == surfaces
+        or not page.get_by_text("Up to date").count()
+    ):
+        assert time.monotonic() - begun_s < 2 * DRAG_S  # no surface of the radius at rest
+    for _ in range(100):
+        page.evaluate("look()")
+    watched = page.evaluate("watched")
     assert min(watched["covered"]) > before / 2
 
 
@@ -146,6 +155,15 @@ def test_of_two_questions_only_the_last_is_answered(page):
     page.wait_for_function("() => watched.answers === 1")
     page.wait_for_timeout(1500)
     assert page.evaluate("watched.answers") == 1
+
+
+def test_a_view_is_drawn_while_a_mesh_is_awaited_whose_place_is_not_empty(page):
+    begin_to_count(page)
+    page.evaluate("packetmesh.ask([123456789], false)")
+    page.set_viewport_size({"width": 860, "height": 600})
+    page.wait_for_function("() => watched.drawn > 0")
+    assert page.evaluate("watched.answers") == 0
+    page.wait_for_function("() => watched.answers === 1")
 
 
 def test_a_mesh_that_is_awaited_still_keeps_the_view_until_it_comes(page):

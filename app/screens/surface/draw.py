@@ -33,13 +33,15 @@ class SurfaceDrawing:
         once and not removed, so that its material stays and the shader need not be compiled again.
         """
         self._made += 1
-        if unseen:
-            for handle in (*self._meshes, *self._rims):
-                handle.visible = False
+        replaced = []
         for kind, glb, handles in (("mesh", view.glb, self._meshes), ("rims", view.rims_glb, self._rims)):
             shorten(handles, 1 if glb else 0)
+            replaced += handles
             if glb:
                 handles.append(self._add(f"{kind}-{self._made}", glb, kind == "mesh" or self._rims_shown))
+        if unseen:  # only now: a page takes messages in order, and waits for the content of a mesh
+            for handle in replaced:
+                handle.visible = False
 
     def draw_unused(self, unused: UnusedView) -> None:
         """Draw the points that the ball left out, in the colours of their sources."""

@@ -124,7 +124,7 @@ def _painted(surface: Surface, request: PaintRequest, rig: Rig, placement: Place
     quick = request.radius_m is not None
     glb = colored_glb(surface, request.coloring, rig, placement, worn=not quick)
     rims_glb = b"" if quick else lines_glb(rim_segments_m(surface), LOSS)
-    return PaintedMesh(glb, rims_glb, len(surface.vertices_m), len(surface.triangles))
+    return PaintedMesh(glb, rims_glb, len(surface.triangles))
 
 
 def colored_glb(

@@ -191,10 +191,7 @@ class SurfacePanel(Panel):
             self._ball.hide()
             self._stage.draw_unused(view.unused)
             if labels.COLORINGS[self._coloring.value] == "photo":
-                self._stage.draw("after", view.after)
-                if view.before is not None:
-                    self._stage.draw("before", view.before)
-                self._look_quickly.sent()
+                self._look_quickly.sent(self._stage.draw({"after": view.after, "before": view.before}))
             if self.session.spec.config.surface.radius_rule != "manual":
                 self._radius.min, self._radius.max = slider_range_mm(view.spacing, view.radii_m)
                 self._radius.value = on_slider_mm(view.radii_m[-1])
@@ -237,12 +234,11 @@ class SurfacePanel(Panel):
         if quick != self._look_quickly.moving:
             return
         with self.ui.atomic():
-            drawn = [mesh for which, mesh in view.meshes.items() if self._stage.draw(which, mesh, quick)]
+            self._look_quickly.sent(self._stage.draw(view.meshes, quick))
             if quick:
                 self._stage.draw_unused(view.unused)
                 self._ball.show(view.request)
                 self._quickly_drawn = True
-            self._look_quickly.sent([mesh.vertices for mesh in drawn if mesh.triangles] if quick else ())
         self._quick_line = quick_line(view) if quick else Markup("")
         self.ui.flush()
 
@@ -346,8 +342,7 @@ class SurfacePanel(Panel):
         with self.ui.atomic():
             self._holes.filled(view)
             if view is not None and self._holes.filling:
-                self._stage.draw("after", view.mesh)
-                self._look_quickly.sent()
+                self._look_quickly.sent(self._stage.draw({"after": view.mesh}))
             elif self._view is not None:
                 self._take(self._view)
 

@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from app.screens.surface.view import QUICK_POINTS, PaintedView, PaintRequest
-from app.window.acknowledgement import DrawAcknowledgement
+from app.window.acknowledgement import TIMEOUT_S, DrawAcknowledgement
 from app.window.panel import PanelSession
 
 QUIET_S = 0.4
-"""Time without a change after which the radius counts as at rest, seconds."""
+"""Time without a change after which the radius counts as at rest once its surface is drawn, seconds."""
 
 FEWEST_POINTS = QUICK_POINTS // 4
 SLOW_S, FAST_S = 0.25, 0.11
@@ -40,38 +40,42 @@ class QuickLook:
             on_rest: called when the radius is at rest.
         """
         self._session, self._on_view, self._on_drawn, self._on_rest = session, on_view, on_drawn, on_rest
-        self._settle = session.ui.debounce(QUIET_S, self._rest)
+        self._settle = session.ui.debounce(QUIET_S, self._quiet)
+        self._last_look = session.ui.debounce(TIMEOUT_S, self._rest)
         self._acknowledgement = DrawAcknowledgement(session.ui, self._drawn)
         self._next: PaintRequest | None = None
         self._rolling = False
+        self.moving = False
+        """Whether the radius has not come to rest."""
         self._detail = Detail()
         self._submitted_s: float | None = None
 
-    @property
-    def moving(self) -> bool:
-        """Whether the radius has not come to rest."""
-        return self._settle.pending
-
     def want(self, request: PaintRequest) -> None:
         """Request a surface of a new radius; the newest request replaces one that waits."""
-        if not self.moving:
-            self._acknowledgement.hold()
+        self.moving = True
+        self._last_look.cancel()
         self._settle.restart()
         self._next = request
         self._go_on()
 
     def sent(self, vertices: Sequence[int] = ()) -> None:
-        """Wait until the browser has drawn what was sent; ``vertices`` are vertex counts of quick looks."""
+        """Wait until the browser has drawn what was sent; ``vertices`` are vertex counts of its meshes."""
         self._acknowledgement.ask(vertices, hold=self.moving)
 
     def _go_on(self) -> None:
         session, request = self._session, self._next
-        ready = session.results.fresh("fuse", session.spec)
-        if ready and request is not None and not self._rolling and not self._acknowledgement.waiting:
+        if self._rolling or self._acknowledgement.waiting:
+            return
+        if request is not None and session.results.fresh("fuse", session.spec):
+            if not self._acknowledgement.held:
+                self._acknowledgement.hold()
+                return
             self._rolling, self._next = True, None
             self._submitted_s = time.monotonic()
             request = replace(request, most_points=self._detail.points)
             session.quick_job(request.job, request, on_end=self._came, key=request.key(session.spec))
+        elif self._last_look.pending:
+            self._rest()
 
     def _came(self, view: PaintedView | None) -> None:
         self._rolling = False
@@ -79,8 +83,7 @@ class QuickLook:
             if view.points > 1.5 * self._detail.points:  # a small ball needs them, whatever time they take
                 self._submitted_s = None
             self._on_view(view)
-        if not self._acknowledgement.waiting:
-            self._go_on()
+        self._go_on()
 
     def _drawn(self) -> None:
         if self._submitted_s is not None:
@@ -89,8 +92,14 @@ class QuickLook:
         self._on_drawn()
         self._go_on()
 
+    def _quiet(self) -> None:
+        """The slider has stopped: show the surface of its last value, then rest."""
+        self._last_look.restart()
+        self._go_on()
+
     def _rest(self) -> None:
-        self._next = None
+        self._last_look.cancel()
+        self.moving, self._rolling, self._next = False, False, None
         self._on_rest()
 
 

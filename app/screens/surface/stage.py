@@ -11,6 +11,7 @@ import viser
 from app.compute.cuts import Cut, kept_on_ray
 from app.compute.records import MeshView, Stage
 from app.drawing.colors import SOURCE
+from app.drawing.glb import Parts
 from app.screens.surface.draw import SurfaceDrawing
 from app.screens.surface.labels import AFTER, BASELINES, BEFORE, BOTH
 from app.screens.surface.view import PaintedMesh, PaintRequest, Ray, UnusedView, Which
@@ -72,19 +73,25 @@ class SurfaceStage:
 
         return max(self.which, key=along)
 
-    def draw(self, which: Which, mesh: MeshView | PaintedMesh, unseen: bool = False) -> bool:
-        """Draw one of the ball's surfaces; False if it is drawn already.
+    def draw(self, meshes: Mapping[Which, MeshView | PaintedMesh | None], unseen: bool = False) -> list[int]:
+        """Draw those of the ball's surfaces that are not drawn yet.
 
         Args:
-            which: the surface.
-            mesh: its new mesh.
-            unseen: whether the browser draws nothing until it has this mesh.
+            meshes: the new meshes; None is left out.
+            unseen: whether the browser draws nothing until it has them.
+
+        Returns:
+            Vertex counts of the meshes that are new to the browser and shown.
         """
-        if which in self._drawn and self._drawn[which].glb == mesh.glb:
-            return False
-        self._drawings[which].draw(mesh, unseen)
-        self._drawn[which] = mesh
-        return True
+        counts = []
+        for which, mesh in meshes.items():
+            if mesh is None or (which in self._drawn and self._drawn[which].glb == mesh.glb):
+                continue
+            self._drawings[which].draw(mesh, unseen)
+            self._drawn[which] = mesh
+            if which in self.which and mesh.glb:
+                counts.append(Parts.of(mesh.glb).vertices)
+        return counts
 
     def draw_unused(self, unused: Mapping[Which, UnusedView]) -> None:
         """Draw the points that the ball left out of these surfaces."""

@@ -67,7 +67,6 @@ class PaintedMesh:
 
     glb: bytes
     rims_glb: bytes
-    vertices: int
     triangles: int
 
 

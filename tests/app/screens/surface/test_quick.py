@@ -1,5 +1,6 @@
 """Quick looks: one at a time, always the newest, none faster than the browser answers."""
 
+import threading
 import time
 from types import SimpleNamespace
 
@@ -52,6 +53,7 @@ def scene(monkeypatch):
         look.sent()
 
     look = QuickLook(browser, draw, lambda: seen.append("drawn"), lambda: seen.append("rest"))
+    look._acknowledgement.held = True
     yield browser, look, seen
     browser.ui.close()
 
@@ -100,6 +102,46 @@ def test_a_job_that_fails_does_not_stop_the_next(scene):
     browser.jobs[0][1](None)
     assert [asked.radius_m for asked, _ in browser.jobs] == [0.01, 0.02]
     assert seen == []
+
+
+def test_the_radius_rests_once_the_surface_of_its_last_value_is_drawn(scene):
+    browser, look, seen = scene
+    look.want(request(0.01))
+    look.want(request(0.02))
+    look._quiet()  # the slider stops while the first surface is computed
+    browser.finish()
+    browser.answer()
+    assert seen == [0.01, "drawn"]
+    browser.finish()
+    assert look.moving
+    browser.answer()
+    assert seen == [0.01, "drawn", 0.02, "drawn", "rest"]
+    assert not look.moving
+
+
+def test_a_radius_that_moves_again_does_not_rest(scene):
+    browser, look, seen = scene
+    look.want(request(0.01))
+    look._quiet()
+    look.want(request(0.02))
+    for _ in range(2):
+        browser.finish()
+        browser.answer()
+    assert "rest" not in seen
+    assert look.moving
+
+
+def test_the_radius_rests_though_a_surface_never_comes(monkeypatch):
+    monkeypatch.setattr(quick, "TIMEOUT_S", 0.1)
+    browser, rested = Browser(), threading.Event()
+    look = QuickLook(browser, lambda view: None, lambda: None, rested.set)
+    look._acknowledgement.held = True
+    look.want(request(0.01))
+    assert rested.wait(10.0)
+    assert not look.moving
+    look.want(request(0.02))
+    assert [asked.radius_m for asked, _ in browser.jobs] == [0.01, 0.02]
+    browser.ui.close()
 
 
 def test_before_the_nodes_are_placed_nothing_is_rolled(scene):
@@ -181,14 +223,32 @@ def test_a_look_that_needed_more_points_does_not_make_the_next_ones_coarser(scen
     assert {asked.most_points for asked, _ in browser.jobs} == {QUICK_POINTS}
 
 
-def test_the_view_is_held_from_the_first_move_until_the_radius_rests(scene):
+def test_the_view_is_held_before_the_first_surface_is_computed_and_until_the_radius_rests(scene):
     browser, look, _ = scene
+    look._acknowledgement.held = False
     look.want(request(0.01))
     assert browser.call == ("hold", [])
+    assert browser.jobs == []
+    browser.answer()
+    look.want(request(0.02))
+    assert [asked.radius_m for asked, _ in browser.jobs] == [0.01]
     look.sent([4, 5])
     assert browser.call == ("ask", [[4, 5], True])
-    look.want(request(0.02))
-    assert browser.call == ("ask", [[4, 5], True])
-    browser.ui.close()
-    look.sent()
-    assert browser.call == ("ask", [[], False])
+    look._rest()
+    browser.answer()
+    look.sent([6])
+    assert browser.call == ("ask", [[6], False])
+    browser.answer()
+    look.want(request(0.03))
+    assert browser.call == ("hold", [])
+
+
+def test_a_second_question_is_for_the_meshes_of_both(scene):
+    browser, look, _ = scene
+    look.sent([4])
+    look.sent([])
+    look.sent([5])
+    assert browser.call == ("ask", [[4, 5], False])
+    browser.answer()
+    look.sent([6])
+    assert browser.call == ("ask", [[6], False])
