@@ -33,13 +33,18 @@ FILES = {"config.json", "measuring.npz", "metrics.json", "poses.json", "report.h
 
 @contextlib.contextmanager
 def disk_with_room(size):
-    """The system lets no file grow beyond a size; on a full disk a write fails alike."""
+    """The system lets no file grow beyond a size; on a full disk a write fails alike.
+
+    Python 3.11 would keep the truncated bytecode of modules that are imported meanwhile: none is written.
+    """
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "dont_write_bytecode", True)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @pytest.fixture(scope="module")
