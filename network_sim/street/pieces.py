@@ -15,7 +15,7 @@ from network_sim.settings.street import RANGE_BYTES
 class Part(NamedTuple):
     """The part of an offered image that a scheme asks for."""
 
-    index: int
+    row: int
     """Position of the image in the summary."""
     shows: tuple[int, ...]
     """Cells, or pieces of road, that count as covered by it."""

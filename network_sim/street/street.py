@@ -135,7 +135,7 @@ class Street:
         requested = len(parts)
         if scheme.asks:
             requested = yield from self._send_request(vehicle, access_point, len(parts))
-        wanted = [part.index for part in parts]
+        wanted = [part.row for part in parts]
         images, taken_ns = heard[wanted].tolist(), captured_ns[wanted].tolist()
         sent = yield from self._upload(vehicle, access_point, leave_ns, images[:requested], taken_ns, parts)
         missed = set(images).difference(sent)

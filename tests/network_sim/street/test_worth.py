@@ -47,7 +47,7 @@ def _plain(known: list[tuple[int, int]], offered: list[tuple[int, int]], k: int 
     while k is None or len(chosen) < k:
         best = None
         for index, (_, taken) in enumerate(offered):
-            if index in {part.index for part in chosen}:
+            if index in {part.row for part in chosen}:
                 continue
             new = [{(piece, taken + s) for s in range(VALIDITY)} - seconds for piece in rows[index]]
             wanted = [
@@ -82,13 +82,13 @@ def test_no_covered_piece_is_asked_for_and_none_is_left(known, offered) -> None:
     rows, taken = _rows(offered), [t for _, t in offered]
     chosen = select_pieces(coverage, rows, taken, None, Cuts(CONFIG))
     for part in chosen:
-        assert part.shows == tuple(rows[part.index][part.first : part.stop])
+        assert part.shows == tuple(rows[part.row][part.first : part.stop])
         for piece in part.shows:
-            new = {(piece, taken[part.index] + second) for second in range(VALIDITY)} - seconds
+            new = {(piece, taken[part.row] + second) for second in range(VALIDITY)} - seconds
             assert piece >= 0
             assert len(new) >= VALIDITY / 2
             seconds |= new
-    asked = {part.index for part in chosen}
+    asked = {part.row for part in chosen}
     for index, row in enumerate(rows):
         if index not in asked:
             for piece in row:
@@ -108,7 +108,7 @@ def test_with_whole_images_it_is_greedy(known, offered, k) -> None:
         worth.add(*image)
     cells, taken = [cell for cell, _ in offered], [t for _, t in offered]
     chosen = select_pieces(worth, [[cell] for cell in cells], taken, k, Cuts(replace(CONFIG, pieces=1)))
-    assert [part.index for part in chosen] == select(greedy, cells, taken, k)
+    assert [part.row for part in chosen] == select(greedy, cells, taken, k)
 
 
 def test_a_small_case_by_hand() -> None:
@@ -154,7 +154,7 @@ def test_what_did_not_come_is_asked_for_again() -> None:
     worth = Worth(SchemeConfig(name="worth"))
     shown, taken = np.arange(5)[None], np.array([100])
     (part,) = worth.parts(shown, taken, 0)
-    assert (part.index, part.shows, part.first, part.stop) == (0, (0, 1, 2, 3, 4), 0, 5)
+    assert (part.row, part.shows, part.first, part.stop) == (0, (0, 1, 2, 3, 4), 0, 5)
     assert worth.parts(shown, taken, 0) == []
     worth.missed(2, 100)
     assert worth.parts(shown, taken, 0) == [Part(0, (2,), 2, 3)]
