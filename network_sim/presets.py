@@ -14,24 +14,33 @@ from network_sim.config import (
 )
 
 WAVELAN = EnergyConfig(tx_w=1.346, rx_w=0.901, idle_w=0.739, sleep_w=0.0474)
-"""Lucent's WaveLAN at 11 Mb/s: 284, 190, 156, 10 mA at 4.74 V (Feeney and Nilsson 2001, from memory)."""
+"""Lucent's WaveLAN at 11 Mb/s: 284, 190, 156, 10 mA at 4.74 V, quoted from memory (Feeney and Nilsson,
+"Investigating the energy consumption of a wireless network interface in an ad hoc networking environment",
+2001); an assumption until it is compared with the paper."""
 ESP32_C6_N = EnergyConfig(tx_w=0.924, rx_w=0.2574, idle_w=0.2574, sleep_w=0.0000231)
-"""Espressif's ESP32-C6 at 3.3 V: 280 mA sending 802.11n at MCS 7 with 18.5 dBm, 78 mA receiving and listening
-(series data sheet v1.4, Table 5-7: peaks), 7 uA in deep sleep (from memory)."""
+"""Espressif's ESP32-C6 at 3.3 V: 280 mA sending 802.11n at MCS 7 with 18.5 dBm, 78 mA receiving and
+listening (series data sheet v1.4, Table 5-7: peaks), 7 uA in deep sleep, all quoted from memory:
+assumptions."""
 ESP32_C6_AX = EnergyConfig(tx_w=0.8316, rx_w=0.2574, idle_w=0.2574, sleep_w=0.0000231)
-"""The same module: 252 mA sending 802.11ax at MCS 9 with 16.5 dBm (Table 5-7)."""
+"""The same module: 252 mA sending 802.11ax at MCS 9 with 16.5 dBm (Table 5-7), an assumption, too."""
 HALOW_20_DBM = EnergyConfig(tx_w=0.66, rx_w=0.132, idle_w=0.132, sleep_w=0.000033)
-"""Modules of 802.11ah at 3.3 V: 200 mA sending 20 dBm, 40 mA receiving and listening, 10 uA asleep. Round
-figures of their order from memory; no data sheet was at hand."""
+"""Modules of 802.11ah at 3.3 V: 200 mA sending 20 dBm, 40 mA receiving and listening, 10 uA asleep. These
+are assumptions of the right order, not a product's: descriptions of modules with Morse Micro's MM6108 that
+could be read give no currents."""
 SX1276 = EnergyConfig(tx_w=0.0957, rx_w=0.03795, idle_w=6.6e-7, sleep_w=6.6e-7)
-"""Semtech's SX1276 at 3.3 V: 29 mA sending 13 dBm, 11.5 mA receiving, .2 µA asleep (data sheet Rev. 7, Table
-6, from memory). Between its frames a node of class A sleeps; its empty receive windows are not counted."""
+"""Semtech's SX1276 at 3.3 V: 29 mA sending 13 dBm and 11.5 mA receiving (data sheet Rev. 7, Table 6, quoted
+from memory: assumptions; the first page has 9.9 mA for the most sparing reception), .2 µA asleep (first
+page: 200 nA register retention). Between its frames a node of class A sleeps; its empty receive windows are
+not counted."""
 NRF52840 = EnergyConfig(tx_w=0.0192, rx_w=0.01878, idle_w=9.5e-6, sleep_w=9.5e-6)
-"""Nordic's nRF52840 at 3 V with DC/DC: 6.4 mA sending 0 dBm and 6.26 mA receiving at 1 Mbit/s (product
-specification, I_RADIO_TX1, I_RADIO_RX0), 3.16 µA asleep (from memory). Between its frames a node sleeps."""
+"""Nordic's nRF52840 at 3 V with DC/DC: 6.40 mA sending 0 dBm and 6.26 mA receiving at 1 Mbit/s (product
+specification, current consumption: I_RADIO_TX1, I_RADIO_RX0); 3.16 µA asleep is quoted from memory. Between
+its frames a node sleeps."""
 MODULE_23_DBM = EnergyConfig(tx_w=0.545, rx_w=0.09, idle_w=0.09, sleep_w=0.000015)
-"""A cellular module at 23 dBm: the figures with which 3GPP TR 45.820 judged the battery life of NB-IoT (from
-memory). It listens for grants whenever it does not send; LTE-M has the same power class."""
+"""A cellular module at 23 dBm, after 3GPP TR 45.820, 5.4, which judged the battery life of NB-IoT: .015 mW
+asleep (also quoted so, with about 500 mW sending, by Sauter, "From GSM to LTE-Advanced Pro and 5G",
+p. 318); 545 mW sending and 90 mW receiving are quoted from memory: assumptions. It listens for grants
+whenever it does not send; LTE-M has the same power class."""
 
 _FAST_CAMERAS = NodesConfig(
     spacing_m=8.0,

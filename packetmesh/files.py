@@ -105,6 +105,19 @@ def writable_folder(path: str | os.PathLike[str]) -> Path:
     return folder
 
 
+@contextmanager
+def removed_if_empty(folder: Path) -> Iterator[None]:
+    """Delete a folder, and those above it, that this block created and left empty when it failed."""
+    created = [path for path in (folder, *folder.parents) if not path.exists()]
+    try:
+        yield
+    except BaseException:
+        with suppress(OSError):  # not there, or not empty
+            for path in created:
+                path.rmdir()
+        raise
+
+
 def write_json(path: Path, value: Any) -> None:
     """Write ``value`` as strict JSON (NaN and infinity become null)."""
     with atomic_path(path) as temporary:

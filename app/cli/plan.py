@@ -20,7 +20,18 @@ if TYPE_CHECKING:
 
 SinkPlace = Annotated[str | None, tyro.conf.arg(metavar="X,Y|best")]
 HEADINGS = (
-    *("camera", "x m", "y m", "height m", "pan", "tilt", "on", "promise points (95 %)", "overlap"),
+    *(
+        "camera",
+        "x m",
+        "y m",
+        "height m",
+        "pan",
+        "tilt",
+        "on",
+        "promise points (95 %)",
+        "of it dark",
+        "overlap",
+    ),
     *("90 % after s", "99 % after s", "J", "battery days"),
 )
 REPLACED = {
@@ -41,6 +52,7 @@ def plan(
     preset: str = "office",
     coding: str = "exact",
     walls: str = "brick",
+    dark_surface: bool = True,
     sink: SinkPlace = None,
     every_s: float = 600.0,
     budget_j: float | None = None,
@@ -64,6 +76,8 @@ def plan(
         preset: The network: a preset of `deliver`, or the config.json of a finished simulation.
         coding: How images are encoded; `deliver` lists the codings.
         walls: Material of the walls, which damp the radio: plaster, wood, brick or concrete.
+        dark_surface: Let surface count that looks dark to a present sensor, such as a screen. A camera of the
+            same kind may get no depth there; --no-dark-surface plans without it.
         sink: Place of the sink in metres, or "best": where its weakest link to a camera is strongest; without
             it, the network's, or behind the present cameras.
         every_s: Time between two images of a camera, for the days that a battery lasts.
@@ -83,17 +97,19 @@ def plan(
     from pipeline.planning.plan import PlanConfig
     from pipeline.planning.radio import PlanRadio
 
-    wanted = PlanConfig(cameras, sensor, tuple(filter(None, where.split(","))))  # type: ignore[arg-type]
+    places = tuple(filter(None, where.split(",")))
+    wanted = PlanConfig(cameras, sensor, places, dark_surface)  # type: ignore[arg-type]
     radio = PlanRadio(network, coding, walls, sink_m, every_s, budget_j, deadline_s)
 
     from app.cli.reconstruct import imported_notes, say_places
     from app.cli.runs import iterate_imported
-    from packetmesh.files import writable_folder
+    from packetmesh.files import removed_if_empty, writable_folder
     from pipeline.folders.plan import (
         PAGE,
         PRINT,
         best_sentence,
         check_plan_folder,
+        dark_sentence,
         fewer_sentence,
         level_sentence,
         plan_record,
@@ -108,7 +124,7 @@ def plan(
 
     if out is not None:
         check_plan_folder(out, named)
-    with TemporaryDirectory() as scratch:
+    with TemporaryDirectory() as scratch, removed_if_empty(out or Path(scratch)):
         source, imported = drain(iterate_imported(named, out or Path(scratch)), say_progress)
         say_network(network, before, preset, of_network, REPLACED)
         spec, cache = Spec(source, chain, config), RunCache()
@@ -117,10 +133,10 @@ def plan(
             writable_folder(out)
         steps = iterate_reconstruction(spec, cache)
         done = drain(part(steps, "reconstruction", 0.0, DONE, detail=True), say_progress)
-    planned = drain(part(iterate_plan(done, wanted, radio), "plan", DONE, 1.0, detail=True), say_progress)
+        planned = drain(part(iterate_plan(done, wanted, radio), "plan", DONE, 1.0, detail=True), say_progress)
     report = None if imported is None else asdict(imported)
     notes = [*imported_notes(report), *done.rig.notes]
-    notes += filter(None, [fewer_sentence(planned, cameras), level_sentence(planned)])
+    notes += filter(None, [fewer_sentence(planned, cameras), level_sentence(planned), dark_sentence(planned)])
     record = plan_record(planned, spec.source.title, preset)
     if out is not None:
         _write(planned, done, record | settings_record(spec, planned), notes, out)

@@ -22,6 +22,8 @@ HOLE = (255, 0, 255)
 """Magenta: pixels without depth in a picture."""
 GHOST = (214, 51, 132)
 """Pink: planned cameras, and what they would newly see."""
+GHOST_DARK = (112, 72, 40)
+"""Brown: of that, surface that looks dark to a present sensor, and may stay without depth."""
 NEUTRAL = (120, 130, 140)
 """Grey: frames and context."""
 DISTANCE_STOPS = ((68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37))

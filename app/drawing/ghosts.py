@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from app.drawing.clouds import clear
-from app.drawing.colors import BACKGROUND, GHOST
+from app.drawing.colors import BACKGROUND, GHOST, GHOST_DARK
 from app.drawing.poses import move, place
 from pipeline.kernels.geometry import rigid
 from pipeline.types import BoolArray, FloatArray
@@ -56,11 +56,17 @@ class Ghosts:
         self._handle: viser.TransformControlsHandle | None = None
         self._cloud: viser.PointCloudHandle | None = None
         self._targets_m: FloatArray = np.zeros((0, 3), np.float32)
+        self._colors = np.zeros((0, 3), int)
         self._chosen = 0
         self._size_m = HANDLE_M[0]
 
     def draw(
-        self, T_world_camera: Sequence[FloatArray], fov_rad: float, aspect: float, targets_m: FloatArray
+        self,
+        T_world_camera: Sequence[FloatArray],
+        fov_rad: float,
+        aspect: float,
+        targets_m: FloatArray,
+        dark: BoolArray,
     ) -> None:
         """Draw ghosts of one lens at (4, 4) poses; the first is chosen.
 
@@ -69,9 +75,11 @@ class Ghosts:
             fov_rad: vertical field of view.
             aspect: width over height.
             targets_m: (T, 3) float32 places that they might newly see, world frame.
+            dark: (T,) True where these look dark to a present sensor.
         """
         self.clear()
         self._targets_m = targets_m
+        self._colors = np.where(dark[:, None], GHOST_DARK, GHOST)
         diagonal_m = float(np.linalg.norm(np.ptp(targets_m, axis=0))) if len(targets_m) else 0.0
         self._size_m = float(np.clip(HANDLE * diagonal_m, *HANDLE_M))
         for row, T in enumerate(T_world_camera):
@@ -89,7 +97,7 @@ class Ghosts:
             self._cloud = self._scene.add_point_cloud(
                 f"{self._below}/seen",
                 np.tile(np.array(AWAY_M, np.float32), (len(targets_m), 1)),
-                np.tile(np.array(GHOST, np.uint8), (len(targets_m), 1)),
+                self._colors.astype(np.uint8),
                 point_size=POINT_M,
                 point_shape="circle",
                 precision="float32",
@@ -144,7 +152,7 @@ class Ghosts:
         if self._cloud is None:
             return
         pale = pale[:, None]
-        colors = (1.0 - pale) * np.array(GHOST) + pale * np.array(BACKGROUND)
+        colors = (1.0 - pale) * self._colors + pale * np.array(BACKGROUND)
         self._cloud.points = np.where(seen[:, None], self._targets_m, np.array(AWAY_M, np.float32))
         self._cloud.colors = np.rint(colors).astype(np.uint8)
         self._cloud.visible = bool(seen.any())

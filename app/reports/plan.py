@@ -18,6 +18,7 @@ from pipeline.folders.plan import (
     PAGE,
     PRINT,
     best_sentence,
+    dark_points,
     points,
     promise_sentence,
     times_sentence,
@@ -29,7 +30,8 @@ from pipeline.planning.places import floor_m
 
 COLUMNS = 2
 HEADINGS = (
-    "camera", "x (m)", "y (m)", "height (m)", "pan", "tilt", "on", "promise (points)", "overlap",
+    "camera", "x (m)", "y (m)", "height (m)", "pan", "tilt", "on",
+    "promise (points)", "of it dark", "overlap",
 )  # fmt: skip
 SENT_HEADINGS = ("camera", "90 % after (s)", "99 % after (s)", "energy (J)", "days on a battery")
 
@@ -67,8 +69,9 @@ def _sections(planned: RigPlan, texture: Texture, drawing: str, notes: Sequence[
         '<p class="note">x and y are those of the world; the height is above the floor. Pan: angle from the '
         "x axis, counter-clockwise from above; tilt: above the horizon, so that a camera with a negative one "
         "looks down. Promise: hundredths of the present cameras' rays that newly meet measured surface, of "
-        "each camera beyond those before it. Overlap: share of its image that one present camera sees, too, "
-        "by which it is registered.</p>"
+        "each camera beyond those before it. Of it dark: points of the promise on surface that looks dark to "
+        "a present sensor, where a camera of the same kind may get no depth, either. Overlap: share of its "
+        "image that one present camera sees, too, by which it is registered.</p>"
     )
     yield Markup("<h2>Floor plan</h2>")
     yield Markup('<div class="wide">{}</div>').format(_inline(drawing))
@@ -103,6 +106,7 @@ def position_rows(planned: RigPlan) -> list[tuple[str, ...]]:
                 f"{tilt_deg:.0f}°",
                 STANDS_ON[camera.where],
                 points(camera.promise),
+                dark_points(camera.promise),
                 f"{camera.overlap_share:.0%}",
             )
         )

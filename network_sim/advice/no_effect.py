@@ -216,8 +216,12 @@ def _of_street(config: NetworkConfig) -> Reasons:
     fixed = (*settings(config.nodes, "nodes."), *settings(config.uplink, "uplink."))
     yield fixed, "scenario is street-grid, whose cameras are in vehicles; try scheme and street"
     yield ("energy.sleep_w", "energy.platform_sleep_w"), "no vehicle ever sleeps or fails"
-    if scheme.name != "greedy":
-        yield ("scheme.k",), f"{name}, and only greedy uses it"
+    if scheme.name not in ("greedy", "worth"):
+        yield ("scheme.k",), f"{name}, and only greedy and worth use it"
+    if scheme.name != "worth":
+        yield ("scheme.piece_header_bytes",), f"{name}, and only worth uses it"
+        if config.run.keep == "counters":
+            yield ("scheme.pieces",), f"{name}, and with run.keep counters no coverage is measured"
     if scheme.name not in ("pdc", "pdc-received"):
         yield _PDC, f"{name}, and only pdc and pdc-received use it"
     elif scheme.control_s >= config.run.horizon_s:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from network_sim.metrics import energy
-from network_sim.metrics.coverage import NEVER_NS, road_coverage
+from network_sim.metrics.coverage import NEVER_NS, RoadCoverage, piece_coverage, road_coverage
 from network_sim.trace.ledger import Outcomes
 from network_sim.trace.log import NetworkTrace
 from network_sim.trace.states import State
@@ -184,17 +184,23 @@ def _overheads(trace: NetworkTrace) -> Rows:
 
 
 def _coverage(trace: NetworkTrace) -> Rows:
-    """Yield road coverage and redundancy, if the trace has image events with road cells."""
-    sights = road_coverage(trace)
-    if sights is None:
-        return
-    covered = int((sights.covered_ns != NEVER_NS).sum())
-    span = f"span of {trace.config.scheme.validity_s:g} s"
-    pairs = f"Pairs of a road cell and a {span} of which an image arrived"
-    yield "coverage", covered / len(sights.cell), "1", f"{pairs}, of all that cameras saw"
-    if sights.arrived:
-        again = f"Share of the arrived images whose road cell and {span} are those of an earlier arrival"
-        yield "redundancy", 1.0 - covered / sights.arrived, "1", again
+    """Yield road coverage, by cells and by pieces, and redundancy, if images of road cells were kept."""
+    scheme = trace.config.scheme
+    span = f"span of {scheme.validity_s:g} s"
+    if sights := road_coverage(trace):
+        pairs = f"Pairs of a road cell and a {span} of which an image arrived"
+        yield "coverage", _covered(sights) / len(sights.cell), "1", f"{pairs}, of all that cameras saw"
+        if sights.arrived:
+            again = f"Share of the arrived images whose road cell and {span} are those of an earlier arrival"
+            yield "redundancy", 1.0 - _covered(sights) / sights.arrived, "1", again
+    if sights := piece_coverage(trace):
+        road = f"{scheme.cell_m / scheme.pieces:g} m of road"
+        pairs = f"Pairs of {road} and a {span} of which an image, or its piece of them, arrived"
+        yield "coverage_pieces", _covered(sights) / len(sights.cell), "1", f"{pairs}, of all that cameras saw"
+
+
+def _covered(sights: RoadCoverage) -> int:
+    return int((sights.covered_ns != NEVER_NS).sum())
 
 
 def _after(trace: NetworkTrace, sums: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -8,7 +8,11 @@ from typing import Literal
 from packetmesh.checks import above, at_least
 from packetmesh.errors import InputError
 
-SchemeName = Literal["baseline", "greedy", "pdc", "pdc-received"]
+SchemeName = Literal["baseline", "greedy", "pdc", "pdc-received", "worth"]
+
+RANGE_BYTES = 2
+"""Bytes of a request that name an image's first and last piece."""
+MOST_PIECES = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,10 +20,16 @@ class SchemeConfig:
     """Which images of passing vehicles are collected (SPEC 6.2, Table 4.7)."""
 
     name: SchemeName = "baseline"
-    """Upload everything (baseline), ask for what adds coverage (greedy), or ask for each image with a
-    probability that falls with how many are offered (pdc) or received (pdc-received)."""
+    """Upload everything (baseline), ask for the images that add coverage (greedy), ask only for the pieces
+    of images that add coverage (worth), or ask for each image with a probability that falls with how many are
+    offered (pdc) or received (pdc-received)."""
     k: int | None = None
-    """Most images that a request of greedy asks for; None does not limit it."""
+    """Most images that a request of greedy or worth asks for; None does not limit it."""
+    pieces: int = 5
+    """Equal pieces of an image, each of which shows as many parts of scheme.cell_m of road ahead; worth asks
+    for some of them. The coverage of pieces is measured for all schemes."""
+    piece_header_bytes: int = 40
+    """Bytes that an image adds to each of its datagrams when only some of its pieces are sent."""
     r_low: float = 3.0
     """Images of a cell in a control period up to which pdc asks for all."""
     r_high: float = 8.0
@@ -55,10 +65,17 @@ class SchemeConfig:
     def __post_init__(self) -> None:
         for key in ("validity_s", "observation_s", "control_s", "sample_s", "cell_m", "summary_interval_s"):
             above(f"scheme.{key}", getattr(self, key), 0.0)
-        for key in ("k", "buffer_images", "image_bytes", "tag_bytes", "id_bytes"):
+        for key in ("k", "pieces", "buffer_images", "image_bytes", "tag_bytes", "id_bytes"):
             at_least(f"scheme.{key}", getattr(self, key), 1)
-        at_least("scheme.datagram_bytes", self.datagram_bytes, max(self.tag_bytes, self.id_bytes))
-        at_least("scheme.headers_bytes", self.headers_bytes, 0)
+        for key in ("headers_bytes", "piece_header_bytes"):
+            at_least(f"scheme.{key}", getattr(self, key), 0)
+        least_bytes = max(self.tag_bytes, self.id_bytes + RANGE_BYTES, self.piece_header_bytes + 1)
+        at_least("scheme.datagram_bytes", self.datagram_bytes, least_bytes)
+        if self.pieces > min(self.image_bytes, MOST_PIECES):
+            raise InputError(
+                f"scheme.pieces is {self.pieces}; try at most {MOST_PIECES}, and no "
+                "more than an image has bytes"
+            )
         at_least("scheme.r_low", self.r_low, 0.0)
         above("scheme.r_high", self.r_high, self.r_low)
 

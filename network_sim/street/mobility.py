@@ -13,7 +13,7 @@ from math import ceil, hypot, sqrt
 
 import numpy as np
 
-from network_sim.config import StreetConfig
+from network_sim.config import NetworkConfig, StreetConfig
 from network_sim.types import NS_PER_S
 from packetmesh.errors import InputError
 
@@ -52,14 +52,48 @@ class Routes:
         """
         segment, into_m = self.segments(vehicle, t_ns)
         crossing, heading = self.crossings[vehicle, segment], self.headings[vehicle, segment]
+        end = self.crossings[vehicle, segment + 1]
+        return self._numbers(crossing, end, heading, into_m, cell_m, directed)
+
+    def cells_ahead(
+        self, vehicle: int, t_ns: np.ndarray, cell_m: float, count: int, directed: bool = True
+    ) -> np.ndarray:
+        """Return (T, count) the vehicle's cell and those straight ahead of it; -1 beyond the grid's border.
+
+        A camera looks straight ahead over a crossing, whichever way its vehicle turns there. Arguments as
+        in ``cells``.
+        """
+        segment, into_m = self.segments(vehicle, t_ns)
+        crossing = self.crossings[vehicle, segment][:, None]
+        heading = self.headings[vehicle, segment][:, None]
+        ahead_m = into_m[:, None] + cell_m * np.arange(count)
+        blocks = (ahead_m / self.config.block_m).astype(np.int64)
+        side = self.config.blocks + 1
+        start = np.stack((crossing % side, crossing // side), axis=-1) + STEPS[heading] * blocks[..., None]
+        end = start + STEPS[heading]
+        inside = ((end >= 0) & (end < side)).all(axis=2)
+        start, end = start @ (1, side), end @ (1, side)
+        into_m = ahead_m - blocks * self.config.block_m
+        return np.where(inside, self._numbers(start, end, heading, into_m, cell_m, directed), -1)
+
+    def _numbers(
+        self,
+        start: np.ndarray,
+        end: np.ndarray,
+        heading: np.ndarray,
+        into_m: np.ndarray,
+        cell_m: float,
+        directed: bool,
+    ) -> np.ndarray:
+        """Return the cell that is ``into_m`` from the crossing ``start`` towards ``end``."""
         if not directed:  # number the cells as if all vehicles drove east or north
             back = heading >= len(STEPS) // 2
-            crossing = np.where(back, self.crossings[vehicle, segment + 1], crossing)
+            start = np.where(back, end, start)
             heading = heading % (len(STEPS) // 2)
             into_m = np.where(back, self.config.block_m - into_m, into_m)
-        pieces = _pieces(self.config, cell_m)
+        pieces = pieces_of_block(self.config, cell_m)
         piece = np.minimum((into_m / cell_m).astype(np.int64), pieces - 1)
-        return (crossing * len(STEPS) + heading) * pieces + piece
+        return (start * len(STEPS) + heading) * pieces + piece
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +167,7 @@ def cell_numbers(config: StreetConfig, cell_m: float) -> int:
     Raises:
         InputError: there are more than ``MAX_CELLS`` cells.
     """
-    numbers = (config.blocks + 1) ** 2 * len(STEPS) * _pieces(config, cell_m)
+    numbers = (config.blocks + 1) ** 2 * len(STEPS) * pieces_of_block(config, cell_m)
     if numbers > MAX_CELLS:
         raise InputError(
             f"scheme.cell_m is {cell_m}, which divides the streets into {numbers} cells, more than "
@@ -144,7 +178,7 @@ def cell_numbers(config: StreetConfig, cell_m: float) -> int:
 
 def cells_m(config: StreetConfig, cell_m: float) -> np.ndarray:
     """Return (C, 2, 2) start and end of every cell in driving direction, ordered by cell number."""
-    pieces = _pieces(config, cell_m)
+    pieces = pieces_of_block(config, cell_m)
     ends_m = np.minimum(np.arange(pieces + 1) * cell_m, config.block_m)
     into_m = np.stack((ends_m[:-1], ends_m[1:]), axis=1)
     ways_m = STEPS[:, None, None] * into_m[..., None]
@@ -176,6 +210,18 @@ def drive(config: StreetConfig, horizon_s: float, rng: np.random.Generator) -> R
             choice = (draw * turn_counts[here, headings[:, i]]).astype(np.int64)
             headings[:, i + 1] = turns[here, headings[:, i], choice]
     return Routes(config, crossings, headings, start_m)
+
+
+def random_streams(rng: np.random.Generator) -> list[np.random.Generator]:
+    """Return a run's streams of driving, first images, requests, radio, medium and medium access."""
+    street, *others = rng.spawn(4)
+    return [*street.spawn(3), *others]
+
+
+def routes_of(config: NetworkConfig) -> Routes:
+    """Return the routes of the vehicles in the street-grid run of this config, without running it."""
+    driving = random_streams(np.random.default_rng(config.run.seed))[0]
+    return drive(config.street, config.run.horizon_s, driving)
 
 
 def contacts(routes: Routes, points_m: np.ndarray, range_m: float) -> list[list[Contact]]:
@@ -229,5 +275,6 @@ def _turns(open_ways: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return turns, counts
 
 
-def _pieces(config: StreetConfig, cell_m: float) -> int:
+def pieces_of_block(config: StreetConfig, cell_m: float) -> int:
+    """Return the number of cells of one side of a block, in one direction."""
     return ceil(config.block_m / cell_m)

@@ -10,10 +10,19 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from network_sim.config import NetworkConfig
+from network_sim.config import NetworkConfig, SchemeConfig
 from network_sim.street.mobility import Routes
 from network_sim.trace.log import Recorder
 from network_sim.types import Cause, EventKind, to_ns
+
+
+def shown_pieces(routes: Routes, scheme: SchemeConfig, vehicle: int, captured_ns: np.ndarray) -> np.ndarray:
+    """Return (T, P) the pieces of road that a vehicle's images show, nearest first; -1 beyond the grid.
+
+    A piece is ``scheme.cell_m / scheme.pieces`` of road; the first is that on which the vehicle is.
+    """
+    piece_m = scheme.cell_m / scheme.pieces
+    return routes.cells_ahead(vehicle, captured_ns, piece_m, scheme.pieces, scheme.directed_cells)
 
 
 class Snapshots:
@@ -26,6 +35,7 @@ class Snapshots:
     def __init__(self, config: NetworkConfig, routes: Routes, rng: np.random.Generator) -> None:
         """Draw from ``rng`` the time of each vehicle's first image, within the first interval."""
         self._routes = routes
+        self._scheme = config.scheme
         self._cell_m = config.scheme.cell_m
         self._directed = config.scheme.directed_cells
         self._capacity = config.scheme.buffer_images
@@ -59,6 +69,10 @@ class Snapshots:
         """Return cells (T,) and capture times in ns (T,) of a vehicle's images."""
         captured_ns = self._first_ns[vehicle] + (images - vehicle * self._per_vehicle) * self._sample_ns
         return self._routes.cells(vehicle, captured_ns, self._cell_m, self._directed), captured_ns
+
+    def pieces(self, vehicle: int, captured_ns: np.ndarray) -> np.ndarray:
+        """Return (T, P) the pieces of road that a vehicle's images of these times show; -1 shows none."""
+        return shown_pieces(self._routes, self._scheme, vehicle, captured_ns)
 
     def record(self, recorder: Recorder, now_ns: int, image_bytes: int) -> None:
         """Record all images taken so far, and those that a full buffer dropped before their arrival."""

@@ -21,6 +21,7 @@ from network_sim.mac import make_mac
 from network_sim.mac.context import MacContext
 from network_sim.mac.medium import Medium
 from network_sim.radio.propagation import Radio, reach_m
+from network_sim.settings.street import RANGE_BYTES
 from network_sim.street.mobility import (
     Contact,
     Routes,
@@ -29,14 +30,15 @@ from network_sim.street.mobility import (
     cell_numbers,
     contacts,
     drive,
+    random_streams,
+    routes_of,
 )
+from network_sim.street.pieces import Cuts, Part
 from network_sim.street.schemes import make_scheme
 from network_sim.street.snapshots import Snapshots
 from network_sim.trace.log import Recorder
 from network_sim.types import EventKind, Packet, PacketKind, to_ns
 
-_STREAMS = 4
-"""Number of random streams of a run; the first is for the vehicles."""
 _ENQUEUE, _RECEIVE, _ARRIVE = EventKind.ENQUEUE, EventKind.RECEIVE, EventKind.ARRIVE
 _IMAGE = PacketKind.IMAGE
 """Local names, because enumeration members are slow to look up and these are used for every packet."""
@@ -46,8 +48,7 @@ def start_street(
     env: simpy.Environment, config: NetworkConfig, recorder: Recorder, rng: np.random.Generator
 ) -> Street:
     """Start all vehicles; the caller runs ``env`` to the horizon, then calls ``Street.record_images``."""
-    street_rng, radio_rng, medium_rng, mac_rng = rng.spawn(_STREAMS)
-    driving, cameras, requests = street_rng.spawn(3)
+    driving, cameras, requests, radio_rng, medium_rng, mac_rng = random_streams(rng)
     routes = drive(config.street, config.run.horizon_s, driving)
     medium = Medium(env, Radio(config.radio, config.mac, radio_rng), _places(routes), medium_rng)
     snapshots = Snapshots(config, routes, cameras)
@@ -60,8 +61,7 @@ def start_street(
 
 def street_of(config: NetworkConfig) -> StreetPlaces:
     """Return the nodes' positions over time in the street-grid run of this config, without running it."""
-    street_rng = np.random.default_rng(config.run.seed).spawn(_STREAMS)[0]
-    return _places(drive(config.street, config.run.horizon_s, street_rng.spawn(3)[0]))
+    return _places(routes_of(config))
 
 
 def _places(routes: Routes) -> StreetPlaces:
@@ -94,8 +94,10 @@ class Street:
         self._downlinks = [simpy.Resource(env) for _ in range(points)]
         self._ids = count()
         self._arrived = [-1] * len(self.names)
-        most, size = config.scheme.datagram_bytes, config.scheme.image_bytes
-        self._parts = [(first, min(most, size - first)) for first in range(0, size, most)]
+        self._cuts = Cuts(config.scheme)
+        self._whole = self._cuts.datagrams(0, self._cuts.pieces)
+        self._sending = [(0, 0)] * len(self.names)
+        """First byte and byte after the last of the image, or part of it, that each node sends."""
         self._interval_ns = to_ns(config.scheme.summary_interval_s)
         always_up = ([True] * len(self.names)).__getitem__
         self._mac = make_mac(MacContext(env, medium, config, recorder, mac_rng, always_up, self._receive))
@@ -128,18 +130,21 @@ class Street:
         offered = snapshots.offer(vehicle, int(env.now))
         heard = yield from self._send_summary(vehicle, access_point, leave_ns, offered)
         cells, captured_ns = snapshots.tags(vehicle, heard)
-        wanted = scheme.wanted(cells, captured_ns, int(env.now))
-        requested = len(wanted)
+        shown = snapshots.pieces(vehicle, captured_ns) if scheme.by_pieces else cells
+        parts = scheme.parts(shown, captured_ns, int(env.now))
+        requested = len(parts)
         if scheme.asks:
-            requested = yield from self._send_request(vehicle, access_point, len(wanted))
+            requested = yield from self._send_request(vehicle, access_point, len(parts))
+        wanted = [part.row for part in parts]
         images, taken_ns = heard[wanted].tolist(), captured_ns[wanted].tolist()
-        sent = yield from self._upload(vehicle, access_point, leave_ns, images[:requested], taken_ns)
+        sent = yield from self._upload(vehicle, access_point, leave_ns, images[:requested], taken_ns, parts)
         missed = set(images).difference(sent)
-        for image, cell, image_ns in zip(images, cells[wanted].tolist(), taken_ns, strict=True):
-            if image in missed:
-                scheme.missed(cell, image_ns)
-            else:
-                scheme.received(cell, int(env.now))
+        for image, part, image_ns in zip(images, parts, taken_ns, strict=True):
+            for cell in part.shows:
+                if image in missed:
+                    scheme.missed(cell, image_ns)
+                else:
+                    scheme.received(cell, int(env.now))
         snapshots.offer_later(vehicle, missed.union(set(offered.tolist()).difference(heard.tolist())))
 
     def _send_summary(
@@ -162,10 +167,11 @@ class Street:
     def _send_request(self, vehicle: int, access_point: int, ids: int) -> Generator[simpy.Event, Any, int]:
         """Send a request with ``ids`` image ids; returns the number of leading ids that arrived."""
         config = self._config
-        most = config.datagram_bytes // config.id_bytes
+        id_bytes = config.id_bytes + (RANGE_BYTES if self._scheme.by_pieces else 0)
+        most = config.datagram_bytes // id_bytes
         downlink = self._downlinks[access_point - len(self.names)]
         for first in range(0, ids, most):
-            size_bytes = min(most, ids - first) * config.id_bytes
+            size_bytes = min(most, ids - first) * id_bytes
             with downlink.request() as slot:
                 yield slot
                 arrived = yield from self._send(PacketKind.REQUEST, access_point, vehicle, size_bytes)
@@ -174,18 +180,30 @@ class Street:
         return ids
 
     def _upload(
-        self, vehicle: int, access_point: int, leave_ns: int, images: list[int], taken_ns: list[int]
+        self,
+        vehicle: int,
+        access_point: int,
+        leave_ns: int,
+        images: list[int],
+        taken_ns: list[int],
+        parts: list[Part],
     ) -> Generator[simpy.Event, Any, list[int]]:
-        """Send images while in range and while they are in the buffer; returns those received."""
-        env, parts, kept_ns = self._env, self._parts, self._snapshots.kept_ns
+        """Send parts of images while in range and while in the buffer; returns the images received."""
+        env, cuts, kept_ns = self._env, self._cuts, self._snapshots.kept_ns
         sent: list[int] = []
-        for image, image_ns in zip(images, taken_ns, strict=False):
-            for first_byte, size_bytes in parts:
+        for image, image_ns, (_, _, first, stop) in zip(images, taken_ns, parts, strict=False):
+            stop = cuts.pieces if stop is None else stop
+            header_bytes = cuts.header_bytes(first, stop)
+            datagrams = self._whole if not header_bytes else cuts.datagrams(first, stop)
+            self._sending[vehicle] = cuts.edges[first], cuts.edges[stop]
+            for first_byte, size_bytes in datagrams:
                 if env.now >= leave_ns:
                     return sent
                 if env.now >= image_ns + kept_ns:
                     break
-                arrived = yield from self._send(_IMAGE, vehicle, access_point, size_bytes, image, first_byte)
+                arrived = yield from self._send(
+                    _IMAGE, vehicle, access_point, size_bytes, image, first_byte, header_bytes
+                )
                 if not arrived:
                     break
             else:
@@ -200,10 +218,11 @@ class Street:
         size_bytes: int,
         image: int = -1,
         first_byte: int = 0,
+        header_bytes: int = 0,
     ) -> Generator[simpy.Event, Any, bool]:
         """Send one datagram; returns whether it arrived."""
         now_ns = int(self._env.now)
-        whole_bytes = size_bytes + self._config.headers_bytes
+        whole_bytes = size_bytes + header_bytes + self._config.headers_bytes
         number = next(self._ids)
         packet = Packet(number, kind, source, destination, whole_bytes, image, first_byte, size_bytes)
         record = self._recorder.add_packet
@@ -222,7 +241,8 @@ class Street:
         self._arrived[source] = packet.id
         self._recorder.add_packet(now_ns, _RECEIVE, packet, source, node, packet.size_bytes)
         # Fragments are sent in order, none after a lost one: the last one completes its image.
-        if image >= 0 and packet.first_byte + packet.byte_count == self._config.image_bytes:
+        first_byte, end_byte = self._sending[source]
+        if image >= 0 and packet.first_byte + packet.byte_count == end_byte:
             self._snapshots.arrived[image] = True
-            size_bytes = self._config.image_bytes
-            self._recorder.add(now_ns, _ARRIVE, source, node, packet.id, image, 0, size_bytes)
+            size_bytes = end_byte - first_byte
+            self._recorder.add(now_ns, _ARRIVE, source, node, packet.id, image, first_byte, size_bytes)

@@ -10,7 +10,8 @@ The log satisfies these invariants; ``network_sim.trace.conservation`` checks th
 4. At the instant of DELIVER the next node ENQUEUEs the packet; at its destination RECEIVE is recorded
    instead (``node`` is the source, ``peer`` the destination).
 5. An image is CAPTUREd once (``node`` took it, ``peer`` is the road cell that it shows, or -1) and closed at
-   most once: by ARRIVE (``node`` took it, ``peer`` has received all its bytes) or EXPIRE (``node`` took it).
+   most once: by ARRIVE (``node`` took it, ``peer`` has received all its bytes, or the bytes
+   [first_byte, first_byte + size_bytes) that it asked for) or EXPIRE (``node`` took it).
 6. AIR and ACK carry their start time and duration, and are recorded within a second of the start.
 7. DOWN means a failure with ``Cause.NODE_DOWN`` and sleep with ``Cause.NONE``; UP is the end of either.
 

@@ -14,12 +14,17 @@ from pipeline.kernels.geometry import aim_deg
 from pipeline.planning.calls import RigPlan
 from pipeline.planning.places import floor_m
 from pipeline.planning.promise import Promise
+from pipeline.planning.radio import ruled_out
 from pipeline.sources import FileSource
 from pipeline.spec import Spec
 
 RECORD, PAGE, DRAWING, PRINT = "plan.json", "plan.html", "floor_plan.svg", "floor_plan.pdf"
 FILES = (RECORD, PAGE, DRAWING, PRINT)
 """All files of a plan; the record is deleted first and written last."""
+LEAST_NAMED = 0.0005
+"""Least share of the rays on dark surface that a sentence names: a tenth of a point, rounded."""
+MOSTLY = 0.5
+"""Share of a promise that is most of it."""
 
 
 def check_plan_folder(folder: Path, source: FileSource) -> None:
@@ -79,6 +84,7 @@ def plan_record(planned: RigPlan, scene: str, preset: str) -> dict[str, Any]:
         "scene": scene,
         "sensor": plan.sensor.name,
         "where": list(plan.config.where),
+        "dark_surface": plan.config.dark_surface,
         "cameras": cameras,
         "total": _promise(plan.total) | {"joules": delivery.joules},
         "measured_rays": plan.measured_share,
@@ -100,7 +106,7 @@ def plan_record(planned: RigPlan, scene: str, preset: str) -> dict[str, Any]:
 
 
 def _promise(one: Promise) -> dict[str, Any]:
-    return {"gain_rays": one.gain_share, "ci95": list(one.ci95_share)}
+    return {"gain_rays": one.gain_share, "ci95": list(one.ci95_share), "dark_rays": one.dark_share}
 
 
 def settings_record(spec: Spec, planned: RigPlan) -> dict[str, Any]:
@@ -117,14 +123,39 @@ def points(promise: Promise) -> str:
     return f"{100.0 * promise.gain_share:.1f} ({100.0 * low:.1f} to {100.0 * high:.1f})"
 
 
+def dark_points(promise: Promise) -> str:
+    """Return the points of a promise that are on dark surface."""
+    return f"{100.0 * promise.dark_share:.1f}"
+
+
+def dark_part(promise: Promise) -> str:
+    """Say how much of a promise is on dark surface, as a part of a sentence; empty if nothing is."""
+    if promise.dark_share < LEAST_NAMED:
+        return ""
+    return f", {dark_points(promise)} of them on a dark surface that may stay without depth"
+
+
+def dark_sentence(planned: RigPlan) -> str:
+    """Say that a plan leaves dark surface out, or how to; empty if little of its promise is dark."""
+    plan = planned.plan
+    if not plan.config.dark_surface:
+        return "Surface that looks dark to a present sensor is left out of this plan"
+    if plan.total.dark_share < max(LEAST_NAMED, MOSTLY * plan.total.gain_share):
+        return ""
+    return (
+        "Most of the promise is on surface that looks dark to a present sensor: a camera of the same kind "
+        "may measure nothing there; --no-dark-surface plans without it"
+    )
+
+
 def promise_sentence(planned: RigPlan) -> str:
     """Say what all cameras of a plan promise together."""
     plan, count = planned.plan, len(planned.plan.cameras)
     who = "The camera promises" if count == 1 else f"The {count} cameras together promise"
     return (
-        f"{who} {points(plan.total)} points: {plan.measured_share:.1%} of the present cameras' rays meet "
-        f"measured surface now, about {plan.measured_share + plan.total.gain_share:.1%} would then; in "
-        "brackets the 95 % interval"
+        f"{who} {points(plan.total)} points{dark_part(plan.total)}: {plan.measured_share:.1%} of the "
+        "present cameras' rays meet measured surface now, about "
+        f"{plan.measured_share + plan.total.gain_share:.1%} would then; in brackets the 95 % interval"
     )
 
 
@@ -133,7 +164,8 @@ def best_sentence(planned: RigPlan) -> str:
     plan = planned.plan
     return (
         f"It promises at least {plan.at_least_of_best:.0%} of what the best choice could, among the "
-        f"{plan.candidates} judged cameras that can be registered and are not ruled out by the deadline"
+        f"{plan.candidates} judged cameras that can be registered"
+        f"{ruled_out(plan, planned.radio.deadline_s)}"
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from packetmesh.progress import Progress, drain, part
 from pipeline.planning.plan import Plan, PlanConfig, iterate_candidates
 from pipeline.planning.radio import PlanDelivery, PlanRadio, plan_within
-from pipeline.planning.seen import SeenPlace, seen_place
+from pipeline.planning.seen import SeenPlace, seen_place, without_dark
 from pipeline.planning.sensors import sensor_named
 from pipeline.reconstruct import Reconstruction, reconstruct
 from pipeline.types import Rig
@@ -19,7 +19,7 @@ class RigPlan:
     """The next cameras of a rig, and what it takes to send their images."""
 
     seen: SeenPlace
-    """What the present cameras know of the place."""
+    """What the present cameras know of the place, ``without_dark`` if the plan is."""
     rig: Rig
     """The registered present cameras, at the poses that registration found."""
     plan: Plan
@@ -60,6 +60,8 @@ def iterate_plan(
     """Plan with a report after each batch of candidates; raises as ``plan``."""
     yield Progress("what the cameras see", 0.0)
     seen = seen_place(done)
+    if not config.dark_surface:
+        seen = without_dark(seen)
     sensor = sensor_named(config.sensor, done.rig)
     judged = yield from part(
         iterate_candidates(seen, sensor, config.where), "candidates", 0.1, 0.7, detail=True

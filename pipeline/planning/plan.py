@@ -36,6 +36,8 @@ class PlanConfig:
     """Name of their depth camera."""
     where: tuple[Where, ...] = field(default=WHERES)
     """Where they may stand."""
+    dark_surface: bool = True
+    """Whether surface counts that looks dark to a present sensor, where they may get no depth, either."""
 
     def __post_init__(self) -> None:
         at_least("cameras", self.cameras, 1)
@@ -74,6 +76,8 @@ class Plan:
     """Share of the expected gain that the best choice among these candidates could have, at least."""
     candidates: int
     """Number of candidates that could be chosen: they could be registered, and none was barred."""
+    barred: int
+    """Number of candidates that could be registered, but were barred."""
     measured_share: float
     """Share of the present cameras' rays on measured surface, before."""
 
@@ -117,7 +121,7 @@ def plan_of(
     """Choose the cameras of a plan.
 
     Args:
-        seen: the place.
+        seen: the place, ``without_dark`` if the config says so.
         judged: its candidates, judged for the sensor.
         sensor: the cameras' sensor.
         config: how many cameras.
@@ -128,6 +132,7 @@ def plan_of(
     """
     allowed = judged.allowed.copy()
     allowed[list(barred)] = False
+    left_out = int(judged.allowed.sum() - allowed.sum())
     if not allowed.any():
         raise InputError(
             f"None of the {len(allowed)} possible places shows enough of what a present camera measures "
@@ -140,6 +145,7 @@ def plan_of(
     if not choice.rows:
         raise InputError(
             "No camera on these places would measure anything that is missing; allow more kinds of places"
+            + ("" if config.dark_surface else ", or let dark surface count")
         )
     return Plan(
         config,
@@ -148,6 +154,7 @@ def plan_of(
         promise(choice.gains.sum(axis=0), seen.targets),
         min(1.0, choice.gain / choice.best_at_most),
         int(allowed.sum()),
+        left_out,
         seen.measured_share,
     )
 

@@ -27,6 +27,8 @@ class Promise:
 
     gain_share: float
     ci95_share: tuple[float, float]
+    dark_share: float
+    """Part of the gain that is on surface which looks dark to a present sensor, and may not be measured."""
 
 
 def promise(chance: FloatArray, targets: Targets) -> Promise:
@@ -39,7 +41,7 @@ def promise(chance: FloatArray, targets: Targets) -> Promise:
     gain = targets.share * float(np.sum(chance))
     dark = targets.share * float(np.sum(chance[targets.dark_return > 0.0]))
     half = float(np.sqrt(LEAST_HALF**2 + (HALF * gain) ** 2 + (DARK_HALF * dark) ** 2))
-    return Promise(gain, (max(0.0, gain - half), gain + half))
+    return Promise(gain, (max(0.0, gain - half), gain + half), dark)
 
 
 def measured_share(done: Reconstruction, cameras: Sequence[Camera]) -> float:

@@ -223,6 +223,13 @@ def plan_within(
     raise InputError(_why_none(delivery, radio))
 
 
+def ruled_out(plan: Plan, deadline_s: float | None) -> str:
+    """Say by what candidates of a plan were barred, if any were, as the end of a sentence on the others."""
+    if not plan.barred:
+        return ""
+    return f" and are not ruled out by the {'radio' if deadline_s is None else 'deadline'}"
+
+
 def _near(judged: Candidates, places_m: Sequence[FloatArray]) -> list[int]:
     at_m = np.array([candidate.T_world_camera[:3, 3] for candidate in judged.candidates])
     near = [np.linalg.norm(at_m - place, axis=1) < NEAR_M for place in places_m]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +33,20 @@ class SeenPlace:
     space: FreeSpace
     measured_share: float
     """Share of the present cameras' rays on measured surface."""
+
+
+def without_dark(seen: SeenPlace) -> SeenPlace:
+    """Return the place without those targets that look dark to a present sensor."""
+    targets = seen.targets
+    bright = targets.dark_return == 0.0
+    kept = replace(
+        targets,
+        points_m=targets.points_m[bright],
+        normals=targets.normals[bright],
+        view=targets.view[bright],
+        dark_return=targets.dark_return[bright],
+    )
+    return replace(seen, targets=kept)
 
 
 def seen_place(done: Reconstruction) -> SeenPlace:

@@ -11,11 +11,15 @@ from pipeline.planning.places import WHERES, free_places
 from pipeline.planning.seen import SeenPlace
 from pipeline.types import FloatArray
 
+APART_M = 0.3
+"""Least distance on the floor plan of the best sink from every camera: both need room."""
+
 
 def best_sink(seen: SeenPlace, cameras_m: FloatArray, radio: RadioConfig) -> FloatArray:
     """Return (2,) x and y of the place whose weakest link to a camera is the strongest.
 
-    The sink may stand wherever a camera could: on walls, ceiling, furniture and tripods.
+    The sink may stand wherever a camera could, on walls, ceiling, furniture and tripods, but not where one
+    stands.
 
     Args:
         seen: the place.
@@ -23,11 +27,17 @@ def best_sink(seen: SeenPlace, cameras_m: FloatArray, radio: RadioConfig) -> Flo
         radio: path loss, and the walls that damp the links.
 
     Raises:
-        InputError: the surface has no free place.
+        InputError: the surface has no free place, or cameras stand at all of them.
     """
     places_m = np.vstack([np.reshape(list(free_places(seen, kind)), (-1, 3))[:, :2] for kind in WHERES])
     if not len(places_m):
         raise InputError("The surface has no free place for a sink; give its x and y")
+    away_m = np.linalg.norm(places_m[:, None] - cameras_m, axis=2).min(axis=1)
+    places_m = places_m[away_m >= APART_M]
+    if not len(places_m):
+        raise InputError(
+            f"A camera stands within {APART_M:g} m of every free place for a sink; give its x and y"
+        )
     weakest_w = [weakest_link_w(place_m, cameras_m, radio) for place_m in places_m]
     best: FloatArray = places_m[int(np.argmax(weakest_w))]
     return best

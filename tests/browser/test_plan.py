@@ -97,7 +97,7 @@ def test_a_camera_that_is_taken_is_a_node_and_its_gain_is_beside_its_promise(pla
     page, session = planned
     place_m = node(session, "1").position
     press(page, "Take it")
-    said = page.get_by_text(re.compile(r"Promised [\d.]+ \(.*\) points, really -?[\d.]+"))
+    said = page.get_by_text(re.compile(r"Promised [\d.]+ \(.*\) points(?:, .* depth)?, really -?[\d.]+"))
     said.first.wait_for()
     page.get_by_text("4 nodes sent").first.wait_for()
     page.get_by_text("Up to date").wait_for()

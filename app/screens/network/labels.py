@@ -120,6 +120,7 @@ SCHEMES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "BASELINE: everything": ("scheme.name=baseline",),
         "GREEDY: what adds coverage": ("scheme.name=greedy",),
         "GREEDY, at most 5 per request": ("scheme.name=greedy", "scheme.k=5"),
+        "WORTH: only pieces that add coverage": ("scheme.name=worth",),
         "PDC: by chance, as offered": ("scheme.name=pdc",),
         "PDC: by chance, as received": ("scheme.name=pdc-received",),
     }

@@ -18,6 +18,7 @@ FIRST = (
     "throughput",
     "images_per_minute",
     "coverage",
+    "coverage_pieces",
     "redundancy",
     "airtime_share",
     "attempts_lost",
@@ -62,12 +63,16 @@ def metric_tables(views: Sequence[NetworkView]) -> tuple[Markup, Markup]:
 
 
 def verdict(views: Sequence[NetworkView]) -> Markdown:
-    """Return a sentence that compares images and coverage of two runs; empty unless both runs have both."""
+    """Return a sentence that compares images and coverage of two runs; empty unless both runs have both.
+
+    Coverage is that of whole cells, or of pieces of road if a run's images arrive in pieces.
+    """
     nothing = Markdown("")
     if len(views) != 2:
         return nothing
     one, two = ({name: metric.value for name, metric in view.metrics.items()} for view in views)
-    images, coverage = "images_per_minute", "coverage"
+    images = "images_per_minute"
+    coverage = "coverage" if all("coverage" in run for run in (one, two)) else "coverage_pieces"
     if not all(run.get(name) for run in (one, two) for name in (images, coverage)):
         return nothing
     first, second = (view.label.partition(":")[0] for view in views)

@@ -9,7 +9,7 @@ from app.drawing.levels import Levels, levels_of
 from app.screens.network.view import Curve, NetworkView, Pieces, Series, What
 from network_sim.config import NetworkConfig
 from network_sim.mac import FRAME_HEADER_BYTES
-from network_sim.metrics.coverage import road_coverage
+from network_sim.metrics.coverage import piece_coverage, road_coverage
 from network_sim.metrics.energy import cumulative_radio_j
 from network_sim.metrics.metrics import camera_nodes, metrics
 from network_sim.street.street import street_of
@@ -59,7 +59,7 @@ def run_view(trace: NetworkTrace, elapsed_s: float) -> NetworkView:
         metrics=metrics(trace),
         elapsed_s=elapsed_s,
         packets=trace.counters.created,
-        roads=road_coverage(trace),
+        roads=road_coverage(trace) or piece_coverage(trace),
         header_bytes=_header_bytes(trace.config),
     )
 

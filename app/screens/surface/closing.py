@@ -16,6 +16,8 @@ from pipeline.types import FloatArray
 JOB = "surface.closing_job:closing_job"
 LOOKING = Markdown("Judging up to 500 free places …")
 STALE = Markdown("The surface is being computed again; ask when it is there.")
+LEAST_NAMED = 0.005
+"""Least share of a hole on dark surface that the sentence names."""
 SILENT = Markdown("There is no result: the computation was replaced or failed. Press the button again.")
 
 
@@ -77,7 +79,7 @@ class HoleClosing:
         if camera is not None:
             pose = rigid(np.eye(3), self._offset_m) @ camera.T_world_camera
             points_m = (camera.points_m + self._offset_m).astype(np.float32)
-            self._ghosts.draw([pose], camera.fov_rad, camera.aspect, points_m)
+            self._ghosts.draw([pose], camera.fov_rad, camera.aspect, points_m, camera.dark)
             self._ghosts.show_newly([camera.chance])
 
 
@@ -87,6 +89,10 @@ def closing_sentence(answer: ClosingView, rim: bool) -> Markdown:
     if camera is None:
         return Markdown("**No camera would close it**: {}.").format(answer.why_none.rstrip("."))
     what = "what is just beyond this rim" if rim else "this hole"
+    if camera.dark_share >= LEAST_NAMED:
+        what += (
+            f", {100.0 * camera.dark_share:.0f} points of that on a dark surface that may stay without depth"
+        )
     return Markdown(
         "**A camera like the present ones would measure about {:.0f} % of {}** ({}, {:.2f} m high; {:.0f} % "
         "of its image is shared with a present camera): the pink ghost, the best of the judged places. The "

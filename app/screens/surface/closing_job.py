@@ -48,9 +48,11 @@ def _camera(store: Store, spec: Spec, which: Which, index: int) -> Generator[Pro
         camera.where,
         float(camera.T_world_camera[2, 3] - place.floor_m),
         camera.promise.gain_share,
+        camera.promise.dark_share,
         camera.overlap_share,
         2.0 * float(np.arctan2(0.5 * lens.height_px, lens.fy_px)),
         lens.width_px / lens.height_px,
         targets.points_m.astype(np.float32),
         judged.chance[row],
+        targets.dark_return > 0.0,
     )

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 from app.compute.records import MeshView
 from pipeline.spec import Spec, key
 from pipeline.surface.findings import Explanation, RayParts, Suggestion, SweepPoint
-from pipeline.types import FloatArray, IntArray
+from pipeline.types import BoolArray, FloatArray, IntArray
 
 Coloring = Literal["photo", "violet", "color", "source", "distance", "normal"]
 """The quantity that the colours of a surface show."""
@@ -134,6 +134,8 @@ class ClosingCamera:
     """Above the floor."""
     share: float
     """Share of the hole that it would measure."""
+    dark_share: float
+    """Part of that share where the hole looks dark to a present sensor, and may stay without depth."""
     overlap_share: float
     """Share of its image on measured surface that one present camera sees, too."""
     fov_rad: float
@@ -144,6 +146,8 @@ class ClosingCamera:
     """(T, 3) float32 points of the hole, world frame."""
     chance: FloatArray
     """(T,) float32 chance that it measures each of them."""
+    dark: BoolArray
+    """(T,) True where they look dark to a present sensor."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,12 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
+from network_sim.street.pieces import Part
+
 
 class Scheme:
     """Decides which of the offered images the collector requests."""
 
     asks = True
     """Vehicles upload images only on request."""
+    by_pieces = False
+    """Requests name pieces of images."""
+
+    def parts(self, shown: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[Part]:
+        """Return the parts of images to upload, in upload order, of those in a summary (T,).
+
+        Args:
+            shown: (T,) cells of the images, or (T, P) pieces of road ``by_pieces``.
+            captured_ns: (T,) capture times of the images.
+            now_ns: present time.
+        """
+        wanted = self.wanted(shown, captured_ns, now_ns)
+        cells = shown[wanted].tolist()
+        return [Part(index, (cell,)) for index, cell in zip(wanted, cells, strict=True)]
 
     def wanted(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
         """Return the indices of the images to upload, in upload order, of those in a summary (T,).

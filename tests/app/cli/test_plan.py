@@ -15,7 +15,8 @@ from tests.pipeline.delivery.small import small_rig
 pytestmark = pytest.mark.xdist_group("cli_plan")  # one worker makes the shared plan once
 FEW = ("--set", "surface.max_points=2500")
 CAMERA = {
-    *("T_world_camera", "height_m", "pan_deg", "tilt_deg", "where", "gain_rays", "ci95", "overlap"),
+    *("T_world_camera", "height_m", "pan_deg", "tilt_deg", "where", "gain_rays", "ci95"),
+    *("dark_rays", "overlap"),
     *("seconds_to_90", "seconds_to_99", "joules", "battery_days"),
 }
 
@@ -59,6 +60,7 @@ def test_json_has_every_camera_with_its_promise_and_its_delivery(planned):
     assert len(record["cameras"]) == 2
     for camera in record["cameras"]:
         assert set(camera) == CAMERA
+        assert 0.0 <= camera["dark_rays"] <= camera["gain_rays"]
         assert camera["ci95"][0] <= camera["gain_rays"] <= camera["ci95"][1]
         assert camera["where"] in ("walls", "tripods")
         assert camera["overlap"] >= 0.25
@@ -125,6 +127,19 @@ def test_a_budget_that_fewer_cameras_keep_says_so(capsys, rig_folder, planned, t
     assert re.search(r"The budget of [\d.]+ J allows 1 of the 2 cameras", err)
 
 
+def test_dark_surface_may_be_left_out(capsys, rig_folder, planned):
+    got = run(capsys, "plan", "--rig", rig_folder, "--cameras", 2, "--where", "walls,tripods",
+              "--no-dark-surface", "--json", *FEW)  # fmt: skip
+    record = json.loads(got.out)
+    assert (planned[1]["dark_surface"], record["dark_surface"]) == (True, False)
+    assert record["total"]["dark_rays"] == 0.0
+    assert (
+        planned[1]["total"]["gain_rays"] - planned[1]["total"]["dark_rays"]
+        <= record["total"]["gain_rays"] + 1e-9
+    )
+    assert "is left out of this plan" in got.err
+
+
 def test_the_plan_may_place_the_sink(capsys, rig_folder):
     code, _, err = run(capsys, "plan", "--rig", rig_folder, "--where", "tripods", "--sink", "best", *FEW)
     assert code == 0
@@ -175,9 +190,9 @@ def test_wrong_use_is_one_sentence_and_leaves_no_folder(capsys, rig_folder, tmp_
     ],
 )
 def test_a_plan_that_cannot_be_is_one_sentence_and_writes_nothing(capsys, rig_folder, tmp_path, words, says):
-    got = run(capsys, "plan", "--rig", rig_folder, "--out", tmp_path / "out", *words, *FEW)
+    got = run(capsys, "plan", "--rig", rig_folder, "--out", tmp_path / "runs" / "out", *words, *FEW)
     check_one_sentence(got, 1, says)
-    assert list((tmp_path / "out").iterdir()) == []
+    assert not (tmp_path / "runs").exists()
 
 
 def test_a_node_without_depth_is_one_sentence(capsys, rig_folder, tmp_path):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.drawing.colors import GHOST
+from app.drawing.colors import GHOST, GHOST_DARK
 from app.drawing.ghosts import LEAST_CHANCE, Ghosts
 from pipeline.kernels.geometry import rigid, rotation_exp
 
@@ -18,7 +18,7 @@ def drawn(server):
     moves, picks = [], []
     server.scene.add_frame("/plan", show_axes=False)
     ghosts = Ghosts(server.scene, "/plan", lambda *given: moves.append(given), picks.append)
-    ghosts.draw(POSES, 0.8, 1.5, TARGETS_M)
+    ghosts.draw(POSES, 0.8, 1.5, TARGETS_M, np.array([False, False, True]))
     return SimpleNamespace(ghosts=ghosts, node=server.scene.get_handle_by_name, moves=moves, picks=picks)
 
 
@@ -62,11 +62,17 @@ def test_only_points_that_are_likely_seen_are_shown_the_chosen_ghosts_in_full_co
     assert drawn.node("/plan") is not None
 
 
+def test_points_on_dark_surface_have_their_own_colour(drawn):
+    drawn.ghosts.show_newly([np.ones(3), np.zeros(3)])
+    colors = [tuple(color) for color in drawn.node("/plan/seen").colors]
+    assert colors == [GHOST, GHOST, GHOST_DARK]
+
+
 def test_handle_and_frustum_grow_with_the_room_between_two_limits(drawn):
     sizes = []
     for diagonal_m in (0.1, 5.0, 100.0):
         corners_m = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, diagonal_m]], np.float32)
-        drawn.ghosts.draw(POSES, 0.8, 1.5, corners_m)
+        drawn.ghosts.draw(POSES, 0.8, 1.5, corners_m, np.zeros(2, bool))
         sizes.append(drawn.node("/plan/handle-1").scale)
         assert np.ravel(drawn.node("/plan/1").scale)[0] == pytest.approx(0.7 * sizes[-1])
     assert sizes == pytest.approx([0.3, 0.6, 0.9])

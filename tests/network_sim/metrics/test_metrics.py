@@ -124,7 +124,7 @@ def test_every_way_of_keeping_gives_equal_numbers() -> None:
         metrics(trace_of(random_run(7), keep)) for keep in ("all", "images", "counters")
     )
     assert images == full
-    assert set(full) - set(counters) == {"coverage", "redundancy"}
+    assert set(full) - set(counters) == {"coverage", "coverage_pieces", "redundancy"}
     assert all(full[name] == metric for name, metric in counters.items())
 
 

@@ -11,6 +11,7 @@ from pipeline.planning.calls import plan
 from pipeline.planning.chances import judge
 from pipeline.planning.plan import BY_HAND, LEAST_OVERLAP, PlanConfig, moved_plan, plan_of
 from pipeline.planning.promise import promise
+from pipeline.planning.seen import without_dark
 from pipeline.planning.sensors import SENSORS, sensor_named
 from tests.pipeline.planning.rooms import targets_at
 
@@ -85,8 +86,23 @@ def test_the_interval_is_wider_where_what_is_promised_is_dark():
     known, doubtful = promise(chance, bright), promise(chance, dark)
     assert known.gain_share == doubtful.gain_share > 0.0
     assert doubtful.ci95_share[1] > known.ci95_share[1]
+    assert (known.dark_share, doubtful.dark_share) == (0.0, doubtful.gain_share)
+    mixed = replace(bright, dark_return=np.repeat([0.0, 0.1], [30, 10]))
+    assert promise(chance, mixed).dark_share == pytest.approx(0.25 * known.gain_share)
     assert promise(0 * chance, bright).gain_share == promise(0 * chance, bright).ci95_share[0] == 0.0
     assert promise(chance, bright).gain_share == pytest.approx(2.0 * promise(0.5 * chance, bright).gain_share)
+
+
+def test_dark_surface_is_left_out_of_all_targets(office):
+    targets, bright = office.seen.targets, without_dark(office.seen).targets
+    lit = targets.dark_return == 0.0
+    assert 0 < lit.sum() < len(lit), "the office has dark screens"
+    assert np.array_equal(bright.points_m, targets.points_m[lit])
+    assert not bright.dark_return.any()
+    assert bright.share == targets.share
+    chance = np.linspace(0.0, 1.0, len(lit))
+    both, known = promise(chance, targets), promise(chance[lit], bright)
+    assert known.gain_share == pytest.approx(both.gain_share - both.dark_share)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from packetmesh.errors import InputError
 from packetmesh.settings import with_settings
 from pipeline.kernels.geometry import LEVEL_POSE
 from pipeline.planning.plan import PlanConfig, plan_of
-from pipeline.planning.radio import BATTERY_J, PlanRadio, deliver_plan, plan_within
+from pipeline.planning.radio import BATTERY_J, PlanRadio, deliver_plan, plan_within, ruled_out
 from pipeline.types import Rig
 
 
@@ -90,6 +90,17 @@ def test_a_deadline_is_kept_or_refused(office):
     assert sent.cameras[0].seconds_to_99_s <= deadline_s
     with pytest.raises(InputError, match="No camera meets budget and deadline"):
         within(office, 1, deadline_s=1e-3)
+
+
+def test_a_plan_says_by_what_places_are_ruled_out_and_nothing_where_none_is(office):
+    free, _ = within(office, 1)
+    assert free.barred == 0
+    assert ruled_out(free, None) == ruled_out(free, 5.0) == ""
+    allowed = np.flatnonzero(office.judged.allowed)
+    fewer = plan_of(office.seen, office.judged, office.sensor, PlanConfig(), allowed[:3])
+    assert (fewer.barred, fewer.candidates) == (3, len(allowed) - 3)
+    assert ruled_out(fewer, None).endswith("ruled out by the radio")
+    assert ruled_out(fewer, 5.0).endswith("ruled out by the deadline")
 
 
 def test_the_same_plan_is_delivered_the_same(office):

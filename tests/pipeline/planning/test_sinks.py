@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from network_sim.presets import PRESETS
+from packetmesh.errors import InputError
 from pipeline.planning.places import WHERES, free_places
 from pipeline.planning.plan import PlanConfig, plan_of
 from pipeline.planning.radio import PlanRadio, deliver_plan
-from pipeline.planning.sinks import best_sink, weakest_link_w
+from pipeline.planning.sinks import APART_M, best_sink, weakest_link_w
 
 RADIO = replace(PRESETS["office"].radio, walls_m=(), wall_db=8.0)
 TWO_M = np.array([[0.0, 0.0], [6.0, 0.0]])
@@ -37,11 +38,22 @@ def test_no_free_place_has_a_stronger_weakest_link(office):
     best_m = best_sink(office.seen, cameras_m, RADIO)
     places_m = np.vstack([place[:2] for kind in WHERES for place in free_places(office.seen, kind)])
     assert (places_m == best_m).all(axis=1).any()
+    places_m = places_m[np.linalg.norm(places_m[:, None] - cameras_m, axis=2).min(axis=1) >= APART_M]
     most_w = weakest_link_w(best_m, cameras_m, RADIO)
     assert all(weakest_link_w(place_m, cameras_m, RADIO) <= most_w for place_m in places_m)
     farthest_m = np.linalg.norm(places_m[:, None] - cameras_m, axis=2).max(axis=1)
     without_walls_m = np.linalg.norm(best_m - cameras_m, axis=1).max()
     assert without_walls_m == pytest.approx(farthest_m.min())
+
+
+def test_the_sink_does_not_stand_where_a_camera_does(office):
+    places_m = np.vstack([place[:2] for kind in WHERES for place in free_places(office.seen, kind)])
+    middle_m = best_sink(office.seen, places_m[:1], RADIO)
+    for cameras_m in (places_m[:1], np.vstack([places_m[:1], middle_m])):
+        sink_m = best_sink(office.seen, cameras_m, RADIO)
+        assert np.linalg.norm(sink_m - cameras_m, axis=1).min() >= APART_M
+    with pytest.raises(InputError, match="give its x and y"):
+        best_sink(office.seen, places_m, RADIO)
 
 
 def test_the_plan_s_images_go_to_the_best_sink_of_all_its_cameras(office):

@@ -7,7 +7,7 @@ from typing import Any
 
 from app.compute.state import Sent
 from app.screens.network.place import show, shown, text_of, values_of
-from app.screens.network.planning.labels import SENSORS, WHERES
+from app.screens.network.planning.labels import MATERIALS, SENSORS, WHERES
 from app.screens.network.planning.view import PlanRequest
 from app.window.ui import Ui
 from packetmesh.errors import InputError
@@ -15,6 +15,7 @@ from packetmesh.errors import InputError
 MOST_CAMERAS = 4
 LIMITS = {"budget": ("The budget", "J"), "deadline": ("The deadline", "s")}
 SENSOR_NAMES = {title: name for name, title in SENSORS.items()}
+MATERIAL_NAMES = {title: name for name, title in MATERIALS.items()}
 
 
 class PlanControls:
@@ -35,6 +36,19 @@ class PlanControls:
             list(SENSOR_NAMES),
             hint="Lens and range of the new cameras. As the present ones: the lens of the first node and the "
             "range of a Kinect v1.",
+        )
+        self._walls = gui.add_dropdown(
+            "Walls of",
+            list(MATERIAL_NAMES),
+            MATERIALS["brick"],
+            hint="Material of the walls that are found in the surface: concrete damps the radio most, "
+            "plaster least.",
+        )
+        self._dark = gui.add_checkbox(
+            "Dark surface counts",
+            True,
+            hint="Whether surface counts that looks dark to a present sensor, such as a screen; a camera of "
+            "the same kind may get no depth there, either.",
         )
         self._limits = {
             "budget": gui.add_text(
@@ -65,6 +79,8 @@ class PlanControls:
             SENSOR_NAMES[self._sensor.value],
             limits["budget"],
             limits["deadline"],
+            MATERIAL_NAMES[self._walls.value],
+            self._dark.value,
         )
 
     def place(self) -> str:
@@ -85,6 +101,8 @@ class PlanControls:
                     self._limits[name].value = text
                 elif name == "sensor":
                     show(name, self._sensor, SENSORS.get(text, text))
+                elif name == "material":
+                    show(name, self._walls, MATERIALS.get(text, text))
                 elif name in handles:
                     show(name, handles[name], text)
                 else:
@@ -95,11 +113,12 @@ class PlanControls:
             raise wrong[0]
 
     def _handles(self) -> dict[str, Any]:
-        return {"cameras": self._cameras, **self._where}
+        return {"cameras": self._cameras, **self._where, "dark": self._dark}
 
     def _values(self) -> dict[str, str]:
         texts = {name: shown(handle) for name, handle in self._handles().items()}
         texts["sensor"] = SENSOR_NAMES[self._sensor.value]
+        texts["material"] = MATERIAL_NAMES[self._walls.value]
         return texts | {name: handle.value.strip() for name, handle in self._limits.items()}
 
 

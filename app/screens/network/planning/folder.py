@@ -229,7 +229,7 @@ class PlanFolder:
         """Show a plan's ghosts, with the first beside a camera if the stop says so, or what is missed."""
         where = tuple(_pose_of(one.T_world_camera) for one in plan.ghosts.ghosts)
         if look.show == "missed":
-            self._drawn.draw((), plan.fov_rad, plan.aspect, plan.targets_m)
+            self._drawn.draw((), plan.fov_rad, plan.aspect, plan.targets_m, plan.dark)
             self._drawn.show_targets()
             self._status.content = MISSED.format(100.0 * (1.0 - plan.measured_share))
             self._on_change()
@@ -242,7 +242,7 @@ class PlanFolder:
         ghosts, T_world_camera = plan.ghosts.ghosts, [np.reshape(pose, (4, 4)) for pose in where]
         self._plan, self._ghosts, self._row, self._arrivals = plan, None, 0, ()
         self._poses, self._placed = list(where), False
-        self._drawn.draw(T_world_camera, plan.fov_rad, plan.aspect, plan.targets_m)
+        self._drawn.draw(T_world_camera, plan.fov_rad, plan.aspect, plan.targets_m, plan.dark)
         self._about.content = DRAG
         self._chosen.options = tuple(f"new {row}" for row in range(1, len(ghosts) + 1))
         self._chosen.value = "new 1"

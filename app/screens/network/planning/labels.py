@@ -21,12 +21,16 @@ WHERES: Mapping[str, str] = MappingProxyType(
     {"walls": "On walls", "ceiling": "On the ceiling", "furniture": "On furniture", "tripods": "On tripods"}
 )
 """Titles of ``pipeline.planning.places.WHERES``, whose libraries the server process does not load."""
+MATERIALS: Mapping[str, str] = MappingProxyType(
+    {"plaster": "Plaster", "wood": "Wood", "brick": "Brick", "concrete": "Concrete"}
+)
+"""Titles of the walls in ``pipeline.planning.walls.DAMPING_DB``."""
 RENDERED = ("as-present", "kinect-v1")
 """Sensors that the demo rooms can be rendered with: the model of their sensor is that of a Kinect v1."""
 
 TEXT = Markdown(
     """Where would the next cameras stand best? The planner judges up to 500 free places by what a camera
-there would newly measure; pink ghosts show the best. Walls found in the surface damp the radio like brick."""
+there would newly measure; pink ghosts show the best. Walls found in the surface damp the radio."""
 )
 NONE_YET = Markdown("No plan yet.")
 PLANNING = Markdown("Planning; the bar at the top shows the progress. *Cancel* stops it.")
@@ -37,7 +41,8 @@ MISSED = Markdown(
 )
 DRAG = Markdown(
     """**Drag a ghost by its arrows and rings**, or change the numbers below: promise and pink points
-follow. When you let go, its picture and the time of its image follow, too."""
+follow; brown points look dark to a present sensor. When you let go, its picture and the time of its image
+follow, too."""
 )
 PICTURE = Markdown(
     "What it would see, on the surface known today. Green: newly measured, the stronger the likelier; "
@@ -51,6 +56,7 @@ TAKING = Markdown(
 )
 NO_TRUTH = Markdown("*Take it* renders demo rooms, whose truth is known; this scene is not one of them.")
 OTHER_SENSOR = Markdown(
-    "*Take it* renders demo rooms with a Kinect v1; choose that sensor, or *As the present ones*."
+    "*Take it* is not offered for this sensor: the demo rooms know only how a Kinect v1 measures depth, so "
+    "the gain of another sensor would be a wrong number. Choose *Kinect v1*, or *As the present ones*."
 )
 NOT_TAKEN = Markdown("The camera was not added: the computation was stopped or failed.")

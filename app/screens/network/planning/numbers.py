@@ -33,20 +33,26 @@ def points(promise: PromiseView) -> str:
     return f"{100.0 * promise.gain_share:.1f} ({100.0 * low:.1f} to {100.0 * high:.1f})"
 
 
+def dark_part(promise: PromiseView) -> str:
+    """Say how much of a promise is on dark surface, as a part of a sentence; empty if nothing is."""
+    dark = f"{100.0 * promise.dark_share:.1f}"
+    return "" if dark == "0.0" else f", {dark} of them on a dark surface that may stay without depth"
+
+
 def summary(plan: PlanView, ghosts: GhostsView) -> Markdown:
     """Return markdown: what all ghosts promise together, how good the plan is, and notes."""
     count = len(ghosts.ghosts)
     who = "The new camera promises" if count == 1 else f"The {count} new cameras together promise"
     then = plan.measured_share + ghosts.total.gain_share
     text = Markdown(
-        "**{} {} points**: {:.1f} % of the present cameras' rays meet measured surface now, about {:.1f} % "
+        "**{} {} points**{}: {:.1f} % of the present cameras' rays meet measured surface now, about {:.1f} % "
         "would then; in brackets the 95 % interval."
-    ).format(who, points(ghosts.total), 100.0 * plan.measured_share, 100.0 * then)
+    ).format(who, points(ghosts.total), dark_part(ghosts.total), 100.0 * plan.measured_share, 100.0 * then)
     if ghosts is plan.ghosts:
         text += Markdown(
-            " It is at least {:.0f} % of the best choice among the {} judged cameras that can be registered "
-            "and are not ruled out by the deadline."
-        ).format(100.0 * plan.at_least_of_best, plan.candidates)
+            " It is at least {:.0f} % of the best choice among the {} judged cameras that can be "
+            "registered{}."
+        ).format(100.0 * plan.at_least_of_best, plan.candidates, plan.ruled_out)
     for note in (*plan.notes, *_doubts(plan, ghosts.ghosts)):
         text += Markdown("\n\n{}.").format(note.rstrip("."))
     return text
@@ -85,6 +91,12 @@ def ghost_table(ghosts: GhostsView, arrivals: Sequence[Arrival]) -> Markup:
             "Hundredths of the present cameras' rays that newly meet measured surface, of each camera beyond "
             "those before it, with the 95 % interval.",
             *(points(one.promise) for one in ghosts.ghosts),
+        ),
+        (
+            "Of it on dark surface",
+            "Points of the promise on surface that looks dark to a present sensor; a camera of the same kind "
+            "may get no depth there, either.",
+            *(number(one.promise.dark_share, 1, "", 100.0) for one in ghosts.ghosts),
         ),
         (
             "Overlap",
@@ -146,8 +158,8 @@ def kept_sentence(taken: TakenView) -> Markdown:
     low, high = taken.promise.ci95_share
     real, gain = taken.real_share, taken.promise.gain_share
     text = Markdown(
-        "**Promised {} points, really {:.1f}** (hundredths of the earlier cameras' rays). "
-    ).format(points(taken.promise), 100.0 * real)
+        "**Promised {} points{}, really {:.1f}** (hundredths of the earlier cameras' rays). "
+    ).format(points(taken.promise), dark_part(taken.promise), 100.0 * real)
     if not taken.placed:
         return text + Markdown("Registration did not find the new camera's pose, so its image was left out.")
     if not low <= real <= high:

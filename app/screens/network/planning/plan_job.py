@@ -21,6 +21,7 @@ from packetmesh.progress import Progress
 from pipeline.folders.plan import fewer_sentence, level_sentence
 from pipeline.planning.calls import RigPlan
 from pipeline.planning.plan import LEAST_OVERLAP
+from pipeline.planning.radio import ruled_out
 from pipeline.types import FloatArray
 
 
@@ -45,6 +46,7 @@ def _view(store: Store, spec: Spec, request: PlanRequest) -> Generator[Progress,
         ghosts_view(place, plan, judged),
         arrivals_of(delivery),
         place.seen.targets.points_m.astype(np.float32),
+        place.seen.targets.dark_return > 0.0,
         2.0 * float(np.arctan2(0.5 * lens.height_px, lens.fy_px)),
         lens.width_px / lens.height_px,
         plan.measured_share,
@@ -53,6 +55,7 @@ def _view(store: Store, spec: Spec, request: PlanRequest) -> Generator[Progress,
         len(delivery.walls_m),
         plan.at_least_of_best,
         plan.candidates,
+        ruled_out(plan, request.deadline_s),
         delivery.image_bytes,
         LEAST_OVERLAP,
         tuple(filter(None, notes)),

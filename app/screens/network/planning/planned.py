@@ -28,6 +28,7 @@ from pipeline.planning.places import is_free
 from pipeline.planning.plan import Plan, PlanConfig, iterate_candidates, moved_plan
 from pipeline.planning.promise import Promise
 from pipeline.planning.radio import PlanDelivery, PlanRadio, deliver_plan, plan_within
+from pipeline.planning.seen import without_dark
 from pipeline.planning.sensors import sensor_named
 from pipeline.types import FloatArray, Rig
 
@@ -37,6 +38,8 @@ CLEAR_M = 0.05
 _judged: dict[tuple[str, bytes], tuple[Place, Judged]] = {}
 """What this process judged last, by sensor and pose, with its place."""
 MOST_JUDGED = 16
+_bright: list[tuple[Place, Place]] = []
+"""The place of which this process last left dark surface out, and that place without it."""
 
 
 def plan_of_request(
@@ -48,9 +51,17 @@ def plan_of_request(
         PacketMeshError: there is no plan; the message says why and what to try.
     """
     place = yield from place_of(store, spec)
+    if not request.dark_surface:
+        place = _without_dark(place)
     key = ("plan", spec.key("surface"), request)
     plan, delivery = yield from store.remember(key, partial(_planned, store, spec, place, request))
     return place, plan, delivery
+
+
+def _without_dark(place: Place) -> Place:
+    if not (_bright and _bright[0][0] is place):
+        _bright[:] = [(place, replace(place, seen=without_dark(place.seen)))]
+    return _bright[0][1]
 
 
 def _planned(
@@ -59,7 +70,7 @@ def _planned(
     config, done = config_of(request), place.done
     rig, radio = sending_of(place, request)
     sensor = sensor_named(request.sensor, done.rig)
-    key = ("judged", spec.key("surface"), sensor.name, config.where)
+    key = ("judged", spec.key("surface"), sensor.name, config.where, config.dark_surface)
     compute = partial(iterate_candidates, place.seen, sensor, config.where)
     judging = store.remember(key, compute)
     judged = yield from part(judging, "judging places", 0.6, 0.9, detail=True)
@@ -69,7 +80,8 @@ def _planned(
 
 def config_of(request: PlanRequest) -> PlanConfig:
     """Return the planner's settings; raises ``InputError`` if no kind of place is allowed."""
-    return PlanConfig(request.cameras, request.sensor, request.where)  # type: ignore[arg-type]
+    places = request.where
+    return PlanConfig(request.cameras, request.sensor, places, request.dark_surface)  # type: ignore[arg-type]
 
 
 def sending_of(place: Place, request: PlanRequest) -> tuple[Rig, PlanRadio]:
@@ -89,7 +101,8 @@ def sending_of(place: Place, request: PlanRequest) -> tuple[Rig, PlanRadio]:
     if network.nodes.places_m:
         names = [frame.name for frame in whole.frames]
         network = placed(whole, network, [names.index(frame.name) for frame in frames])
-    radio = PlanRadio(network, sent.coding, budget_j=request.budget_j, deadline_s=request.deadline_s)
+    limits = {"budget_j": request.budget_j, "deadline_s": request.deadline_s}
+    radio = PlanRadio(network, sent.coding, request.walls, **limits)
     return Rig(found.name, frames), radio
 
 
@@ -131,7 +144,7 @@ def ghosts_view(place: Place, plan: Plan, judged: Sequence[Judged]) -> GhostsVie
 
 def promise_view(one: Promise) -> PromiseView:
     """Return a promise as the server reads it."""
-    return PromiseView(one.gain_share, one.ci95_share)
+    return PromiseView(one.gain_share, one.ci95_share, one.dark_share)
 
 
 def arrivals_of(delivery: PlanDelivery) -> tuple[Arrival, ...]:

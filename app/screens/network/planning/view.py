@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from app.compute.state import Sent
 from pipeline.sources import RigFolder
-from pipeline.types import ByteArray, FloatArray
+from pipeline.types import BoolArray, ByteArray, FloatArray
 
 Pose: TypeAlias = tuple[float, ...]
 """The 16 numbers of a (4, 4) pose, row by row; unlike an array, it can be part of a key."""
@@ -28,6 +28,10 @@ class PlanRequest:
     """Name of the new cameras' sensor, as in ``pipeline.planning.sensors``."""
     budget_j: float | None
     deadline_s: float | None
+    walls: str = "brick"
+    """Material of the walls, as in ``pipeline.planning.walls``."""
+    dark_surface: bool = True
+    """Whether surface counts that looks dark to a present sensor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +40,8 @@ class PromiseView:
 
     gain_share: float
     ci95_share: tuple[float, float]
+    dark_share: float
+    """Part of the gain on surface that looks dark, where a camera may get no depth."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +89,8 @@ class PlanView:
     arrivals: tuple[Arrival, ...]
     targets_m: FloatArray
     """(T, 3) float32 places of the unmeasured rays, world frame."""
+    dark: BoolArray
+    """(T,) True where they look dark to a present sensor."""
     fov_rad: float
     """Vertical field of view of the new cameras."""
     aspect: float
@@ -97,6 +105,8 @@ class PlanView:
     """Number of walls that damp the radio."""
     at_least_of_best: float
     candidates: int
+    ruled_out: str
+    """By what other candidates were barred, if any were, as the end of a sentence on these."""
     image_bytes: int
     """Bytes that count for an image of a new camera."""
     least_overlap: float

@@ -1,5 +1,7 @@
 """What would close a hole: the job on a small room, and the button with its ghost."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,7 +18,10 @@ from tests.pipeline.delivery.small import CONFIG, small_rig
 
 LABEL = "What would close this?"
 POINTS_M = np.array([[0.0, 0.0, 1.0], [0.1, 0.0, 1.0]], np.float32)
-CAMERA = ClosingCamera(np.eye(4), "tripods", 1.42, 0.83, 0.5, 0.8, 1.3, POINTS_M, np.array([0.9, 0.0]))
+DARK = np.array([False, True])
+CAMERA = ClosingCamera(
+    np.eye(4), "tripods", 1.42, 0.83, 0.0, 0.5, 0.8, 1.3, POINTS_M, np.array([0.9, 0.0]), DARK
+)
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +45,12 @@ def test_the_camera_of_a_hole_measures_points_of_that_hole(store, spec, which):
     loop_m = surface.vertices_m[holes[0].loop]
     near_m = np.linalg.norm(camera.points_m - holes[0].center_m, axis=1)
     assert near_m.max() <= np.linalg.norm(loop_m - holes[0].center_m, axis=1).max() + 1e-5
+
+
+def test_a_hole_on_dark_surface_is_named():
+    assert "dark" not in closing_sentence(ClosingView("after", 2, CAMERA), rim=False)
+    dark = ClosingView("after", 2, replace(CAMERA, dark_share=0.52))
+    assert "83 % of this hole, 52 points of that on a dark surface" in closing_sentence(dark, rim=False)
 
 
 def test_a_hole_that_is_not_there_is_a_sentence(store, spec):

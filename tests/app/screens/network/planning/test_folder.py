@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from app.compute import jobs
+from app.compute.seen_places import place_of
 from app.compute.state import Sent, Spec
 from app.screens.network.planning.controls import PlanControls
 from app.screens.network.planning.folder import PlanFolder
+from app.screens.network.planning.planned import sending_of
 from app.window.panel import Panel
 from network_sim.presets import PRESETS
 from packetmesh.errors import InputError
@@ -93,6 +95,30 @@ def test_a_plan_has_its_table_its_ghosts_and_what_they_newly_see(screen):
     (picture,) = screen.gui.all("image", "Plan")
     assert picture.image.shape[2] == 3
     assert not screen.notices
+
+
+def test_the_walls_have_the_material_that_was_chosen(screen):
+    screen.suggest()
+    brick = screen.panel.plan._plan
+    screen.gui.set("Walls of", "Plaster")
+    screen.suggest()
+    radio = sending_of(drain(place_of(screen.store, screen.spec)), screen.panel.plan._plan.request)[1]
+    assert (brick.request.walls, radio.walls) == ("brick", "plaster")
+
+
+def test_dark_surface_is_named_and_can_be_left_out(screen):
+    text, plan = screen.suggest(), screen.panel.plan._plan
+    assert "Of it on dark surface" in text
+    assert plan.dark.any(), "the small room's screen"
+    screen.gui.set("Dark surface counts", False)
+    screen.suggest()
+    without = screen.panel.plan._plan
+    assert not without.dark.any()
+    assert len(without.targets_m) == (~plan.dark).sum()
+    assert without.ghosts.total.dark_share == 0.0
+    assert "may stay without depth" not in screen.gui.text("Plan")
+    screen.drag((0.0, 0.0, 0.1))
+    assert screen.panel.plan._ghosts.total.dark_share == 0.0, "a dragged ghost counts the same"
 
 
 def test_a_dragged_ghost_promises_what_it_sees_there_and_its_image_is_sent_from_there(screen):
@@ -229,7 +255,9 @@ def test_a_camera_that_is_taken_stands_in_a_larger_rig_and_its_promise_is_beside
     near = np.abs(rig.frames[2].depth.z_m - rig.truth.depth[2].z_m) < 0.05
     assert near.sum() > 0.8 * rig.frames[2].depth.valid.sum(), "its depth is that of the room from there"
     text = screen.gui.text("Plan")
-    promised, real = re.search(r"Promised ([\d.]+) \(.*\) points, really (-?[\d.]+)\*", text).groups()
+    promised, real = re.search(
+        r"Promised ([\d.]+) \(.*\) points(?:, .* depth)?, really (-?[\d.]+)\*", text
+    ).groups()
     assert 0.0 < float(promised) < 20.0
     assert abs(float(real)) < 20.0
     assert "No plan yet" in text
@@ -243,10 +271,10 @@ def test_a_camera_that_cannot_be_taken_is_explained_and_one_at_a_time_is_taken(s
     taking = screen.panel.plan._taking
     taking._rooms[screen.spec.source] = "box-on-table", 0
     screen.gui.set("Sensor", "Kinect v2")
-    assert "renders demo rooms with a Kinect v1" in screen.suggest()
+    assert "know only how a Kinect v1 measures depth" in screen.suggest()
     assert not screen.gui.find("Take it").seen
     screen.gui.set("Sensor", "Kinect v1")
-    assert "renders demo rooms" not in screen.suggest()
+    assert "*Take it* is not offered" not in screen.suggest()
     answers = []
     screen.side_job = lambda *_, on_end: answers.append(on_end)
     screen.gui.press("Take it")
@@ -269,15 +297,23 @@ def test_the_controls_are_in_the_address_and_wrong_values_are_named():
     ui.gui.set("New cameras", 3)
     ui.gui.set("On walls", False)
     ui.gui.set("Sensor", "Kinect v2")
+    ui.gui.set("Walls of", "Concrete")
+    ui.gui.set("Dark surface counts", False)
     ui.gui.set("Deadline (s)", "2.5")
     sent = Sent(PRESETS["office"])
     place, request = controls.place(), controls.request(sent)
-    assert place == "cameras=3;walls=false;sensor=kinect-v2;deadline=2.5"
+    assert place == "cameras=3;walls=false;dark=false;sensor=kinect-v2;material=concrete;deadline=2.5"
+    assert (request.walls, request.dark_surface) == ("concrete", False)
     controls.take("")
     assert controls.place() == ""
     controls.take(place)
     assert controls.request(sent) == request
-    for wrong, word in (("cameras=9", "cameras=9"), ("deadline=-1", "-1"), ("colour=red", "colour")):
+    for wrong, word in (
+        ("cameras=9", "cameras=9"),
+        ("deadline=-1", "-1"),
+        ("colour=red", "colour"),
+        ("material=straw", "straw"),
+    ):
         with pytest.raises(InputError, match=word):
             controls.take(wrong)
     assert controls.place() == ""
