@@ -91,7 +91,7 @@ def added_area_m2(view: BaseView, tile_bytes: IntArray) -> FloatArray:
             "give the bytes of each tile"
         )
     if not known.any():
-        return tile_bytes.astype(np.float64)
+        return np.zeros(tile_bytes.shape)
     px_per_byte = _BLOCK_PX * blocks_known.sum() / max(1, int(tile_bytes.sum()))
     beyond_px, missing = tile_bytes * px_per_byte - _BLOCK_PX * blocks_known, tile_sums(~known)
     missing_px = np.clip(beyond_px, LEAST_MISSING_PX * missing, 0.5 * _BLOCK_PX * missing)

@@ -82,10 +82,10 @@ def test_shown_tiles_follow_all_others_and_tiles_without_bytes_are_last():
     assert sorted(order) == list(range(12))
 
 
-def test_a_base_layer_without_depth_leaves_the_bytes():
-    sizes = BYTES.copy()
-    sizes[2, 3] = 300
-    assert order_by_worth(view(np.full(BLOCKS, np.nan)), sizes, OWN).order[0] == 11
+def test_without_depth_in_the_base_layer_the_coding_s_order_stays():
+    found = order_by_worth(view(np.full(BLOCKS, np.nan)), BYTES, OWN)
+    np.testing.assert_array_equal(found.order, OWN)
+    assert not found.area_m2.any()
 
 
 def test_an_order_takes_as_many_bytes_as_there_are_orders():
