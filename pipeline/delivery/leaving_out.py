@@ -195,8 +195,8 @@ def send_requested(
         if order == "own":
             decision = replace(decision, worth=(None,) * len(sending))
         streams = [
-            _stream(node, coding, packet_bytes, *both)
-            for node, *both in zip(sending, decision.shared.leave_out, decision.worth, strict=True)
+            _stream(node, coding, packet_bytes, mask, worth)
+            for node, mask, worth in zip(sending, decision.shared.leave_out, decision.worth, strict=True)
         ]
         trace = simulate(
             network_of(part, [len(stream) for stream in streams], network, first, _sizes(sending, decision))
@@ -236,7 +236,10 @@ def _stream(
 def _sizes(sending: Sequence[Sender], decision: Decision) -> list[int]:
     """Return the bytes of the request to each sender."""
     masks = decision.shared.leave_out
-    orders = [_order_bytes(node, *both) for node, *both in zip(sending, masks, decision.worth, strict=True)]
+    orders = [
+        _order_bytes(node, mask, worth)
+        for node, mask, worth in zip(sending, masks, decision.worth, strict=True)
+    ]
     return [one + other for one, other in zip(request_bytes(masks), orders, strict=True)]
 
 

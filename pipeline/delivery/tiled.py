@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from packetmesh.errors import InputError
 from pipeline.delivery.coding import Images, Received, areas_of
 from pipeline.delivery.protected import protect, unprotect
-from pipeline.types import BoolArray, ByteArray
+from pipeline.types import BoolArray, ByteArray, IntArray
 
 TILE = 32
 """Side of a depth tile in pixels."""
@@ -88,7 +88,7 @@ class Tiled:
         pieces: Pieces,
         packet_bytes: int,
         leave_out: BoolArray | None = None,
-        depth_order: NDArray[np.int64] | None = None,
+        depth_order: IntArray | None = None,
     ) -> bytes:
         """Join tiles to the bytes of a frame, as ``Coding.encode`` returns them.
 
@@ -110,7 +110,7 @@ class Tiled:
         shape: tuple[int, int],
         packet_bytes: int,
         leave_out: BoolArray | None = None,
-        depth_order: NDArray[np.int64] | None = None,
+        depth_order: IntArray | None = None,
     ) -> Received:
         """Decode as ``Coding.decode``; an incomplete depth tile gives the depths before its first gap.
 
@@ -164,7 +164,7 @@ class Tiled:
         return received
 
 
-def _order(depth_count: int, color_count: int, depth_order: NDArray[np.int64] | None) -> NDArray[np.int64]:
+def _order(depth_count: int, color_count: int, depth_order: IntArray | None) -> NDArray[np.int64]:
     """Return all tiles in order of sending, depth before colour."""
     depth = own_order(depth_count) if depth_order is None else depth_order
     return np.concatenate([depth, depth_count + own_order(color_count)])
