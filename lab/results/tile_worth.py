@@ -18,7 +18,7 @@ def tile_worth(numbers: Row) -> str:
         "its bytes are those of `exact`. *kB*: all nodes' images until then, the base layers with them; "
         "*of own*: of each rig's kB in the coding's own order. Seconds and joules of the nodes are those of "
         "the network model until the sink has as many bytes, lost packets being sent again: over five seeds, "
-        "losses in bursts of eight packets. *With colour*: rigs that needed their colour images as well, which "
+        "losses in bursts of eight packets. *With colour*: rigs that need colour images too; they "
         "count with all bytes. By worth, the nodes wait for the request, and for the second in "
         "which the sink computes it. In brackets the 95 % interval over rigs.",
         *(_first(entry) for entry in numbers["first"]),
