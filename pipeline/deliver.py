@@ -17,6 +17,7 @@ from packetmesh.batch import process_pool
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import drain
 from pipeline.config import PRESETS, PipelineConfig
+from pipeline.delivery.leaving_out import Order
 from pipeline.delivery.moments import Moment, Rebuilder, lossless_spec, spec_of
 from pipeline.delivery.sending import DeliverySpec, Sending, frames_at_sink, received_at, send
 from pipeline.delivery.sink import heard
@@ -46,6 +47,7 @@ def deliver(
     moments: int = 40,
     config: PipelineConfig = PRESETS["packetmesh"],
     leave_out_seen: bool = False,
+    order: Order = "own",
 ) -> Delivery:
     """Send a rig's images through a network and rebuild the scene from what has arrived at each moment.
 
@@ -57,6 +59,9 @@ def deliver(
         config: settings of the reconstruction.
         leave_out_seen: whether every node first sends a coarse image, and then leaves out the tiles of which
             the sink tells it that another camera shows them; with the coding ``exact`` and two nodes or more.
+        order: ``own`` sends the tiles in the order of the coding; with ``worth``, for the coding ``exact``,
+            every node first sends a coarse image, by which the sink requests its depth tiles in the order
+            in which they add most to the surface.
 
     Returns:
         The moments in order of time, with surfaces in metres, times in seconds and energies in joules.
@@ -72,9 +77,8 @@ def deliver(
     [False, True]
     """
     spec = Spec(LoadedRig(rig), config=config)
-    return drain(
-        iterate_delivery(DeliverySpec(spec, network, coding, moments, leave_out_seen=leave_out_seen))
-    )
+    sent = DeliverySpec(spec, network, coding, moments, leave_out_seen=leave_out_seen, order=order)
+    return drain(iterate_delivery(sent))
 
 
 def iterate_delivery(

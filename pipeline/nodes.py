@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from threading import Lock
 from typing import Any, TypeVar
@@ -13,8 +13,8 @@ from weakref import finalize
 
 import numpy as np
 
-from pipeline.acquisition import Acquired, FilterResult, back_project
-from pipeline.config import DepthConfig, FusionMode, RegistrationConfig
+from pipeline.acquisition import Acquired, FilterResult, acquire, back_project
+from pipeline.config import AcquisitionConfig, DepthConfig, FusionMode, RegistrationConfig
 from pipeline.depth import AlignmentResult, DepthNetwork, JudgedDepth, align_depth, completed_by, judge
 from pipeline.kernels.masks import near
 from pipeline.kernels.straight_view import bends_strongly, bent_depth, straight_image, straight_view
@@ -168,6 +168,19 @@ def prepare_node(
         result = register(cloud, acquired.cloud(frame).kept, registration)
         cloud = cloud.transformed(result.T_target_source)
     return node(cloud, result, mode)
+
+
+def with_coarse_depth(
+    frame: RgbdFrame, node: NodeClouds, acquisition: AcquisitionConfig
+) -> tuple[RgbdFrame, NodeClouds]:
+    """Return a frame and its node for registration: coarse depth that arrived counts as measured.
+
+    A few tiles do not determine a pose; their base layer does (SPEC 13.3).
+    """
+    if frame.coarse is None:
+        return frame, node
+    whole = replace(frame, depth=_guide(frame), coarse=None)
+    return whole, replace(node, frame=whole, acquired=acquire(whole, acquisition))
 
 
 def _guide(frame: RgbdFrame) -> DepthMap:

@@ -80,7 +80,12 @@ NEEDS: dict[StageName, Needs] = {
         ("rig", "inferred", "outliers"),
     ),
     "placement": Needs(
-        lambda spec: (spec.config.node_registration, spec.config.fusion.align_nodes_with), ("rig", "nodes")
+        lambda spec: (
+            spec.config.node_registration,
+            spec.config.fusion.align_nodes_with,
+            spec.config.acquisition,
+        ),
+        ("rig", "nodes"),
     ),
     "fused": Needs(
         lambda spec: (

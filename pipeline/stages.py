@@ -38,6 +38,7 @@ from pipeline.nodes import (
     infer_depth,
     nothing_inferred,
     prepare_node,
+    with_coarse_depth,
 )
 from pipeline.placement.outcome import Placement, whole_placement
 from pipeline.placement.pairwise import place_nodes
@@ -212,13 +213,20 @@ def _side_by_side(
 
 
 def register_nodes(
-    config: RegistrationConfig, align_with: NodePoints, rig: Rig, nodes: tuple[NodeClouds, ...]
+    config: RegistrationConfig,
+    align_with: NodePoints,
+    acquisition: AcquisitionConfig,
+    rig: Rig,
+    nodes: tuple[NodeClouds, ...],
 ) -> Steps[Placement]:
-    """Register the nodes to one another; those of a recording are at their final poses."""
+    """Register the nodes to one another, with the coarse depth of tiles that have not arrived; those of a
+    recording are at their final poses.
+    """
     yield Progress("registering the nodes", 0.45)
     if rig.walk is not None:
         return place_walked(rig.frames, nodes)
-    return place_nodes(rig.frames, nodes, config, align_with)
+    whole = [with_coarse_depth(*both, acquisition) for both in zip(rig.frames, nodes, strict=True)]
+    return place_nodes([frame for frame, _ in whole], [node for _, node in whole], config, align_with)
 
 
 def fused_cloud(

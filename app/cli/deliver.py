@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from app.cli.options import Images, PresetName, Settings
 from app.cli.text import print_json, say, say_progress
@@ -27,6 +27,7 @@ def deliver(
     link_trace: Path | None = None,
     down: tuple[str, ...] = (),
     leave_out_seen: bool = False,
+    order: Literal["own", "worth"] = "own",
     every_radio: bool = False,
     chain: PresetName = "packetmesh",
     set: Settings = (),
@@ -47,6 +48,8 @@ def deliver(
         down: Names of nodes that have failed and send nothing, for example node_02.
         leave_out_seen: Leave out tiles that another camera shows. Every node first sends a coarse image; by
             these the sink tells each node its tiles. Needs the coding exact and two cameras.
+        order: Order of the depth tiles: the coding's own, or by what they add to the surface: every node
+            first sends a coarse image, by which the sink requests them. Needs the coding exact.
         every_radio: Send the images by every radio, each in a network of its own, and print what each needs
             for the surface; `--preset` and `--link-trace` then have no effect, and only every_radio.json
             is written. It takes minutes; fewer `--moments` are quicker.
@@ -68,6 +71,7 @@ def deliver(
     from pipeline.folders.delivery import (
         delivery_metrics,
         left_out_sentences,
+        ordered_sentences,
         summary,
         write_delivery_folder,
     )
@@ -82,12 +86,15 @@ def deliver(
             say("--link-trace changes nothing here: --every-radio takes every radio")
         if leave_out_seen:
             say("--leave-out-seen changes nothing here: --every-radio sends all tiles")
+        if order != "own":
+            say("--order changes nothing here: --every-radio sends the tiles in the coding's own order")
         compare_radios(Spec(source, chain, config), coding, moments, down, of_network, out, json)
         return
     if link_trace is not None:
         network = _with_link(network, link_trace, of_network)
     say_network(network, before, preset, of_network, {})
-    delivery_spec = DeliverySpec(Spec(source, chain, config), network, coding, moments, down, leave_out_seen)
+    chain_spec = Spec(source, chain, config)
+    delivery_spec = DeliverySpec(chain_spec, network, coding, moments, down, leave_out_seen, order)
     cache = RunCache()
     drain(compute(delivery_spec.spec, "rig", cache), say_progress)
     steps = iterate_delivery(delivery_spec, min(2, os.cpu_count() or 1), cache)
@@ -101,7 +108,7 @@ def deliver(
     page = write_hand_out(delivery, out)
     write_delivery_folder(delivery, metrics, preset, out)
     say(f"100%  {summary(delivery)}; see {page}")
-    for sentence in left_out_sentences(delivery.sending):
+    for sentence in (*left_out_sentences(delivery.sending), *ordered_sentences(delivery.sending)):
         say(sentence)
     for note in (*imported_notes(report), *delivery.sending.rig.notes):
         say(note)

@@ -17,6 +17,7 @@ from lab.results import (
     planning,
     recordings,
     tables,
+    tile_worth,
     verdicts,
 )
 from lab.results.markdown import Row, listed, percent
@@ -65,6 +66,7 @@ SECTIONS: dict[str, tuple[str, Callable[[Row], str]]] = {
     "delivery_claims": ("What a lost packet costs: ours, beyond the thesis", tables.our_claims),
     "bench_codings": ("Bytes of a camera's images", codings.codings),
     "between_cameras": ("Tiles that another camera shows", between_cameras.between_cameras),
+    "tile_worth": ("The order of tiles that the sink requests", tile_worth.tile_worth),
     "setting_claims": ("Settings, and what cannot be tested", tables.claims),
     "ns3_saturation": ("The camera network: throughput beside ns-3", tables.ns3_throughput),
 }

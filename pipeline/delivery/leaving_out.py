@@ -1,13 +1,15 @@
-"""A delivery in which the sink tells each node the tiles that another camera has shown (SPEC 13.2).
+"""A delivery in which the sink requests the nodes' tiles by their base layers (SPEC 13.2, 13.3).
 
-Every node first sends its base layer. When the sink has those of all nodes, it registers the cameras by them,
-chooses the tiles that are left out, and sends each node one bit a tile; the node then sends the others.
+Every node first sends its base layer. When the sink has those of all nodes, it registers the cameras by them
+and finds the tiles that another camera shows. It sends each node one bit a tile for those that are left out,
+or the order of the tiles by what they add to the surface, or both; the node then sends them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -27,10 +29,13 @@ from pipeline.delivery.plan import network_of
 from pipeline.delivery.protected import MOST_UNIT_BYTES, first_bytes
 from pipeline.delivery.shared_views import SharedViews, request_bytes, shared_views
 from pipeline.delivery.sink import images_of, units_per_m
-from pipeline.delivery.tiled import TILE, Pieces, Tiled
+from pipeline.delivery.tiled import TILE, Pieces, Tiled, own_order
+from pipeline.delivery.worth import Worth, order_by_worth, order_bytes
 from pipeline.types import BoolArray, ByteArray, IntArray, Rig
 
 ONLY_CODING = "exact"
+Order = Literal["own", "worth"]
+"""Order of a node's depth tiles: that of the coding, or that of ``worth``, which the sink requests."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +68,20 @@ class LeftOut:
 
 
 @dataclass(frozen=True, slots=True)
+class Ordered:
+    """The order of depth tiles that the sink requested of a rig's nodes, and how it was decided."""
+
+    worth: tuple[Worth | None, ...]
+    """Of each node; None if its base layer was late or lost: it sends its tiles in the coding's own order."""
+    request_bytes: tuple[int, ...]
+    """Bytes of the order in the sink's request to each node, without headers."""
+    requested_s: float | None
+    """Time of these requests; None if the sink has sent none, because nothing arrived."""
+    answered: tuple[bool, ...]
+    """Whether a node has received its request; without it, it has sent its base layer only."""
+
+
+@dataclass(frozen=True, slots=True)
 class Sender:
     """A node that sends, as the sink and the node themselves know it."""
 
@@ -75,10 +94,13 @@ class Sender:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What the sink requests, by the senders' base layers that it has."""
+    """What the sink decides, by the senders' base layers that it has."""
 
     shared: SharedViews
+    """The tiles that other cameras show, whether or not they are left out."""
     placed: tuple[bool, ...]
+    worth: tuple[Worth | None, ...]
+    """Order of each sender's tiles; None if its base layer is not there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,37 +110,55 @@ class Sent:
     streams: tuple[bytes, ...]
     """Of each node of the rig."""
     trace: NetworkTrace
-    left_out: LeftOut
+    left_out: LeftOut | None
+    """None if all tiles are sent."""
+    ordered: Ordered | None
+    """None if they are sent in the coding's own order."""
 
 
-def check_can_leave_out(coding: str, network: NetworkConfig) -> None:
-    """Check that a coding has tiles that can be left out, and that the sink can send nodes its request.
+def check_can_request(coding: str, network: NetworkConfig, leave_out_seen: bool) -> None:
+    """Check that a coding has tiles that can be requested, and that the sink can send nodes its request.
+
+    Args:
+        coding: name of the coding.
+        network: the network.
+        leave_out_seen: whether tiles are to be left out, or only to be put into another order.
 
     Raises:
         InputError: one of them does not allow it.
     """
     if coding != ONLY_CODING:
-        raise InputError(
-            f"Tiles that another camera showed can be left out of the coding {ONLY_CODING} only, not of "
-            f"{coding}; try --coding {ONLY_CODING}"
+        what = (
+            f"Tiles that another camera showed can be left out of the coding {ONLY_CODING} only"
+            if leave_out_seen
+            else f"The sink can request the order of tiles of the coding {ONLY_CODING} only"
         )
+        raise InputError(f"{what}, not of {coding}; try --coding {ONLY_CODING}")
     kind = network.mac.kind
     if not network.mac.reaches_nodes:
         confirmed = " with mac.ack=true" if kind == "lora" else ""
         raise InputError(
             f"Over {kind}{confirmed} the sink sends nodes no packets in this model, so it cannot tell them "
-            "which tiles to leave out; try another preset, such as thesis-link, office or greenhouse"
+            f"{'which tiles to leave out' if leave_out_seen else 'the order of their tiles'}; try another "
+            "preset, such as thesis-link, office or greenhouse"
         )
     packet_bytes = network.nodes.payload_bytes - network.nodes.header_bytes
     if packet_bytes > MOST_UNIT_BYTES:
         raise InputError(
-            f"Packets of {packet_bytes} bytes hold more than a base layer, so nothing is left to leave out; "
-            f"try nodes.payload_bytes of at most {MOST_UNIT_BYTES}"
+            f"Packets of {packet_bytes} bytes hold more than a base layer, so nothing is left to "
+            f"{'leave out' if leave_out_seen else 'request'}; try nodes.payload_bytes of at most "
+            f"{MOST_UNIT_BYTES}"
         )
 
 
-def send_without_seen(
-    rig: Rig, coding: Tiled, senders: Sequence[int], network: NetworkConfig, config: PipelineConfig
+def send_requested(
+    rig: Rig,
+    coding: Tiled,
+    senders: Sequence[int],
+    network: NetworkConfig,
+    config: PipelineConfig,
+    leave_out_seen: bool,
+    order: Order,
 ) -> Sent:
     """Encode a rig's images and run the network, with the sink's requests.
 
@@ -131,11 +171,13 @@ def send_without_seen(
         senders: indices of the nodes that send, in their order in the network.
         network: network with the positions of these nodes.
         config: settings by which the sink registers the cameras.
+        leave_out_seen: whether tiles that another camera shows are left out; else all are sent.
+        order: order of the depth tiles; with ``worth`` those that another camera shows come last.
 
     Raises:
-        InputError: fewer than two nodes send, or the network cannot be used.
+        InputError: tiles are to be left out and fewer than two nodes send, or the network cannot be used.
     """
-    if len(senders) < 2:
+    if leave_out_seen and len(senders) < 2:
         raise InputError(
             "Only one camera sends images, so no other camera can have shown its tiles; add a camera, or "
             "send all tiles"
@@ -145,28 +187,73 @@ def send_without_seen(
     sending = [nodes[node] for node in senders]
     part = Rig(rig.name, tuple(rig.frames[node] for node in senders))
     first = [first_bytes(node.pieces.base, packet_bytes) for node in sending]
-    whole = [coding.joined(node.pieces, packet_bytes) for node in nodes]
     known: Set[int] = set(range(len(sending)))
     while True:
         decision = _decision(sending, known, config)
-        masks = decision.shared.leave_out
-        requests = request_bytes(masks)
+        if not leave_out_seen:
+            decision = replace(decision, shared=_nothing_of(decision.shared))
+        if order == "own":
+            decision = replace(decision, worth=(None,) * len(sending))
         streams = [
-            coding.joined(node.pieces, packet_bytes, tiles_of(mask, node.images.depth.shape, coding))
-            for node, mask in zip(sending, masks, strict=True)
+            _stream(node, coding, packet_bytes, mask, worth)
+            for node, mask, worth in zip(sending, decision.shared.leave_out, decision.worth, strict=True)
         ]
-        sizes = [len(stream) for stream in streams]
-        trace = simulate(network_of(part, sizes, network, first, requests))
+        trace = simulate(
+            network_of(part, [len(stream) for stream in streams], network, first, _sizes(sending, decision))
+        )
         asked = requested(trace)
         had = {node for node in known if asked.first_arrived[node]}
         if had == known:
             break
         known = had
+    whole = [coding.joined(node.pieces, packet_bytes) for node in nodes]
     all_streams = list(whole)
     for node, stream in zip(senders, streams, strict=True):
         all_streams[node] = stream
     saved = [len(one) - len(other) for one, other in zip(whole, all_streams, strict=True)]
-    return Sent(tuple(all_streams), trace, _left_out(nodes, senders, whole, saved, asked, decision))
+    return Sent(
+        tuple(all_streams),
+        trace,
+        _left_out(nodes, senders, whole, saved, asked, decision) if leave_out_seen else None,
+        _ordered(nodes, senders, asked, decision) if order == "worth" else None,
+    )
+
+
+def _nothing_of(shared: SharedViews) -> SharedViews:
+    """Return the record of no tile left out."""
+    return SharedViews(
+        tuple(np.zeros_like(mask) for mask in shared.leave_out), np.zeros_like(shared.shown_by)
+    )
+
+
+def _stream(
+    node: Sender, coding: Tiled, packet_bytes: int, leave_out: BoolArray, worth: Worth | None
+) -> bytes:
+    missing = tiles_of(leave_out, node.images.depth.shape, coding)
+    return coding.joined(node.pieces, packet_bytes, missing, None if worth is None else worth.order)
+
+
+def _sizes(sending: Sequence[Sender], decision: Decision) -> list[int]:
+    """Return the bytes of the request to each sender."""
+    masks = decision.shared.leave_out
+    orders = [
+        _order_bytes(node, mask, worth)
+        for node, mask, worth in zip(sending, masks, decision.worth, strict=True)
+    ]
+    return [one + other for one, other in zip(request_bytes(masks), orders, strict=True)]
+
+
+def _order_bytes(node: Sender, leave_out: BoolArray, worth: Worth | None) -> int:
+    """Return the bytes of the order of the tiles that a node sends, without those that have no bytes."""
+    if worth is None:
+        return 0
+    return order_bytes(int((~leave_out & (_tile_bytes(node) > 0)).sum()))
+
+
+def _tile_bytes(node: Sender) -> IntArray:
+    """Return (rows, columns) the bytes of a node's depth tiles, which its protected part lists."""
+    sizes = np.array([len(tile) for tile in node.pieces.depth])
+    return sizes.reshape(grid_of(node.images.depth.shape, TILE))
 
 
 def tiles_of(mask: BoolArray, shape: tuple[int, ...], coding: Tiled) -> BoolArray:
@@ -182,7 +269,7 @@ def _sender(rig: Rig, coding: Tiled, node: int) -> Sender:
 
 
 def _decision(sending: Sequence[Sender], known: Set[int], config: PipelineConfig) -> Decision:
-    """Choose the tiles to leave out among the senders whose base layers the sink has."""
+    """Find the tiles that other cameras show and order all tiles, by the base layers that the sink has."""
     masks = [np.zeros(grid_of(node.images.depth.shape, TILE), np.bool_) for node in sending]
     shown_by = np.zeros((len(sending), len(sending)), np.int64)
     placed = _placed([sending[node] for node in sorted(known)], config)
@@ -193,7 +280,14 @@ def _decision(sending: Sequence[Sender], known: Set[int], config: PipelineConfig
             masks[node] = shared.leave_out[row]
             shown_by[node, [other for other, _ in usable]] = shared.shown_by[row]
     found = {node for node, _ in usable}
-    return Decision(SharedViews(tuple(masks), shown_by), tuple(node in found for node in range(len(sending))))
+    worth = [
+        order_by_worth(node.view, _tile_bytes(node), own_order(len(node.pieces.depth)), mask)
+        if index in known
+        else None
+        for index, (node, mask) in enumerate(zip(sending, masks, strict=True))
+    ]
+    placed_too = tuple(node in found for node in range(len(sending)))
+    return Decision(SharedViews(tuple(masks), shown_by), placed_too, tuple(worth))
 
 
 def _placed(nodes: Sequence[Sender], config: PipelineConfig) -> list[BaseView | None]:
@@ -246,4 +340,22 @@ def _left_out(
         placed=of_all(decision.placed),
         answered=of_all(asked.answered),
         shown_by=shown_by,
+    )
+
+
+def _ordered(
+    nodes: Sequence[Sender], senders: Sequence[int], asked: Requested, decision: Decision
+) -> Ordered:
+    """Return the orders of all nodes of the rig; ``asked`` and ``decision`` are of those that send."""
+    row = {node: index for index, node in enumerate(senders)}
+    sent = [row.get(node) for node in range(len(nodes))]
+    masks = decision.shared.leave_out
+    return Ordered(
+        worth=tuple(None if index is None else decision.worth[index] for index in sent),
+        request_bytes=tuple(
+            0 if index is None else _order_bytes(node, masks[index], decision.worth[index])
+            for node, index in zip(nodes, sent, strict=True)
+        ),
+        requested_s=None if asked.requested_ns is None else to_s(asked.requested_ns),
+        answered=tuple(index is not None and asked.answered[index] for index in sent),
     )

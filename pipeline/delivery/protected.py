@@ -80,6 +80,24 @@ def first_bytes(base: bytes, packet_bytes: int) -> int:
     return -(-len(base) // _symbol_bytes(unit)) * unit
 
 
+def ends_in_stream(
+    base: bytes, stream_bytes: int, packet_bytes: int, repair_every: int, body_bytes: int
+) -> int:
+    """Return the bytes of a stream of ``protect`` until the first bytes of its body are sent.
+
+    Args:
+        base: as in ``protect``.
+        stream_bytes: bytes of the stream.
+        packet_bytes: as in ``protect``.
+        repair_every: as in ``protect``.
+        body_bytes: number of bytes of the body, at least one.
+    """
+    unit = _unit_bytes(packet_bytes)
+    source_count = -(-len(base) // _symbol_bytes(unit))
+    of_body = np.flatnonzero(~_of_base(source_count, stream_bytes // unit, repair_every))
+    return int(of_body[(body_bytes - 1) // unit] + 1) * unit
+
+
 def unprotect(data: ByteArray, arrived: BoolArray, packet_bytes: int, repair_every: int) -> Unprotected:
     """Recover the base and the received part of the body from a stream of ``protect``.
 

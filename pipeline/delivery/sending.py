@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,14 @@ from network_sim.trace.log import NetworkTrace
 from packetmesh.errors import InputError
 from pipeline.delivery import coding_named
 from pipeline.delivery.coding import Coding, Received
-from pipeline.delivery.leaving_out import LeftOut, check_can_leave_out, send_without_seen, tiles_of
+from pipeline.delivery.leaving_out import (
+    LeftOut,
+    Order,
+    Ordered,
+    check_can_request,
+    send_requested,
+    tiles_of,
+)
 from pipeline.delivery.plan import network_of, placed
 from pipeline.delivery.sink import frame_at_sink, images_of
 from pipeline.delivery.tiled import Tiled
@@ -40,13 +48,24 @@ class DeliverySpec:
     """Names of failed nodes, which send nothing."""
     leave_out_seen: bool = False
     """Whether nodes leave out tiles that another camera shows, which the sink tells them."""
+    order: Order = "own"
+    """Order of the depth tiles: the coding's own, or that of their worth, which the sink requests."""
+
+    @property
+    def requests(self) -> bool:
+        """Whether the sink requests what follows the base layers."""
+        return self.leave_out_seen or self.order == "worth"
 
     def __post_init__(self) -> None:
         if self.moments < 1:
             raise InputError(f"{self.moments} moments show nothing; try at least 1")
-        if self.leave_out_seen:
+        if self.order not in get_args(Order):
+            raise InputError(
+                f"There is no order '{self.order}' of tiles; try one of {', '.join(get_args(Order))}"
+            )
+        if self.requests:
             coding_named(self.coding)
-            check_can_leave_out(self.coding, self.network)
+            check_can_request(self.coding, self.network, self.leave_out_seen)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +84,9 @@ class Sending:
     spent: Spent
     """(M,) bytes, losses and energy until each moment."""
     left_out: LeftOut | None = None
-    """Tiles that were not sent because another camera shows them; None if nodes send all without asking."""
+    """Tiles that were not sent because another camera shows them; None if nodes send all."""
+    ordered: Ordered | None = None
+    """Order of the depth tiles that the sink requested; None if they are sent in the coding's own order."""
 
     @property
     def packet_bytes(self) -> int:
@@ -76,10 +97,12 @@ class Sending:
         """Decode a node's images from the bytes of its stream that are ``there`` (S,)."""
         data, shape = np.where(there, self.streams[node], 0), self.rig.frames[node].rgb.shape
         size = shape[0], shape[1]
-        if self.left_out is None or not isinstance(self.coding, Tiled):
+        if not isinstance(self.coding, Tiled):
             return self.coding.decode(data, there, size, self.packet_bytes)
-        missing = tiles_of(self.left_out.tiles[node], size, self.coding)
-        return self.coding.decode(data, there, size, self.packet_bytes, missing)
+        missing = None if self.left_out is None else tiles_of(self.left_out.tiles[node], size, self.coding)
+        worth = None if self.ordered is None else self.ordered.worth[node]
+        order = None if worth is None else worth.order
+        return self.coding.decode(data, there, size, self.packet_bytes, missing, order)
 
 
 def send(spec: DeliverySpec, rig: Rig) -> Sending:
@@ -94,11 +117,12 @@ def send(spec: DeliverySpec, rig: Rig) -> Sending:
     """
     coding = coding_named(spec.coding)
     packet_bytes = packet_bytes_of(spec.network)
-    senders, left_out = senders_of(rig, spec.down), None
+    senders, left_out, ordered = senders_of(rig, spec.down), None, None
     network = placed(rig, spec.network, senders)
-    if spec.leave_out_seen and isinstance(coding, Tiled):
-        sent = send_without_seen(rig, coding, senders, network, spec.spec.config)
-        encoded, trace, left_out = sent.streams, sent.trace, sent.left_out
+    if spec.requests and isinstance(coding, Tiled):
+        config = spec.spec.config
+        sent = send_requested(rig, coding, senders, network, config, spec.leave_out_seen, spec.order)
+        encoded, trace, left_out, ordered = sent.streams, sent.trace, sent.left_out, sent.ordered
     else:
         encoded = tuple(coding.encode(images_of(frame), packet_bytes) for frame in rig.frames)
         part = Rig(rig.name, tuple(rig.frames[node] for node in senders))
@@ -107,7 +131,8 @@ def send(spec: DeliverySpec, rig: Rig) -> Sending:
     came = arrivals(trace)
     came = replace(came, node=np.array(senders)[came.node])
     times_ns = moment_times_ns(came, trace, spec.moments)
-    return Sending(spec, rig, coding, streams, trace, came, times_ns, until(trace, times_ns), left_out)
+    spent = until(trace, times_ns)
+    return Sending(spec, rig, coding, streams, trace, came, times_ns, spent, left_out, ordered)
 
 
 def senders_of(rig: Rig, down: Sequence[str]) -> list[int]:

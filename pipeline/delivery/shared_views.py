@@ -191,17 +191,18 @@ def _density(view: BaseView, away_m: FloatArray, normals: FloatArray) -> FloatAr
 def _candidates(view: BaseView, of_block: IntArray, limits: Limits) -> BoolArray:
     """Return the tiles with base points, enough of them with a normal, few missing blocks and few edges."""
     known = np.isfinite(view.z_m)
-    few_missing = _count(~known) <= limits.missing_blocks
-    few_edges = _count(at_edges(view.z_m)) <= limits.edge_blocks
-    least = limits.shared * _count(known)
-    return np.asarray(few_missing & few_edges & (least > 0) & (_count(of_block >= 0) >= least))
+    few_missing = tile_sums(~known) <= limits.missing_blocks
+    few_edges = tile_sums(at_edges(view.z_m)) <= limits.edge_blocks
+    least = limits.shared * tile_sums(known)
+    return np.asarray(few_missing & few_edges & (least > 0) & (tile_sums(of_block >= 0) >= least))
 
 
-def _count(blocks: BoolArray) -> IntArray:
-    """Return the number of marked blocks in each tile."""
+def tile_sums(blocks: BoolArray | FloatArray) -> FloatArray:
+    """Return (rows, columns) the sum over the (h, w) blocks of each tile: of marks, their number."""
     rows, columns = (-(-size // _BLOCKS) for size in blocks.shape)
     padding = ((0, rows * _BLOCKS - blocks.shape[0]), (0, columns * _BLOCKS - blocks.shape[1]))
-    return np.pad(blocks, padding).reshape(rows, _BLOCKS, columns, _BLOCKS).sum(axis=(1, 3))
+    padded = np.pad(np.asarray(blocks, np.float64), padding)
+    return np.asarray(padded.reshape(rows, _BLOCKS, columns, _BLOCKS).sum(axis=(1, 3)))
 
 
 def _replacements(

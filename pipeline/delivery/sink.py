@@ -15,7 +15,9 @@ UNITS_PER_M = (1000.0, 5000.0, 10_000.0, 256.0, 100.0)
 """Units per metre of depth cameras: the first that represents all depths of an image exactly is used."""
 MOST_UNITS = np.iinfo(np.uint16).max
 LEAST_DEPTH_SHARE = 0.02
-"""Least share of pixels with depth for a node to be used."""
+"""Least share of pixels with depth, measured or coarse, for a node to be used."""
+LEAST_MEASURED_SHARE = 0.003
+"""Least share of pixels with measured depth for a node to be used: a tile in an image of 640 x 480."""
 
 
 def units_per_m(depth: DepthMap) -> float:
@@ -64,8 +66,12 @@ def frame_at_sink(frame: RgbdFrame, received: Received) -> RgbdFrame:
 
 
 def heard(frame: RgbdFrame) -> bool:
-    """Return whether enough of a frame's depth has arrived to place its points."""
-    return frame.depth.coverage >= LEAST_DEPTH_SHARE
+    """Return whether enough of a frame's depth has arrived to place its points.
+
+    Coarse depth places them, too, but a surface needs points that were measured.
+    """
+    known = frame.depth.valid if frame.coarse is None else frame.depth.valid | frame.coarse.valid
+    return frame.depth.coverage >= LEAST_MEASURED_SHARE and float(known.mean()) >= LEAST_DEPTH_SHARE
 
 
 def _depth_map(counts: DepthArray, units: float) -> DepthMap:

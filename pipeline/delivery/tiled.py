@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from packetmesh.errors import InputError
 from pipeline.delivery.coding import Images, Received, areas_of
 from pipeline.delivery.protected import protect, unprotect
-from pipeline.types import BoolArray, ByteArray
+from pipeline.types import BoolArray, ByteArray, IntArray
 
 TILE = 32
 """Side of a depth tile in pixels."""
@@ -83,16 +83,23 @@ class Tiled:
         base += zlib.crc32(base).to_bytes(_CHECK_BYTES, "big")
         return Pieces(base, tuple(streams[: len(areas)]), tuple(streams[len(areas) :]))
 
-    def joined(self, pieces: Pieces, packet_bytes: int, leave_out: BoolArray | None = None) -> bytes:
+    def joined(
+        self,
+        pieces: Pieces,
+        packet_bytes: int,
+        leave_out: BoolArray | None = None,
+        depth_order: IntArray | None = None,
+    ) -> bytes:
         """Join tiles to the bytes of a frame, as ``Coding.encode`` returns them.
 
         Args:
             pieces: the tiles.
             packet_bytes: as in ``encode``.
             leave_out: (T,) True for tiles that are not sent, depth before colour; None sends all.
+            depth_order: the depth tiles in order of sending; None takes ``own_order``.
         """
         streams = [*pieces.depth, *pieces.color]
-        order = _order(len(pieces.depth), len(pieces.color))
+        order = _order(len(pieces.depth), len(pieces.color), depth_order)
         body = b"".join(streams[index] for index in order if leave_out is None or not leave_out[index])
         return protect(pieces.base, body, packet_bytes, self.repair_every)
 
@@ -103,12 +110,14 @@ class Tiled:
         shape: tuple[int, int],
         packet_bytes: int,
         leave_out: BoolArray | None = None,
+        depth_order: IntArray | None = None,
     ) -> Received:
         """Decode as ``Coding.decode``; an incomplete depth tile gives the depths before its first gap.
 
         Bytes that are damaged, or another tile's, are noticed in the protected part, and in 255 of 256 tiles
         that are whole; they count as lost. The first bytes of a tile that is cut have no check. Of a tile
-        that the node leaves out, as in ``joined``, there is what the base layer has.
+        that the node leaves out, there is what the base layer has; ``leave_out`` and ``depth_order`` are as
+        in ``joined``.
 
         Raises:
             InputError: the depths are of another version of the coding.
@@ -136,7 +145,7 @@ class Tiled:
                 received.coarse[area] = 0
         if leave_out is not None:
             lengths = np.where(leave_out, 0, lengths).astype(np.uint16)
-        order = _order(len(areas), len(color_areas))
+        order = _order(len(areas), len(color_areas), depth_order)
         for index, stream in _streams(parts.body, parts.arrived, lengths, order):
             whole = stream.size == lengths[index]
             if whole and not _is_sealed(stream, index):
@@ -155,12 +164,14 @@ class Tiled:
         return received
 
 
-def _order(depth_count: int, color_count: int) -> NDArray[np.int64]:
-    """Return all tiles in order of sending, depth before colour, each in steps of the golden section."""
-    return np.concatenate([_spread(depth_count), depth_count + _spread(color_count)])
+def _order(depth_count: int, color_count: int, depth_order: IntArray | None) -> NDArray[np.int64]:
+    """Return all tiles in order of sending, depth before colour."""
+    depth = own_order(depth_count) if depth_order is None else depth_order
+    return np.concatenate([depth, depth_count + own_order(color_count)])
 
 
-def _spread(count: int) -> NDArray[np.int64]:
+def own_order(count: int) -> NDArray[np.int64]:
+    """Return a number of tiles in the coding's own order, in steps of the golden section."""
     step = round(0.382 * count) or 1
     while np.gcd(step, count) != 1:
         step += 1

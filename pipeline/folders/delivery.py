@@ -6,12 +6,15 @@ import csv
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from packetmesh.files import atomic_path, write_json
 from packetmesh.settings import settings
 from pipeline.deliver import Delivery
-from pipeline.delivery.leaving_out import LeftOut
+from pipeline.delivery.leaving_out import LeftOut, Ordered
 from pipeline.delivery.moments import Moment, NodeArrival
 from pipeline.delivery.sending import Sending
+from pipeline.delivery.worth import Worth
 from pipeline.folders.run import (
     METRICS,
     MOMENTS,
@@ -31,7 +34,7 @@ def delivery_metrics(delivery: Delivery) -> dict[str, Any]:
         | {"f_score_5cm": _f_score(lossless.truth_after), "bytes": raw_bytes(delivery)},
         "bytes": sum(len(stream) for stream in delivery.sending.streams),
         "packet_bytes": delivery.sending.packet_bytes,
-    } | _left_out(delivery.sending)
+    } | (_left_out(delivery.sending) | _ordered(delivery.sending))
 
 
 def raw_bytes(delivery: Delivery) -> int:
@@ -54,6 +57,7 @@ def write_delivery_folder(delivery: Delivery, metrics: dict[str, Any], preset: s
         config_of(spec.spec)
         | {"coding": spec.coding, "moments": spec.moments, "network": preset}
         | ({"leave_out_seen": True} if spec.leave_out_seen else {})
+        | ({} if spec.order == "own" else {"order": spec.order})
         | {"network_settings": settings(delivery.sending.trace.config)}
     )
     _write_table(delivery.moments, folder / MOMENTS)
@@ -95,6 +99,38 @@ def left_out_sentences(sending: Sending) -> list[str]:
         if name not in sending.spec.down:
             sentences.append(f"{name}: {_left_out_of(left_out, node, names)}")
     return sentences
+
+
+def ordered_sentences(sending: Sending) -> list[str]:
+    """Describe the order in which the sink requested each node's depth tiles; none in the coding's own."""
+    ordered = sending.ordered
+    if ordered is None:
+        return []
+    if ordered.requested_s is None:
+        return ["no base layer reached the sink, so it requested no order"]
+    sentences = [
+        "the sink requested the depth tiles that add most surface first, in "
+        f"{sum(ordered.request_bytes)} bytes after {ordered.requested_s:.3g} s"
+    ]
+    for node, frame in enumerate(sending.rig.frames):
+        if frame.name not in sending.spec.down:
+            sentences.append(f"{frame.name}: {_ordered_of(ordered, node)}")
+    return sentences
+
+
+def _ordered_of(ordered: Ordered, node: int) -> str:
+    worth = ordered.worth[node]
+    if worth is None:
+        return "its base layer was late or lost, so that it was to send its tiles in the coding's own order"
+    if not ordered.answered[node]:
+        return "the sink's request did not reach it, so that it sent no more than its base layer"
+    return f"{_tiles_of_half(worth)} of its {worth.area_m2.size} tiles hold half of what is to be added"
+
+
+def _tiles_of_half(worth: Worth) -> int:
+    """Return the number of tiles, those that are sent first, with half of the area that all add."""
+    added = np.cumsum(worth.area_m2.ravel()[worth.order])
+    return int(np.searchsorted(added, 0.5 * added[-1])) + 1
 
 
 def _left_out_of(left_out: LeftOut, node: int, names: list[str]) -> str:
@@ -142,6 +178,24 @@ def _left_out(sending: Sending) -> dict[str, Any]:
         ],
     }
     return {"left_out": found}
+
+
+def _ordered(sending: Sending) -> dict[str, Any]:
+    """Return the order that the sink requested; nothing if nodes send in the coding's own order."""
+    ordered = sending.ordered
+    if ordered is None:
+        return {}
+    nodes = [
+        {
+            "name": frame.name,
+            "request_bytes": ordered.request_bytes[node],
+            "answered": ordered.answered[node],
+            "tiles": None if worth is None else worth.order.tolist(),
+            "added_m2": None if worth is None else worth.area_m2.ravel()[worth.order].tolist(),
+        }
+        for node, (frame, worth) in enumerate(zip(sending.rig.frames, ordered.worth, strict=True))
+    ]
+    return {"ordered": {"by": "sink", "requested_s": ordered.requested_s, "nodes": nodes}}
 
 
 def _moment(moment: Moment) -> dict[str, Any]:
