@@ -49,7 +49,8 @@ class LookFolder:
         self._sent = 0
         self._handles = CutHandles(session.ui.scene, f"{below}/look", session.ui.post, self._dragged)
         self._mark = session.ui.gui.add_html(Markup(""))  # outside the folder, which may be closed
-        with session.ui.gui.add_folder("Look", expand_by_default=False):
+        self._folder = session.ui.gui.add_folder("Look", expand_by_default=False)
+        with self._folder:
             self._add_cut()
             self._add_drawing(surface)
         self._show()
@@ -105,6 +106,12 @@ class LookFolder:
         if self._session.spec.source != self._source:
             self._source = self._session.spec.source
             self._take(replace(self._look, cut=None))
+
+    def show(self, there: bool) -> None:
+        """Show or hide the folder, and drop the look of what is no room."""
+        self._folder.visible = there
+        if not there:
+            self._take(Look())
 
     def redraw(self) -> None:
         """Draw the handles again after the screen has cleared its drawing."""

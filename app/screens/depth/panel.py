@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import assets
+from app.compute.cuts import kept_on_ray
 from app.compute.records import DepthNode, DepthView, Sample, SceneView
 from app.compute.state import Spec, Step
 from app.drawing.clouds import add_sensor_cloud, clear
 from app.drawing.colors import INFERRED, LOSS, TARGET
 from app.lesson.files import Numbers
 from app.lesson.on_screen import ScreenLessons
+from app.looking.folder import LookFolder
 from app.screens.depth.hide import HideFolder
 from app.screens.depth.labels import COLORINGS, DRAWN, EVERYWHERE, HOLES, PICTURES
 from app.screens.depth.lesson import KIND, SHIPPED, DepthLook, numbers
@@ -26,6 +28,7 @@ from app.window.compare import CompareArea
 from app.window.controls import Controls
 from app.window.in_address import STOP, Awaited, Picked
 from app.window.panel import Panel
+from pipeline.types import FloatArray
 
 TEXT = Markdown(
     """**What you see.** Blue: points that the sensor measured. Violet: inferred points. Where the sensor
@@ -85,6 +88,8 @@ class DepthPanel(Panel):
             self._controls.append(self._fields(CONFIDENCE_CONTROLS))
             self._confidence_table = gui.add_html(Markup(""))
         self._hide = HideFolder(self.ui, self._request_filling)
+        self._looking = LookFolder(session, self.drawn_below, surface=False)
+        self.in_address["look"] = self._looking
         self._model = ModelFolder(self.ui, session.folder, self._choose_model)
         with gui.add_folder("Advanced", expand_by_default=False):
             self._drawn = gui.add_dropdown(
@@ -96,13 +101,19 @@ class DepthPanel(Panel):
             for handle in (self._drawn, self._rejected):
                 self.ui.when_changed(handle, self._draw)
             self._controls.append(self._fields(ADVANCED))
-        self.ui.when_clicked(self.drawn_below, self._hide.clicked)
+        self.ui.when_clicked(self.drawn_below, self._clicked)
+
+    def _clicked(self, origin_m: FloatArray, direction: FloatArray) -> None:
+        """Paint where a ray first meets what the cut keeps."""
+        for begin, _ in kept_on_ray(self._looking.cut, origin_m, direction)[:1]:
+            self._hide.clicked(origin_m + begin * direction, direction)
 
     def _fields(self, fields: Any) -> Controls:
         return Controls(self.ui, fields, self.session.spec.config, self.session.edit)
 
     def on_spec(self, spec: Spec) -> None:
         """Show the settings; remove depth filled under other settings, and discs painted in another scene."""
+        self._looking.on_spec()
         for controls in self._controls:
             controls.write(spec.config)
         self._model.write(spec.config.depth)
@@ -154,6 +165,7 @@ class DepthPanel(Panel):
                 if self._rejected.value:
                     add_sensor_cloud(self.scene, f"{below}/outliers", node.outliers, T, LOSS)
             self._show_canvas()
+            self._looking.redraw()
 
     def _inferred(self, node: DepthNode) -> tuple[Sample, tuple[int, int, int] | None] | None:
         """Return the inferred points to draw and their colour (None: each its own); None to draw none."""

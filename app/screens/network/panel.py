@@ -11,9 +11,9 @@ from app.compute.state import Spec, Step
 from app.dock.dock import Dock
 from app.drawing.cameras import turn
 from app.drawing.clouds import clear
-from app.drawing.timeline import Lane
 from app.lesson.files import Numbers
 from app.lesson.on_screen import ScreenLessons
+from app.looking.folder import LookFolder
 from app.screens.network.delivery_draw import DeliveryDrawing
 from app.screens.network.delivery_numbers import (
     changes,
@@ -91,19 +91,19 @@ class NetworkPanel(Panel):
         self._table = gui.add_html(Markup(""))
         with gui.add_folder("What if"):
             self._setup.add_what_if(f"{self.drawn_below}/what-if")
-        setup = self._setup
-        plan = f"{self.drawn_below}/plan"
+        setup, plan = self._setup, f"{self.drawn_below}/plan"
         self._plan = PlanFolder(self.session, plan, setup.sent, lambda: setup.preset, self._lessons.refresh)
         self._inspector = Inspector(ui, self.session)
         self._legend = gui.add_html(Markup(""))
-        self._measures = MomentMeasures(self.session)
-        ui.when_clicked(self.drawn_below, self._measures.clicked)
+        measures = self._measures = MomentMeasures(self.session)
+        looking = self._looking = LookFolder(self.session, self.drawn_below)
+        ui.when_clicked(self.drawn_below, lambda eye_m, way: measures.clicked(eye_m, way, looking.cut))
         with gui.add_folder("All other numbers", expand_by_default=False):
             self._others = gui.add_html(Markup(""))
         with gui.add_folder("Advanced", expand_by_default=False):
             self._setup.add_advanced()
         self._dock = Dock(ui, self._moved, self._inspector.pick)
-        self.in_address |= self._lessons.in_address | {"measure": self._measures}
+        self.in_address |= self._lessons.in_address | {"measure": self._measures, "look": self._looking}
         self.in_address["plan"] = CallbackState(self._plan.place, self._plan.take)
         self.in_address["net"] = CallbackState(self._setup.place, self._take_place)
         self.in_address["t"] = CallbackState(self._moment, self._take_moment)
@@ -133,6 +133,7 @@ class NetworkPanel(Panel):
     def on_spec(self, spec: Spec) -> None:
         """Ignore partial results of other settings; another scene also drops the previous delivery."""
         self._plan.on_spec(spec)
+        self._looking.on_spec()
         if spec.source != self._source:
             self._source = spec.source
             self._before, self._other_room, self._difference.content = None, True, Markdown("")
@@ -220,6 +221,7 @@ class NetworkPanel(Panel):
         about = Markdown("{} {}").format(preset.sentence, ORIGIN)
         self._about.content = about if preset.street else Markdown("")
         self._plan.show(not preset.street)
+        self._looking.show(not preset.street)
         if preset.street:
             runs = setup.runs()
             self._labels = tuple(runs)
@@ -260,7 +262,7 @@ class NetworkPanel(Panel):
         """Show more moments of the same delivery."""
         self._delivery = view
         self._status.content = summary(view)
-        self._dock.update(self._lanes())
+        self._dock.update(lanes_of(self._delivery, self._runs, self._frames))
         if self._before is not None:
             self._difference.content = difference(self._before, view, changes(self._before, view))
         self._show_moment()
@@ -349,12 +351,9 @@ class NetworkPanel(Panel):
 
     def _load(self, start_ns: int, end_ns: int, stops: Any) -> None:
         self._framed = ()
-        self._dock.load(start_ns, end_ns, stops, self._lanes())
+        self._dock.load(start_ns, end_ns, stops, lanes_of(self._delivery, self._runs, self._frames))
         self._dock.show(self._here)
         self._moved(self._dock.now_ns)
-
-    def _lanes(self) -> list[Lane]:
-        return lanes_of(self._delivery, self._runs, self._frames)
 
     def _next_name(self) -> str:
         self._drawn += 1
@@ -363,8 +362,7 @@ class NetworkPanel(Panel):
 
     def _forget(self) -> None:
         """Show nothing, because the results belong to other settings."""
-        self._runs, self._delivery, self._drawing, self._streaming = (), None, None, False
-        self._before = None
+        self._runs, self._delivery, self._before, self._drawing, self._streaming = (), None, None, None, False
         self._setup.what_if.clear()
         self._measures.follow(None, None)
         self._inspector.load(())

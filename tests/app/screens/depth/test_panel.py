@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.compute.cuts import Plane
 from app.lesson.reading import read_lesson
+from app.looking.look import Look, text_of
 from app.screens.depth.brush import painted
 from app.screens.depth.hide import BUTTON
 from app.screens.depth.labels import COLORINGS, EVERYWHERE, FILLS, HOLES, PICTURES, UNSEEN
@@ -255,3 +257,17 @@ def test_while_another_scene_has_come_and_its_depth_has_not_the_clouds_keep_thei
         results.put("scene", session.spec.key("scene"), scene)
         results.put("depth", session.spec.key("depth"), depth)
         session.gui.set("Node", node.name)
+
+
+def test_the_brush_paints_only_what_a_cut_keeps(session, monkeypatch):
+    painted_from = []
+    monkeypatch.setattr(
+        session.panel._hide, "clicked", lambda eye_m, way: painted_from.append(eye_m.tolist())
+    )
+    look = session.panel.in_address["look"]
+    for point_m, normal in (((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)), ((-1.0, 0.0, 0.0), (-1.0, 0.0, 0.0))):
+        look.take(text_of(Look(Plane(point_m, normal))))
+        session.panel._clicked(np.zeros(3), np.array([2.0, 0.0, 0.0]))
+    look.take("")
+    session.panel._clicked(np.zeros(3), np.array([2.0, 0.0, 0.0]))
+    assert painted_from == [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]

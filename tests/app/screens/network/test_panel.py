@@ -16,6 +16,7 @@ from app.compute.state import Results, Spec
 from app.dock.dock import time_text
 from app.drawing.colors import COVERAGE_STOPS, linear
 from app.lesson.reading import read_lesson
+from app.looking.look import Look, text_of
 from app.screens.network import setup
 from app.screens.network.delivery_draw import EMPTY, FULL
 from app.screens.network.delivery_numbers import legend, moment_table
@@ -23,6 +24,7 @@ from app.screens.network.delivery_view import DeliveryView, PacketView
 from app.screens.network.draw import STREET, ground_of
 from app.screens.network.inspector import Inspector
 from app.screens.network.labels import ANSWER, CODINGS, NETWORKS, ORIGIN, PICK
+from app.screens.network.lanes import lanes_of
 from app.screens.network.lesson import CROSSING, KIND, LOST_PACKET, PLACING, NetworkLook, numbers
 from app.screens.network.packets import Frames
 from app.screens.network.panel import NetworkPanel
@@ -59,6 +61,10 @@ class Screen(Bench):
     @property
     def dock(self):
         return self.panel._dock
+
+    @property
+    def lanes(self):
+        return lanes_of(self.panel._delivery, self.panel._runs, self.panel._frames)
 
     def names(self):
         """What is drawn of the newest delivery, by the last part of its name."""
@@ -515,7 +521,10 @@ def test_a_failed_or_cancelled_delivery_says_why_and_another_runs(screen, seed, 
 
 def test_vehicles_move_and_two_schemes_stand_beside_each_other(screen):
     gui, screen.refuse = screen.gui, "not yet"
+    screen.panel.in_address["look"].take(text_of(Look(wire=True)))
     gui.set("Preset", NETWORKS["street-grid"].title)
+    assert not gui.find("Cut away").seen, "vehicles are in no room"
+    assert screen.panel.in_address["look"].place() == ""
     gui.set("Vehicles", 5)
     screen.refuse = ""
     screen.use("run.horizon_s=660")
@@ -540,10 +549,10 @@ def test_vehicles_move_and_two_schemes_stand_beside_each_other(screen):
     screen.dock.seek(run.start_ns)
     assert (screen.handle("roads").colors == linear(np.array(STREET))).mean() > 0.8
     assert "Roads, each way" in gui.text()
-    assert screen.panel._lanes()[0].labels(0)[0].text == "vehicle 1"
+    assert screen.lanes[0].labels(0)[0].text == "vehicle 1"
     gui.set("Compare with", "PDC: by chance, as offered")
     assert len(screen.results.view("network")) == 2
-    assert [lane.labels(0)[0].text for lane in screen.panel._lanes()] == [
+    assert [lane.labels(0)[0].text for lane in screen.lanes] == [
         "BASELINE · vehicle 1",
         "PDC · vehicle 1",
     ]
