@@ -137,8 +137,9 @@ def test_an_address_with_an_unknown_loop_shows_the_rest_of_its_walk(store, recor
     assert part._view.frame_at(part._dock.now_ns) == LOST[0]
     assert part._pictures.files
     assert bench.panel.in_address["loop"].place() == chosen
-    assert len(posted) == (not chosen)
-    for take, text in posted:
+    told = [call for call in posted if call != (part._draw,)]  # a slow machine draws again meanwhile
+    assert len(told) == (not chosen)
+    for take, text in told:
         with pytest.raises(InputError, match="5-7, but no loop"):
             take(text)
     server.stop()
