@@ -40,7 +40,7 @@ class PlanControls:
         self._walls = gui.add_dropdown(
             "Walls of",
             list(MATERIAL_NAMES),
-            MATERIALS["brick"],
+            initial_value=MATERIALS["brick"],
             hint="Material of the walls that are found in the surface: concrete damps the radio most, "
             "plaster least.",
         )
