@@ -6,7 +6,7 @@ from collections.abc import Generator
 from dataclasses import dataclass, replace
 
 from packetmesh.progress import Progress, drain, part
-from pipeline.planning.plan import Plan, PlanConfig, iterate_candidates
+from pipeline.planning.plan import Plan, PlanConfig, bright_only, iterate_candidates
 from pipeline.planning.radio import PlanDelivery, PlanRadio, plan_within
 from pipeline.planning.seen import SeenPlace, seen_place, without_dark
 from pipeline.planning.sensors import sensor_named
@@ -60,12 +60,12 @@ def iterate_plan(
     """Plan with a report after each batch of candidates; raises as ``plan``."""
     yield Progress("what the cameras see", 0.0)
     seen = seen_place(done)
-    if not config.dark_surface:
-        seen = without_dark(seen)
     sensor = sensor_named(config.sensor, done.rig)
     judged = yield from part(
         iterate_candidates(seen, sensor, config.where), "candidates", 0.1, 0.7, detail=True
     )
+    if not config.dark_surface:
+        judged, seen = bright_only(judged, seen), without_dark(seen)
     yield Progress("images by radio", 0.7)
     rig = registered(done)
     chosen, delivery = plan_within(rig, seen, judged, sensor, config, radio)

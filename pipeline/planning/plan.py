@@ -115,6 +115,14 @@ def iterate_candidates(
     )
 
 
+def bright_only(judged: Candidates, seen: SeenPlace) -> Candidates:
+    """Return the candidates of a place with their chances for ``without_dark(seen)``.
+
+    The candidates stay those of the whole place, so the best plan has at least the bright part of any other.
+    """
+    return replace(judged, chance=judged.chance[:, seen.targets.dark_return == 0.0])
+
+
 def plan_of(
     seen: SeenPlace, judged: Candidates, sensor: Sensor, config: PlanConfig, barred: Sequence[int] = ()
 ) -> Plan:
@@ -122,7 +130,7 @@ def plan_of(
 
     Args:
         seen: the place, ``without_dark`` if the config says so.
-        judged: its candidates, judged for the sensor.
+        judged: its candidates, judged for the sensor; ``bright_only`` if the config says so.
         sensor: the cameras' sensor.
         config: how many cameras.
         barred: rows of candidates that are not chosen, for example because no radio reaches them.

@@ -128,16 +128,16 @@ def test_a_budget_that_fewer_cameras_keep_says_so(capsys, rig_folder, planned, t
 
 
 def test_dark_surface_may_be_left_out(capsys, rig_folder, planned):
-    got = run(capsys, "plan", "--rig", rig_folder, "--cameras", 2, "--where", "walls,tripods",
-              "--no-dark-surface", "--json", *FEW)  # fmt: skip
-    record = json.loads(got.out)
+    words = ("--cameras", 2, "--where", "walls,tripods", "--no-dark-surface", "--json", *FEW)
+    _, text, err = run(capsys, "plan", "--rig", rig_folder, *words)
+    record = json.loads(text)
     assert (planned[1]["dark_surface"], record["dark_surface"]) == (True, False)
     assert record["total"]["dark_rays"] == 0.0
     assert (
         planned[1]["total"]["gain_rays"] - planned[1]["total"]["dark_rays"]
         <= record["total"]["gain_rays"] + 1e-9
     )
-    assert "is left out of this plan" in got.err
+    assert "is left out of this plan" in err
 
 
 def test_the_plan_may_place_the_sink(capsys, rig_folder):

@@ -9,7 +9,14 @@ from packetmesh.errors import InputError
 from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.planning.calls import plan
 from pipeline.planning.chances import judge
-from pipeline.planning.plan import BY_HAND, LEAST_OVERLAP, PlanConfig, moved_plan, plan_of
+from pipeline.planning.plan import (
+    BY_HAND,
+    LEAST_OVERLAP,
+    PlanConfig,
+    bright_only,
+    moved_plan,
+    plan_of,
+)
 from pipeline.planning.promise import promise
 from pipeline.planning.seen import without_dark
 from pipeline.planning.sensors import SENSORS, sensor_named
@@ -103,6 +110,15 @@ def test_dark_surface_is_left_out_of_all_targets(office):
     chance = np.linspace(0.0, 1.0, len(lit))
     both, known = promise(chance, targets), promise(chance[lit], bright)
     assert known.gain_share == pytest.approx(both.gain_share - both.dark_share)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_plan_without_dark_surface_keeps_the_bright_part_of_the_other(office, count):
+    every = plan_of(office.seen, office.judged, office.sensor, PlanConfig(cameras=count))
+    judged, config = bright_only(office.judged, office.seen), PlanConfig(cameras=count, dark_surface=False)
+    bright = plan_of(without_dark(office.seen), judged, office.sensor, config)
+    assert bright.total.dark_share == 0.0
+    assert bright.total.gain_share >= every.total.gain_share - every.total.dark_share - 1e-9
 
 
 @pytest.mark.parametrize(

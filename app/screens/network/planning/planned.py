@@ -25,7 +25,7 @@ from pipeline.delivery.plan import placed
 from pipeline.planning.calls import RigPlan, registered
 from pipeline.planning.chances import Judged, judge
 from pipeline.planning.places import is_free
-from pipeline.planning.plan import Plan, PlanConfig, iterate_candidates, moved_plan
+from pipeline.planning.plan import Plan, PlanConfig, bright_only, iterate_candidates, moved_plan
 from pipeline.planning.promise import Promise
 from pipeline.planning.radio import PlanDelivery, PlanRadio, deliver_plan, plan_within
 from pipeline.planning.seen import without_dark
@@ -50,11 +50,10 @@ def plan_of_request(
     Raises:
         PacketMeshError: there is no plan; the message says why and what to try.
     """
-    place = yield from place_of(store, spec)
-    if not request.dark_surface:
-        place = _without_dark(place)
+    whole = yield from place_of(store, spec)
+    place = whole if request.dark_surface else _without_dark(whole)
     key = ("plan", spec.key("surface"), request)
-    plan, delivery = yield from store.remember(key, partial(_planned, store, spec, place, request))
+    plan, delivery = yield from store.remember(key, partial(_planned, store, spec, whole, place, request))
     return place, plan, delivery
 
 
@@ -65,15 +64,18 @@ def _without_dark(place: Place) -> Place:
 
 
 def _planned(
-    store: Store, spec: Spec, place: Place, request: PlanRequest
+    store: Store, spec: Spec, whole: Place, place: Place, request: PlanRequest
 ) -> Generator[Progress, None, tuple[Plan, PlanDelivery]]:
+    """Plan on a place, with candidates of the whole one: this or the same without dark surface."""
     config, done = config_of(request), place.done
     rig, radio = sending_of(place, request)
     sensor = sensor_named(request.sensor, done.rig)
-    key = ("judged", spec.key("surface"), sensor.name, config.where, config.dark_surface)
-    compute = partial(iterate_candidates, place.seen, sensor, config.where)
+    key = ("judged", spec.key("surface"), sensor.name, config.where)
+    compute = partial(iterate_candidates, whole.seen, sensor, config.where)
     judging = store.remember(key, compute)
     judged = yield from part(judging, "judging places", 0.6, 0.9, detail=True)
+    if place is not whole:
+        judged = bright_only(judged, whole.seen)
     yield Progress("images by radio", 0.9)
     return plan_within(rig, place.seen, judged, sensor, config, radio)
 
@@ -101,8 +103,9 @@ def sending_of(place: Place, request: PlanRequest) -> tuple[Rig, PlanRadio]:
     if network.nodes.places_m:
         names = [frame.name for frame in whole.frames]
         network = placed(whole, network, [names.index(frame.name) for frame in frames])
-    limits = {"budget_j": request.budget_j, "deadline_s": request.deadline_s}
-    radio = PlanRadio(network, sent.coding, request.walls, **limits)
+    radio = PlanRadio(
+        network, sent.coding, request.walls, budget_j=request.budget_j, deadline_s=request.deadline_s
+    )
     return Rig(found.name, frames), radio
 
 
