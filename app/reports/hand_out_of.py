@@ -15,7 +15,7 @@ from packetmesh.files import atomic_path
 from pipeline.deliver import Delivery
 from pipeline.delivery.moments import Moment
 from pipeline.delivery.sending import Sending, received_at
-from pipeline.folders.delivery import left_out_sentences, summary
+from pipeline.folders.delivery import left_out_sentences, ordered_sentences, summary
 
 RECEIVED = "received"
 PAGE, ANIMATION = "delivery.html", "delivery.gif"
@@ -35,6 +35,11 @@ def write_hand_out(delivery: Delivery, folder: Path) -> Path:
     return folder / PAGE
 
 
+def _requests(sending: Sending) -> list[str]:
+    """Describe what the sink requested of all nodes together."""
+    return [*left_out_sentences(sending)[:1], *ordered_sentences(sending)[:1]]
+
+
 def hand_out_of(delivery: Delivery) -> HandOut:
     """Return the data of a delivery's hand-out."""
     sending, truth = delivery.sending, delivery.lossless.truth_after
@@ -43,7 +48,7 @@ def hand_out_of(delivery: Delivery) -> HandOut:
         title=f"{rig.name}: from packets to a surface",
         sentence=f"{_cameras(len(rig.frames))} colour and depth images ({sending.coding.title}); the "
         f"surface is rebuilt from the data that have arrived. Result: {summary(delivery)}."
-        + "".join(f" {one[0].upper()}{one[1:]}." for one in left_out_sentences(sending)[:1]),
+        + "".join(f" {one[0].upper()}{one[1:]}." for one in _requests(sending)),
         nodes=tuple(
             HandOutNode(frame.name, frame.intrinsics, pose)
             for frame, pose in zip(rig.frames, poses, strict=True)

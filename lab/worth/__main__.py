@@ -23,10 +23,12 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("runs/worth"), help="folder of the trials")
     parser.add_argument("--processes", type=int, default=1, help="rigs that are computed in parallel")
     parser.add_argument("--scenes", nargs="*", default=CALIBRATED_SCENES, help="demo rooms")
+    parser.add_argument("--random", action="store_true", help="also a random order of the tiles")
     parser.add_argument("--json", action="store_true", help="print the table as JSON")
     options = parser.parse_args()
     rigs = [*options.scenes, *(f"room-{seed}" for seed in room_seeds(options.split, options.rooms))]
-    tasks = [Task(rig, orders) for orders in ((OWN, WORTH), (RANDOM,)) for rig in rigs]
+    orders = [(OWN, WORTH), *([(RANDOM,)] if options.random else [])]
+    tasks = [Task(rig, some) for some in orders for rig in rigs]
     trials = iterate_trials("orders", judged, tasks, options.out, processes=options.processes)
     found = [row for rows in drain(trials) for row in rows]
     if options.json:

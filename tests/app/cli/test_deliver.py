@@ -114,12 +114,27 @@ def test_what_was_left_out_and_by_whose_decision_is_printed_and_written(
     assert "left_out" not in delivered[1]
 
 
+def test_the_order_that_the_sink_requests_is_printed_and_written(capsys, rig_folder, delivered, tmp_path):
+    words = ("--order", "worth", "--moments", 1, "--json", *FEW)
+    code, text, err = run(capsys, "deliver", "--rig", rig_folder, "--out", tmp_path / "d", *words)
+    assert code == 0
+    ordered = json.loads(text)["ordered"]
+    for node in ordered["nodes"]:
+        assert sorted(node["tiles"]) == list(range(len(node["added_m2"])))
+        assert f"{node['name']}: " in err
+    assert f"{sum(node['request_bytes'] for node in ordered['nodes'])} bytes after" in err
+    assert json.loads((tmp_path / "d" / "config.json").read_text())["order"] == "worth"
+    assert "add most surface first" in (tmp_path / "d" / "delivery.html").read_text()
+    assert "ordered" not in delivered[1]
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
         (("--leave-out-seen", "--coding", "jpeg"), "coding exact only"),
         (("--leave-out-seen", "--down", "node_01"), "Only one camera"),
         (("--leave-out-seen", "--preset", "nb-iot"), "Over nb-iot"),
+        (("--order", "worth", "--coding", "layered"), "coding exact only"),
         (("--preset", "street-grid"), "cameras that stand still"),
         (("--coding", "zip"), "layered"),
         (("--moments", "0"), "moments"),

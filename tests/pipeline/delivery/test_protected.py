@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.delivery.erasure import recover, repair_symbols
-from pipeline.delivery.protected import BASE_LOSS, protect, unprotect
+from pipeline.delivery.protected import BASE_LOSS, ends_in_stream, protect, unprotect
 
 
 @given(st.integers(1, 40), st.integers(0, 40), st.integers(1, 9), st.integers(0, 2**32 - 1))
@@ -76,3 +76,18 @@ def test_the_base_is_there_before_the_body_when_a_transfer_stops():
     base, _, data = stream_of(9000, 280_000, 108, 24)
     arrived = np.arange(data.size) < 108 * 100
     assert unprotect(data, arrived, 108, 24).base == base
+
+
+@pytest.mark.parametrize("packet_bytes", [108, 1464])
+@pytest.mark.parametrize("body_bytes", [1, 700, 5000])
+def test_a_stream_until_its_first_bytes_of_the_body_has_these_and_one_packet_less_has_not(
+    packet_bytes, body_bytes
+):
+    base, body, data = stream_of(900, 5000, packet_bytes, 24)
+    end = ends_in_stream(base, data.size, packet_bytes, 24, body_bytes)
+    parts = unprotect(data, np.arange(data.size) < end, packet_bytes, 24)
+    assert parts.base == base
+    assert parts.body[:body_bytes].tobytes() == body[:body_bytes]
+    assert parts.arrived[:body_bytes].all()
+    less = unprotect(data, np.arange(data.size) < end - packet_bytes, packet_bytes, 24)
+    assert less.base is None or not less.arrived[:body_bytes].all()
