@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.planning.targets import Targets, dark_returns
+from pipeline.planning.targets import Targets, sensed
 from pipeline.planning.views import PresentView
 from pipeline.surface.fill import skin_points_m
 from pipeline.surface.holes import Hole, beyond_m
@@ -38,7 +38,7 @@ def hole_targets(surface: Surface, hole: Hole, views: Sequence[PresentView], rea
         points_m = beyond_m(surface.vertices_m, surface.triangles, edges, reach_m)
     normals = _normals(surface)[hole.loop][cKDTree(corners_m).query(points_m)[1]]
     count = len(points_m)
-    return Targets(points_m, normals, np.zeros(count, int), dark_returns(points_m, views), 1.0 / count)
+    return Targets(points_m, normals, np.zeros(count, int), *sensed(points_m, views), 1.0 / count)
 
 
 def _normals(surface: Surface) -> FloatArray:

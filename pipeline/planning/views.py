@@ -51,6 +51,8 @@ class PresentView:
     dark_return: FloatArray
     """(H, W) cosine over squared depth where the sensor got no return although nothing in the geometry
     explains that: the surface is probably dark or shiny; 0 elsewhere."""
+    apart_rad: FloatArray
+    """(H, W) angle to the nearest pixel with the sensor's depth."""
 
 
 def view_of(
@@ -78,7 +80,9 @@ def view_of(
     cosine = -np.sum(normals * at_m, axis=-1) / np.maximum(length_m, 1e-12)
     lost = ~node.frame.depth.valid & (z_m > 0.0) & ~_explained(z_m, cosine, camera.intrinsics.fx_px)
     dark_return = np.divide(cosine, z_m**2, out=np.zeros(z_m.shape), where=lost)
-    return PresentView(camera, meets, z_m, normals, dark_return)
+    without = (~node.frame.depth.valid).astype(np.uint8)
+    apart_px = cv2.distanceTransform(without, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return PresentView(camera, meets, z_m, normals, dark_return, apart_px / camera.intrinsics.fx_px)
 
 
 def _normals(at_m: FloatArray) -> FloatArray:

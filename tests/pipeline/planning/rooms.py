@@ -52,12 +52,13 @@ def box_room(width_m=4.0, depth_m=3.0, height_m=2.5, cell_m=0.1, ceiling=True):
     return [sheet(*side, cell_m) for side in sides]
 
 
-def targets_at(points_m, normal, dark_return=0.0):
+def targets_at(points_m, normal, dark_return=0.0, apart_rad=0.0):
     """Unmeasured rays of the first camera, with one normal."""
     points_m = np.reshape(np.asarray(points_m, float), (-1, 3))
     count = len(points_m)
     normals = np.tile(np.asarray(normal, float), (count, 1))
-    return Targets(points_m, normals, np.zeros(count, int), np.full(count, float(dark_return)), 0.001)
+    dark_return, apart_rad = (np.full(count, float(value)) for value in (dark_return, apart_rad))
+    return Targets(points_m, normals, np.zeros(count, int), dark_return, apart_rad, 0.001)
 
 
 def view_through(scene, camera):
@@ -67,7 +68,7 @@ def view_through(scene, camera):
     shape = z_m.shape
     return PresentView(
         camera, meets, np.where(meets == Meets.MEASURED, z_m, np.nan),
-        -pixel_rays(camera.intrinsics), np.zeros(shape),
+        -pixel_rays(camera.intrinsics), np.zeros(shape), np.zeros(shape),
     )  # fmt: skip
 
 

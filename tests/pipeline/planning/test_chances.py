@@ -5,7 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.planning.chances import DARK_CHANCE, DARK_RATIO, judge
+from pipeline.planning.chances import (
+    APART_FADE_RAD,
+    APART_RAD,
+    DARK_APART_RAD,
+    DARK_CHANCE,
+    judge,
+)
 from pipeline.planning.sensors import FADE_SHARE, SENSORS
 from tests.pipeline.planning.rooms import LENS, PLAIN, at, place, sheet, targets_at
 
@@ -14,8 +20,10 @@ FAR_WALL = sheet((-3, 3, 0), (6, 0, 0), (0, 0, 2), 0.5)
 """Behind everything, so that there is a surface."""
 
 
-def chance(points_m, normal=(0, -1, 0), sensor=PLAIN, pose=None, sheets=(FAR_WALL,), guessed=(), dark=0.0):
-    seen = place(sheets, targets_at(points_m, normal, dark), guessed_sheets=guessed)
+def chance(
+    points_m, normal=(0, -1, 0), sensor=PLAIN, pose=None, sheets=(FAR_WALL,), guessed=(), dark=0.0, apart=0.0
+):
+    seen = place(sheets, targets_at(points_m, normal, dark, apart), guessed_sheets=guessed)
     return judge(seen, at(EYE, AHEAD) if pose is None else pose, sensor).chance
 
 
@@ -87,11 +95,24 @@ def test_what_the_projector_does_not_see_has_no_depth():
 
 
 @pytest.mark.parametrize(
-    ("gain", "share"), [(0.5, 0.0), (1.0, 0.0), (DARK_RATIO**0.5, 0.5), (DARK_RATIO, 1.0)]
+    ("gain", "share"), [(0.4, 0.0), (0.5, 0.0), ((0.5 * 3.0) ** 0.5, 0.5), (3.0, 1.0), (9.0, 1.0)]
 )
 def test_a_dark_surface_needs_more_light_than_was_too_little(gain, share):
     """Light falls with the square of the distance; 2 m and facing return 1/4."""
     assert chance([AHEAD], dark=0.25 / gain) == pytest.approx([DARK_CHANCE * share], abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("dark", "apart_rad", "share"),
+    [
+        (0.25 / 3.0, DARK_APART_RAD, DARK_CHANCE * np.exp(-1.0)),
+        (0.25 / 3.0, 2.0 * DARK_APART_RAD, DARK_CHANCE * np.exp(-2.0)),
+        (0.0, APART_RAD, 1.0),
+        (0.0, APART_RAD + APART_FADE_RAD, np.exp(-1.0)),
+    ],
+)
+def test_the_middle_of_a_large_hole_in_a_depth_image_is_seldom_measured(dark, apart_rad, share):
+    assert chance([AHEAD], dark=dark, apart=apart_rad) == pytest.approx([share], abs=1e-5)
 
 
 def test_overlap_is_the_common_part_of_two_images_of_a_wall():

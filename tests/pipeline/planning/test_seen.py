@@ -45,6 +45,18 @@ def test_the_measured_share_is_that_of_the_surfaces_quality(office):
     assert office.seen.measured_share == pytest.approx(measured_share(office.done, cameras), abs=0.002)
 
 
+def test_the_angle_to_the_nearest_depth_is_that_to_the_nearest_of_all_pixels(office):
+    view, node = office.seen.views[0], office.done.nodes[0]
+    valid = node.frame.depth.valid
+    depth_px = np.argwhere(valid)
+    without_px = np.argwhere(~valid)[:: np.count_nonzero(~valid) // 20]
+    nearest_px = np.linalg.norm(without_px[:, None] - depth_px, axis=2).min(axis=1)
+    assert view.apart_rad[tuple(without_px.T)] * view.camera.intrinsics.fx_px == pytest.approx(
+        nearest_px, rel=1e-4
+    )
+    assert not view.apart_rad[valid].any()
+
+
 def test_without_a_triangle_no_place_can_be_judged(office):
     after = office.done.after
     nothing = replace(office.done, after=replace(after, triangles=after.triangles[:0]))
