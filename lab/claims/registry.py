@@ -20,6 +20,7 @@ from lab.claims.delivery.claims import CLAIMS as DELIVERY
 from lab.claims.depth.claims import CLAIMS as DEPTH
 from lab.claims.depth.confidence import D10
 from lab.claims.network import link, radio, selection, street
+from lab.claims.planning import D12, D13
 from lab.claims.registration.claims import CLAIMS as REGISTRATION
 from lab.claims.surface import detail, growth, holes, rule
 from packetmesh.errors import InputError
@@ -36,7 +37,7 @@ _ALL: tuple[Claim, ...] = (
     *(*link.CLAIMS, *street.CLAIMS, *radio.CLAIMS, *selection.CLAIMS),
     *(*DELIVERY, pieces.D07, cameras.D08),
     biased_sensors.D09,
-    D10,
+    *(D10, D12, D13),
 )
 CLAIMS = {claim.id: claim for claim in sorted(_ALL, key=lambda claim: claim.id)}
 """Claims by number in SPEC 8, in its order."""

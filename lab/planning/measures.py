@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.stats import spearmanr
@@ -40,6 +40,31 @@ def measures(rows: Sequence[Row]) -> dict[str, float]:
         "rooms_best_above": float((best > others).sum()),
         "share_of_search": float(searched.sum() / most.sum()),
     }
+
+
+def promise_kept(found: Mapping[str, float]) -> tuple[bool, str]:
+    """Return whether promises are kept (claim D12), by ``measures``, and a sentence that says why."""
+    holds = (
+        found["rank_correlation"] >= 0.85
+        and found["mean_absolute_error_points"] <= 1.0
+        and found["inside_interval"] >= 0.9
+    )
+    return holds, (
+        f"of {found['suggestions']:.0f} suggestions in {found['rooms']:.0f} rooms, promise and real gain "
+        f"have a rank correlation of {found['rank_correlation']:.2f} and are "
+        f"{found['mean_absolute_error_points']:.2f} points apart in the mean; "
+        f"{found['inside_interval']:.1%} of the real gains are in their interval"
+    )
+
+
+def choice_good(found: Mapping[str, float]) -> tuple[bool, str]:
+    """Return whether the planner's choice is good (claim D13), by ``measures``, and a sentence why."""
+    holds = found["rooms_best_above"] == found["rooms"] and found["share_of_search"] >= 0.95
+    return holds, (
+        f"the choice gives {found['best_real_points']:.2f} points in the mean and the others "
+        f"{found['others_real_points']:.2f}; it is above their mean in {found['rooms_best_above']:.0f} of "
+        f"{found['rooms']:.0f} rooms and has {found['share_of_search']:.1%} of the best that a search finds"
+    )
 
 
 def _column(rows: Sequence[Row], name: str) -> FloatArray:

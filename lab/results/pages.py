@@ -38,6 +38,7 @@ PLACES, RECORDINGS = "bench_places", "bench_recording"
 PICTURES: dict[str, Callable[[Row], dict[str, str]]] = {
     PLACES: places.pictures,
     RECORDINGS: recordings.pictures,
+    "planning": planning.pictures,
 }
 """Function that draws a record's pictures, by record; they are written next to the page."""
 

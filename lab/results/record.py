@@ -21,7 +21,7 @@ FOLDER = ROOT / "docs" / "results"
 WRITTEN = (
     *("docs/results", "docs/results.md", "README.md"),
     *("assets/depth/README.md", "assets/depth/worth.md"),
-    *("docs/places_recall.svg", "docs/places_verdict.svg", "docs/recordings.svg"),
+    *("docs/places_recall.svg", "docs/places_verdict.svg", "docs/recordings.svg", "docs/planning.svg"),
 )
 """The records and the files written from them; a change of these is no change of the code."""
 DIGITS = 6

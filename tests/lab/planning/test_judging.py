@@ -1,5 +1,6 @@
 """Promises of suggested cameras against what came of them."""
 
+import xml.etree.ElementTree as ElementTree
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from lab.planning.judging import Suggested, ranked
 from lab.planning.measures import measures
-from lab.results.planning import planning
+from lab.results.planning import PICTURE, pictures, planning
 from pipeline.planning.plan import Candidates
 
 ONE = Suggested(7, 0, "walls", 4.0, 2.0, 6.0, 3.0, True, 0.5, 0.9, 1.0)
@@ -37,10 +38,22 @@ def test_the_measures_are_those_of_a_worked_example():
     assert -1.0 <= found["rank_correlation"] <= 1.0
 
 
+def test_the_picture_has_real_above_promised_and_colours_what_is_outside_its_interval():
+    kept, missed = rows({}, {"rank": 1, "promised": 8.0, "low": 7.0, "high": 9.0, "real": -1.0})
+    drawn = ElementTree.fromstring(pictures({"gains": [kept, missed]})[PICTURE])
+    circles = [one.attrib for one in drawn.iter() if one.tag.endswith("circle")]
+    far, near = circles[:2]
+    assert float(near["cx"]) < float(far["cx"])
+    assert float(near["cy"]) < float(far["cy"])
+    assert near["fill"] == near["stroke"] != far["stroke"]
+    assert far["fill"] == "none"
+
+
 def test_the_page_shows_goal_beside_value():
     text = planning(measures(rows({}, {"rank": 1, "promised": 1.0, "real": 1.0})))
     assert "rendered rooms" in text
     assert "| .85" in text
+    assert "Claim D12 does not hold: of 2 suggestions in 1 rooms" in text
 
 
 def test_only_candidates_that_can_be_registered_are_ranked():
