@@ -68,8 +68,10 @@ def _pose(T_world_camera: FloatArray | None) -> Pose:
 
 
 def _ignored(request: PlanRequest) -> list[str]:
-    """Return sentences on settings of the screen that count otherwise in a plan."""
+    """Return sentences on what a plan leaves out, and on settings of the screen that it takes otherwise."""
     notes = []
+    if not request.dark_surface:
+        notes.append("Surface that looks dark to a present sensor is left out of this plan")
     if request.sent.network.radio.walls_m:
         notes.append("The wall of What if does not count here: the plan takes the walls of the surface")
     if request.sent.down:

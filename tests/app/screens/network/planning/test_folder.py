@@ -111,7 +111,8 @@ def test_dark_surface_is_named_and_can_be_left_out(screen):
     assert "Of it on dark surface" in text
     assert plan.dark.any(), "the small room's screen"
     screen.gui.set("Dark surface counts", False)
-    screen.suggest()
+    assert "is left out of this plan" not in text
+    assert "is left out of this plan" in screen.suggest()
     without = screen.panel.plan._plan
     assert not without.dark.any()
     assert len(without.targets_m) == (~plan.dark).sum()
