@@ -45,7 +45,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "bench_codings": ("packetmesh", "bench", "--only", "codings"),
     "bench_network": ("packetmesh", "bench", "--only", "network"),
     "between_cameras": ("python", "-m", "lab.between_cameras", "--rooms", "20", "--json"),
-    "tile_worth": ("python", "-m", "lab.worth", "--rooms", "20", "--json"),
+    "tile_worth": ("python", "-m", "lab.worth", "--rooms", "20", "--random", "--json"),
     "planning": ("python", "-m", "lab.planning", "--skip", "60"),
     "real_frames": ("python", "-m", "lab.benchmarks.real_frames"),
     "calibration_verdicts": ("python", "-m", "lab.verdicts", "--seed", "2026", "--sessions", "400"),
