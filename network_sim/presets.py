@@ -29,8 +29,8 @@ are assumptions of the right order, not a product's: descriptions of modules wit
 could be read give no currents."""
 SX1276 = EnergyConfig(tx_w=0.0957, rx_w=0.03795, idle_w=6.6e-7, sleep_w=6.6e-7)
 """Semtech's SX1276 at 3.3 V: 29 mA sending 13 dBm and 11.5 mA receiving (data sheet Rev. 7, Table 6, quoted
-from memory: assumptions), .2 µA asleep (200 nA register retention, as a distributor quotes the data sheet). Between its frames a node of class A sleeps; its empty receive windows are
-not counted."""
+from memory: assumptions), .2 µA asleep (200 nA register retention, as a distributor quotes the data sheet).
+Between its frames a node of class A sleeps; its empty receive windows are not counted."""
 NRF52840 = EnergyConfig(tx_w=0.0192, rx_w=0.01878, idle_w=9.5e-6, sleep_w=9.5e-6)
 """Nordic's nRF52840 at 3 V with DC/DC: 6.40 mA sending 0 dBm and 6.26 mA receiving at 1 Mbit/s (product
 specification, current consumption: I_RADIO_TX1, I_RADIO_RX0); 3.16 µA asleep is quoted from memory. Between
