@@ -40,6 +40,8 @@ class Sent:
     """Names of nodes that have failed."""
     leave_out_seen: bool = False
     """Whether nodes leave out tiles that another camera shows, which the sink tells them."""
+    order: Literal["own", "worth"] = "own"
+    """Order of the depth tiles: the coding's own, or by what the sink expects each to add to the surface."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,7 +41,7 @@ from pipeline.delivery.sending import (
     send,
     senders_of,
 )
-from pipeline.folders.delivery import left_out_sentences
+from pipeline.folders.delivery import left_out_sentences, ordered_sentences
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
 from pipeline.spec import key as spec_key
 from pipeline.types import (
@@ -105,7 +105,7 @@ def _send(store: Store, spec: Spec) -> Generator[Progress, None, Sending]:
     rig = yield from store.stage(spec, "rig")
     yield Progress("sending the images", 0.02)
     sent = _sent_of(spec)
-    how = sent.network, sent.coding, sent.moments, sent.down, sent.leave_out_seen
+    how = sent.network, sent.coding, sent.moments, sent.down, sent.leave_out_seen, sent.order
     return send(DeliverySpec(spec, *how), rig)
 
 
@@ -192,6 +192,7 @@ def _first_view(sending: Sending, sent: Sent, elapsed_s: float) -> DeliveryView:
         came.t_ns[some],
         total[some],
         left_out=tuple(left_out_sentences(sending)),
+        ordered=tuple(ordered_sentences(sending)),
     )
 
 

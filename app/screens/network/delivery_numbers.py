@@ -171,8 +171,7 @@ def summary(view: DeliveryView) -> Markdown:
         view.run.packets,
         view.run.elapsed_s,
     )
-    if view.left_out:
-        first = view.left_out[0]
+    for first in (*view.left_out[:1], *view.ordered[:1]):
         sentence += Markdown(" {}.").format(first[0].upper() + first[1:])
     if not view.run.series or not len(view.run.pieces):
         sentence += " No frame was sent in that time."
@@ -211,6 +210,8 @@ def changes(before: DeliveryView, after: DeliveryView) -> str:
         words.append(f"coding {after.sent.coding} instead of {before.sent.coding}")
     if before.sent.leave_out_seen != after.sent.leave_out_seen:
         words.append("shown tiles left out" if after.sent.leave_out_seen else "all tiles sent again")
+    if before.sent.order != after.sent.order:
+        words.append("most surface first" if after.sent.order == "worth" else "tiles in the coding's order")
     words += [f"{name} on again" for name in before.sent.down if name not in after.sent.down]
     changed = _network_changes(before.sent.network, after.sent.network)
     words += changed[:MOST_CHANGES] + (["and more"] if len(changed) > MOST_CHANGES else [])

@@ -112,6 +112,8 @@ class DeliveryView:
     """None while it is computed, or if there is no surface without losses either."""
     left_out: tuple[str, ...] = ()
     """A sentence on the tiles that were left out, and one on each sender's; empty if every node sends all."""
+    ordered: tuple[str, ...] = ()
+    """The same on the order in which the sink requested the tiles; empty in the coding's own order."""
 
     @property
     def senders(self) -> tuple[CameraNode, ...]:

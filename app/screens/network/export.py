@@ -1,10 +1,17 @@
-"""Files that the Network screen offers for download."""
+"""Files that the Network screen offers for download, and the command that makes them."""
 
 from __future__ import annotations
 
+import shlex
+
+from app.compute.state import Sent, Spec
 from app.screens.network.delivery_view import DeliveryView
 from app.web.markup import Markdown
 from app.window.panel import Offer, Offers
+from network_sim.presets import PRESETS
+from packetmesh.settings import differences
+from pipeline.config import PRESETS as CHAINS
+from pipeline.config import PipelineConfig
 
 JOB = "network.export_job"
 
@@ -50,3 +57,21 @@ def network_offers(labels: tuple[str, ...], commands: str) -> Offers:
         "The command writes the trace as `trace.ndjson` and `trace.csv`; no command draws the timeline."
     )
     return Offers("Network", hint, files, "\n".join(lines), note)
+
+
+def deliver_command(spec: Spec, preset: str, sent: Sent) -> str:
+    """Return the command line that delivers the same rig in the same way."""
+    words = ["packetmesh", "deliver", *spec.source.arguments(), "--preset", preset, "--coding", sent.coding]
+    words += ["--moments", str(sent.moments)]
+    if sent.leave_out_seen:
+        words.append("--leave-out-seen")
+    if sent.order != "own":
+        words += ["--order", sent.order]
+    if sent.down:
+        words += ["--down", *sent.down]
+    if spec.preset != "packetmesh":
+        words += ["--chain", spec.preset]
+    chain = CHAINS.get(spec.preset, PipelineConfig())
+    if changed := differences(sent.network, PRESETS[preset]) + differences(spec.config, chain):
+        words += ["--set", *changed]
+    return shlex.join([*words, "--out", "runs/delivery"])

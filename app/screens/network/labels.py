@@ -112,8 +112,8 @@ CODINGS: Mapping[str, str] = MappingProxyType(
     }
 )
 """Titles of ``pipeline.delivery.CODINGS``, whose libraries the server process does not load."""
-LEAVES_OUT = "exact"
-"""The coding of which tiles can be left out."""
+REQUESTABLE = "exact"
+"""The coding of which the sink can request tiles."""
 
 SCHEMES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {

@@ -11,7 +11,8 @@ import numpy as np
 import viser
 
 from app.compute.state import Sent, Spec
-from app.screens.network.labels import CODINGS, LEAVES_OUT, NETWORKS, ways
+from app.screens.network.export import deliver_command
+from app.screens.network.labels import CODINGS, NETWORKS, REQUESTABLE, ways
 from app.screens.network.lesson import NetworkLook
 from app.screens.network.place import show, shown, text_of, values_of
 from app.screens.network.what_if import WhatIf
@@ -22,8 +23,6 @@ from network_sim.config import NetworkConfig
 from network_sim.presets import PRESETS
 from packetmesh.errors import InputError
 from packetmesh.settings import differences, key_of, settings, with_settings
-from pipeline.config import PRESETS as CHAINS
-from pipeline.config import PipelineConfig
 
 TITLES = {preset.title: name for name, preset in NETWORKS.items()}
 CODING_NAMES = {title: name for name, title in CODINGS.items()}
@@ -64,6 +63,13 @@ class NetworkSetup:
             "camera shows, and these are not sent. Needs two cameras, the coding with AVIF colour, and a "
             "radio by which the sink reaches them.",
         )
+        self._by_worth = gui.add_checkbox(
+            "Most surface first",
+            False,
+            hint="Every camera first sends a coarse image. By these the sink asks each for the tiles that "
+            "add most to the surface first. Needs the coding with AVIF colour, and a radio by which the sink "
+            "reaches the cameras.",
+        )
         self._share = gui.add_slider(
             "Lose packets (%)",
             0.0,
@@ -96,7 +102,7 @@ class NetworkSetup:
         )
         ui.when_changed(self._preset, self._picked)
         for handle in (
-            *(self._coding, self._leave_out, self._share, self._burst, self._retransmit),
+            *(self._coding, self._leave_out, self._by_worth, self._share, self._burst, self._retransmit),
             *(self._vehicles, self._scheme, self._beside, self._seed),
         ):
             ui.when_changed(handle, on_change)
@@ -153,7 +159,8 @@ class NetworkSetup:
     def reset(self) -> None:
         """Restore the first settings."""
         self._preset.value = NETWORKS[FIRST].title
-        self._coding.value, self._leave_out.value = CODINGS[NetworkLook().coding], False
+        self._coding.value = CODINGS[NetworkLook().coding]
+        self._leave_out.value = self._by_worth.value = False
         self._moments.value, self._burst.value = MOMENTS, BURST_FRAMES
         self.what_if.forget()
         self._load()
@@ -214,6 +221,7 @@ class NetworkSetup:
         names = {
             "coding": self._coding,
             "leave-out": self._leave_out,
+            "by-worth": self._by_worth,
             "lose": self._share,
             "burst": self._burst,
             "again": self._retransmit,
@@ -243,7 +251,8 @@ class NetworkSetup:
             (self._scheme if self.street else self._access).value = look.way
         if look.beside:
             self._beside.value = look.beside
-        self._coding.value, self._leave_out.value = CODINGS[look.coding], False
+        self._coding.value = CODINGS[look.coding]
+        self._leave_out.value = self._by_worth.value = False
         self._share.value, self._burst.value = look.lose_percent, look.burst_frames
         self._retransmit.value = look.again and self._retransmit.value
         self._moments.value = FEWEST if look.plan.show else MOMENTS
@@ -271,14 +280,23 @@ class NetworkSetup:
         )
         network = with_settings(PRESETS[self.preset], changes)
         coding, moments = CODING_NAMES[self._coding.value], int(self._moments.value)
-        leave_out = bool(self._leave_out.value) and self._can_leave_out(coding, network)
-        return Sent(network, coding, moments, self.what_if.off, leave_out)
+        order, leave_out = self._can_request(coding, network)
+        return Sent(
+            network,
+            coding,
+            moments,
+            self.what_if.off,
+            leave_out and bool(self._leave_out.value),
+            "worth" if order and self._by_worth.value else "own",
+        )
 
-    def _can_leave_out(self, coding: str, network: NetworkConfig) -> bool:
-        """Return whether the cameras can leave out tiles, as far as is known before they have sent."""
+    def _can_request(self, coding: str, network: NetworkConfig) -> tuple[bool, bool]:
+        """Return whether the sink can ask for an order of the tiles, and that some are left out, as far as is
+        known before the cameras have sent."""
         what_if = self.what_if
         alone = what_if.in_room and what_if.count - len(what_if.off) < 2
-        return coding == LEAVES_OUT and network.mac.reaches_nodes and not alone
+        can = coding == REQUESTABLE and network.mac.reaches_nodes
+        return can, can and not alone
 
     def runs(self) -> dict[str, NetworkConfig]:
         """Return the street runs that the controls set, by their labels.
@@ -332,7 +350,10 @@ class NetworkSetup:
         else:
             self._access.options = tuple(self._ways)
             self._access.value = next(iter(self._ways))
-        for handle in (self._coding, self._leave_out, self._share, self._burst, self._retransmit):
+        for handle in (
+            *(self._coding, self._leave_out, self._by_worth),
+            *(self._share, self._burst, self._retransmit),
+        ):
             handle.visible = not street
         for handle in (self._access, self._shadowing, self._moments):
             handle.visible = not street
@@ -353,7 +374,8 @@ class NetworkSetup:
         """Show why some of the given settings change nothing, and disable what cannot be chosen."""
         if not self.street:
             sent = self.sent()
-            self._leave_out.disabled = not self._can_leave_out(sent.coding, sent.network)
+            can = self._can_request(sent.coding, sent.network)
+            self._by_worth.disabled, self._leave_out.disabled = (not one for one in can)
         given = [key_of(change) for change in (*self._extra, *self._beside_extra)]
         if self._shadowing.value and not self.street:
             given.append("radio.shadowing_db")
@@ -371,19 +393,3 @@ class NetworkSetup:
         except InputError:
             self._extra, self._beside_extra = before
             raise
-
-
-def deliver_command(spec: Spec, preset: str, sent: Sent) -> str:
-    """Return the command line that delivers the same rig in the same way."""
-    words = ["packetmesh", "deliver", *spec.source.arguments(), "--preset", preset, "--coding", sent.coding]
-    words += ["--moments", str(sent.moments)]
-    if sent.leave_out_seen:
-        words.append("--leave-out-seen")
-    if sent.down:
-        words += ["--down", *sent.down]
-    if spec.preset != "packetmesh":
-        words += ["--chain", spec.preset]
-    chain = CHAINS.get(spec.preset, PipelineConfig())
-    if changed := differences(sent.network, PRESETS[preset]) + differences(spec.config, chain):
-        words += ["--set", *changed]
-    return shlex.join([*words, "--out", "runs/delivery"])

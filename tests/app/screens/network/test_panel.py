@@ -283,7 +283,7 @@ def test_a_node_switched_off_is_not_heard_and_the_difference_is_told(screen):
     screen.gui.set("Switch off", "none")
 
 
-LEAVE_OUT = "Leave out seen tiles"
+LEAVE_OUT, BY_WORTH = "Leave out seen tiles", "Most surface first"
 
 
 def test_tiles_that_another_camera_showed_are_left_out_and_counted(screen):
@@ -310,6 +310,22 @@ def test_tiles_that_another_camera_showed_are_left_out_and_counted(screen):
     assert "--leave-out-seen" not in screen.panel.command
 
 
+def test_tiles_that_add_most_come_first_and_the_surface_is_there_with_fewer_bytes(screen):
+    own = screen.view
+    screen.gui.set(BY_WORTH, True)
+    view = screen.view
+    assert view.sent.order == "worth"
+    assert view.total_bytes == own.total_bytes
+    text = screen.gui.text()
+    assert "The sink requested the depth tiles that add most surface first, in " in text
+    assert "most surface first" in text.split("in the mesh")[0]
+    assert "--order worth" in screen.panel.command
+    assert "by-worth=true" in screen.panel.in_address["net"].read()
+    screen.gui.set(BY_WORTH, False)
+    assert screen.view.sent.order == "own"
+    assert "--order" not in screen.panel.command
+
+
 def test_what_cannot_be_left_out_cannot_be_chosen(screen):
     gui, box = screen.gui, screen.gui.find(LEAVE_OUT)
     screen.refuse = "not yet"
@@ -321,7 +337,7 @@ def test_what_cannot_be_left_out_cannot_be_chosen(screen):
     ):
         before = gui.find(name).value
         gui.set(name, value)
-        assert box.disabled == (name != "Medium access")
+        assert box.disabled == gui.find(BY_WORTH).disabled == (name != "Medium access")
         assert screen.spec.sent.leave_out_seen == (name == "Medium access")
         gui.set(name, before)
     assert not box.disabled

@@ -14,7 +14,7 @@ from app.compute.state import Sent, Spec
 from app.drawing.curves import polyline
 from app.screens.network.draw import Flights, ground_of
 from app.screens.network.job import network_job
-from app.screens.network.labels import ACCESS, CODINGS, LEAVES_OUT, NETWORKS, SCHEMES, ways
+from app.screens.network.labels import ACCESS, CODINGS, NETWORKS, REQUESTABLE, SCHEMES, ways
 from app.screens.network.lesson import NetworkLook
 from app.screens.network.numbers import metric_tables, runs_summary, value_text
 from app.screens.network.run_view import run_view
@@ -147,7 +147,7 @@ def test_every_preset_can_be_run_in_every_way_that_is_offered(preset):
 
 def test_the_codings_offered_are_those_that_there_are():
     assert {name: coding.title for name, coding in pipeline.delivery.CODINGS.items()} == dict(CODINGS)
-    assert LEAVES_OUT == ONLY_CODING
+    assert REQUESTABLE == ONLY_CODING
 
 
 def test_the_command_the_interface_the_screen_and_its_lessons_have_one_default_coding():
