@@ -8,6 +8,8 @@ from lab.results.markdown import Row, percent, table
 
 PICTURE = "planning.svg"
 """File of the picture, next to the page."""
+JUDGES = {"D12": promise_kept, "D13": choice_good}
+"""The claims that this record judges."""
 KINDS = ("the planner's choice", "other suggestions", "outside their interval")
 """Marks of the picture."""
 
@@ -82,8 +84,9 @@ def planning(numbers: Row) -> str:
         ("best suggestion over the exhaustive search's best", percent(numbers["share_of_search"]), "95 %"),
     ]
     picture = f"![Real gain of every suggestion over its promise]({PICTURE})"
+    verdicts = {name: judge(numbers) for name, judge in JUDGES.items()}
     claims = [
         f"Claim {name} {'holds' if holds else 'does not hold'}: {why}."
-        for name, (holds, why) in (("D12", promise_kept(numbers)), ("D13", choice_good(numbers)))
+        for name, (holds, why) in verdicts.items()
     ]
     return "\n\n".join((text, picture, table(("measure", "value", "goal"), rows), *claims))
