@@ -14,7 +14,7 @@ run: $(VENV)/.core  ## the app in the browser, with a scene reconstructed
 	$(BIN)/packetmesh serve --scene $(SCENE) --open $(ARGS)
 
 test: $(VENV)/.dev  ## all tests, in parallel
-	$(BIN)/python -m pytest -n 4 --dist loadgroup --no-loadscope-reorder $(ARGS)
+	$(BIN)/python -m pytest -n 3 --dist loadgroup --no-loadscope-reorder $(ARGS)
 
 test-fast: $(VENV)/.dev  ## the quick tests, without a browser
 	$(BIN)/python -m pytest -n 3 --dist loadgroup --no-loadscope-reorder -m "not browser and not slow" $(ARGS)

@@ -68,10 +68,9 @@ window.Worker = class extends Worker {
 """Pages keep the worker that holds their connection to the server, the only one that viser starts."""
 SIZE_PX = {"width": 900, "height": 640}
 """Of the tab, small so that drawing in software is quick."""
-LATER_PARTS = ("test_lesson", "test_poison")
-"""The first files of the second and the third part, which take about as long as the first. A browser mostly
-waits: each part runs on one worker, in one Chromium, while others compute. Landing needs the cameras that
-Calibrate has calibrated before it.
+HALF = "test_lesson"
+"""The first file of the second half. A browser mostly waits: each half runs on one worker, in one Chromium,
+while others compute. Landing needs the cameras that Calibrate has calibrated before it.
 """
 
 
@@ -84,12 +83,12 @@ def chromium_path() -> str | None:
 
 @pytest.hookimpl(tryfirst=True)  # pytest-xdist looks at the groups, and where a path is named it came first
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark every test here, and keep those of a part on one worker: they share a page."""
+    """Mark every test here, and keep those of a half on one worker: they share a page."""
     for item in items:
         if item.path.parent == HERE:
             item.add_marker(pytest.mark.browser)
-            part = 1 + sum(item.path.stem >= first for first in LATER_PARTS)
-            item.add_marker(pytest.mark.xdist_group(f"browser {part}"))
+            half = 1 + (item.path.stem >= HALF)
+            item.add_marker(pytest.mark.xdist_group(f"browser {half}"))
 
 
 @pytest.hookimpl(wrapper=True)
