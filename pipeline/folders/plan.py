@@ -162,10 +162,11 @@ def promise_sentence(planned: RigPlan) -> str:
 def best_sentence(planned: RigPlan) -> str:
     """Say how far a plan can be from the best choice."""
     plan = planned.plan
+    least = f"{plan.at_least_of_best:.0%}"
+    share = "as much as" if least == "100%" else f"at least {least} of what"
     return (
-        f"It promises at least {plan.at_least_of_best:.0%} of what the best choice could, among the "
-        f"{plan.candidates} judged cameras that can be registered"
-        f"{ruled_out(plan, planned.radio.deadline_s)}"
+        f"It promises {share} the best choice could, among the {plan.candidates} judged cameras that can be "
+        f"registered{ruled_out(plan, planned.radio.deadline_s)}"
     )
 
 

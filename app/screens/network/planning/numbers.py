@@ -49,10 +49,10 @@ def summary(plan: PlanView, ghosts: GhostsView) -> Markdown:
         "would then; in brackets the 95 % interval."
     ).format(who, points(ghosts.total), dark_part(ghosts.total), 100.0 * plan.measured_share, 100.0 * then)
     if ghosts is plan.ghosts:
+        least = f"{100.0 * plan.at_least_of_best:.0f}"
         text += Markdown(
-            " It is at least {:.0f} % of the best choice among the {} judged cameras that can be "
-            "registered{}."
-        ).format(100.0 * plan.at_least_of_best, plan.candidates, plan.ruled_out)
+            " It is {} best choice among the {} judged cameras that can be registered{}."
+        ).format("the" if least == "100" else f"at least {least} % of the", plan.candidates, plan.ruled_out)
     for note in (*plan.notes, *_doubts(plan, ghosts.ghosts)):
         text += Markdown("\n\n{}.").format(note.rstrip("."))
     return text
