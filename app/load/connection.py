@@ -19,10 +19,10 @@ from app.window.stepper import MARKS
 
 PATIENCE_S = 30.0
 """Default time limit of ``wait_for``, seconds."""
-DRAWN_QUERY = 'data-packetmesh-call="ask"'
-"""Part of the HTML by which the server asks whether everything is drawn."""
+QUESTIONS = ('data-packetmesh-call="ask"', 'data-packetmesh-call="hold"')
+"""Parts of the HTML by which the server asks whether everything is drawn, and whether the page holds."""
 DRAWN = "Say that all is drawn"
-"""Label of the command with which a page confirms that everything is drawn."""
+"""Label of the command with which a page answers."""
 OLD = "packetmesh-old"
 """Part of the HTML that dims the numbers or the picture."""
 _CURRENT = re.compile(r"nth-of-type\((\d+)\) {[^}]*color: white;")
@@ -164,8 +164,8 @@ class Connection:
             self.values[uuid] = value
 
     def _take_html(self, uuid: str, content: str) -> None:
-        """Record the step and whether HTML is dimmed; confirm that all is drawn if the server asks."""
-        if DRAWN_QUERY in content:
+        """Record the step and whether HTML is dimmed; answer if the server asks."""
+        if any(question in content for question in QUESTIONS):
             self._answer_drawn()
         current = _CURRENT.search(content)
         if current is not None and self.steps:

@@ -9,7 +9,7 @@ import pytest
 
 from app.cli.bench import _browsers
 from app.compute.turns import Turns
-from app.load.connection import DRAWN_QUERY, OLD, Connection
+from app.load.connection import OLD, QUESTIONS, Connection
 from app.load.load import Load
 from app.load.serving import Look
 from app.load.visitor import RADIUS_MM, Diary, Visitor
@@ -83,7 +83,8 @@ def test_one_draws_after_the_other_and_who_waits_goes_on_with_other_things():
 
 
 def test_a_simulated_page_knows_the_html_that_a_page_knows():
-    assert DRAWN_QUERY in page_call("ask", [3], True)
+    calls = page_call("ask", [3], True), page_call("hold")
+    assert all(question in call for question, call in zip(QUESTIONS, calls, strict=True))
     assert OLD in stale_html(numbers=True, picture=False)
     assert OLD in stale_html(numbers=False, picture=True)
     assert OLD not in stale_html(numbers=False, picture=False)
