@@ -51,7 +51,8 @@ def main() -> None:
 def answered(copies: list[Path], drawn: list[Mutation], answers: Path) -> list[bool]:
     """Return whether the tests see each mutant; test those whose answer is not in the file, and add it.
 
-    An answer counts as long as the module and the tests that run for it are unchanged.
+    An answer counts as long as the module is unchanged, and the test that failed or, if none did, all tests
+    that run for it.
 
     Args:
         copies: copies of the repository; as many mutants are tested at once.
@@ -61,38 +62,42 @@ def answered(copies: list[Path], drawn: list[Mutation], answers: Path) -> list[b
     Raises:
         InputError: a test fails without a fault, or tests were killed.
     """
-    keys = [(one.name, digest(copies[0], one)) for one in drawn]
-    seen = _read(answers)
-    waiting = [(key, one) for key, one in zip(keys, drawn, strict=True) if key not in seen]
+    seen = _read(answers, copies[0], drawn)
+    waiting = [one for one in drawn if one.name not in seen]
     limits_s = {}
-    for group in GROUPS:
-        if some := [one for _, one in waiting if one.group == group]:
-            limits_s[group] = time_limit_s(copies[0], group, some)
+    with ThreadPoolExecutor(len(copies)) as pool:
+        for group in GROUPS:
+            if some := [one for one in waiting if one.group == group]:
+                limits_s[group] = max(pool.map(lambda copy: time_limit_s(copy, group, some), copies))  # noqa: B023
 
-    def work(task: tuple[tuple[str, str], Mutation]) -> None:
-        (name, digits), mutation = task
+    def work(mutation: Mutation) -> None:
         copy = copies.pop()
         try:
             answer = sees(copy, mutation, limits_s[mutation.group])
         finally:
             copies.append(copy)
-        line = {"name": name, "digest": digits, "seen": answer, **asdict(mutation)}
+        line = {"name": mutation.name, "digest": digest(copy, mutation, answer.by), **asdict(answer)}
         with answers.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(line) + "\n")
-        print(f"{'seen    ' if answer else 'SURVIVED'} {name}", file=sys.stderr, flush=True)
+            file.write(json.dumps(line | asdict(mutation)) + "\n")
+        seen[mutation.name] = answer.seen
+        print(f"{'seen    ' if answer.seen else 'SURVIVED'} {mutation.name}", file=sys.stderr, flush=True)
 
     with ThreadPoolExecutor(len(copies)) as pool:
         list(pool.map(work, waiting))
-    seen = _read(answers)
-    return [seen[key] for key in keys]
+    return [seen[one.name] for one in drawn]
 
 
-def _read(answers: Path) -> dict[tuple[str, str], bool]:
-    """Return the stored answers by name and digest of the mutant; those without a digest do not count."""
+def _read(answers: Path, copy: Path, drawn: list[Mutation]) -> dict[str, bool]:
+    """Return the stored answers that count, by name of the mutant."""
     if not answers.exists():
         return {}
-    lines = map(json.loads, answers.read_text(encoding="utf-8").splitlines())
-    return {(line["name"], line["digest"]): line["seen"] for line in lines if "digest" in line}
+    by_name = {one.name: one for one in drawn}
+    seen = {}
+    for line in map(json.loads, answers.read_text(encoding="utf-8").splitlines()):
+        mutation = by_name.get(line["name"])
+        if mutation is not None and line["digest"] == digest(copy, mutation, line["by"]):
+            seen[mutation.name] = line["seen"]
+    return seen
 
 
 if __name__ == "__main__":

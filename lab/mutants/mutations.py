@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import ast
-import random
 from collections.abc import Iterator
 from dataclasses import dataclass
+from hashlib import sha256
+from heapq import nsmallest
 from pathlib import Path
 
 from cosmic_ray.ast import ast_nodes, get_ast
@@ -75,9 +76,13 @@ class Mutation:
 
 
 def draw(root: Path, count: int, seed: int) -> list[Mutation]:
-    """Return ``count`` of all groups' mutations, drawn with equal chances, in the order of drawing."""
-    everything = [one for group in GROUPS for one in mutations(root, group)]
-    return random.Random(seed).sample(everything, min(count, len(everything)))
+    """Return ``count`` of all groups' mutations, drawn with equal chances, in the order of drawing.
+
+    Each has a number by chance, and those of the smallest numbers are drawn: where a module changes, only
+    its own mutations are drawn anew.
+    """
+    everything = (one for group in GROUPS for one in mutations(root, group))
+    return nsmallest(count, everything, key=lambda one: sha256(f"{seed} {one.place}".encode()).digest())
 
 
 def mutations(root: Path, group: str) -> Iterator[Mutation]:

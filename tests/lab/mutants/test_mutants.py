@@ -15,6 +15,7 @@ from lab.mutants.mutations import Mutation, draw
 from lab.mutants.page import WHYS, Score, page
 from packetmesh.errors import InputError
 
+FAILED = "FAILED tests/test_half.py::test_half - assert 4 == 1\n1 failed in 0.1s\n"
 HALF = "LIMIT = 3\n\n\ndef half(x):\n    return x / 2\n"
 
 
@@ -41,11 +42,11 @@ def _exits(monkeypatch, *codes):
     ran, left = [], list(codes)
 
     def run(command, timeout, **_):
-        ran.append([path.rpartition("/")[2] for path in command[7:]])
+        ran.append([path.rpartition("/")[2] for path in command[9:]])
         code = left.pop(0)
         if code is None:
             raise subprocess.TimeoutExpired(command, timeout)
-        return subprocess.CompletedProcess(command, code, stdout="1 failed in 0.1s\n")
+        return subprocess.CompletedProcess(command, code, stdout=FAILED if code else "")
 
     monkeypatch.setattr(testing.subprocess, "run", run)
     return ran
@@ -55,6 +56,14 @@ def test_a_mutant_knows_its_line(copy):
     one = _doubles(copy)
     assert (one.line, one.source) == (5, "return x / 2")
     assert one.applied(HALF) == HALF.replace("x / 2", "x * 2")
+
+
+def test_a_new_module_changes_no_other_draw(copy):
+    before = draw(copy, 3, 1)
+    assert draw(copy, 3, 2) != before
+    (copy / "shop/whole.py").write_text("def whole(x):\n    return 1 + x\n")
+    after = draw(copy, 100, 1)
+    assert [one for one in after if one.path == "shop/half.py"][:3] == before
 
 
 @pytest.mark.parametrize(
@@ -73,11 +82,9 @@ def test_a_mutant_knows_its_line(copy):
 )
 def test_a_fault_is_seen_unless_all_tests_pass_in_time(copy, monkeypatch, codes, seen):
     ran = _exits(monkeypatch, *codes)
-    (copy / ".numba").mkdir()
-    assert testing.sees(copy, _doubles(copy), 1.0) == seen
+    assert testing.sees(copy, _doubles(copy), 1.0).seen == seen
     assert ran == [["test_half.py"], ["shop"]][: len(codes)]
     assert (copy / "shop/half.py").read_text() == HALF
-    assert not (copy / ".numba").exists()
 
 
 @pytest.mark.parametrize("code", [-9, -15])
@@ -97,18 +104,42 @@ def test_no_fault_is_planted_if_a_test_fails_without_one(copy, monkeypatch, tmp_
     assert not (tmp_path / "answers.jsonl").exists()
 
 
-@pytest.mark.parametrize("changed", ["shop/half.py", "tests/shop/test_all.py", "tests/test_half.py"])
-def test_an_answer_counts_until_the_module_or_a_test_changes(copy, monkeypatch, tmp_path, changed):
+@pytest.mark.parametrize(
+    ("code", "changed", "counts"),
+    [
+        (0, "shop/half.py", False),
+        (0, "tests/shop/test_all.py", False),
+        (0, "tests/test_half.py", False),
+        (1, "shop/half.py", False),
+        (1, "tests/shop/test_all.py", True),  # another test than the one that saw the fault
+        (1, "tests/test_half.py", False),
+    ],
+)
+def test_an_answer_counts_until_the_module_or_a_test_that_matters_changes(
+    copy, monkeypatch, tmp_path, code, changed, counts
+):
     answers = tmp_path / "answers.jsonl"
-    ran = _exits(monkeypatch, 0, 1, 0, 0, 0)
+    first = (0, code) if code else (0, 0, 0)
+    ran = _exits(monkeypatch, *first, 0, 0, 0)
     one = _doubles(copy)
-    assert answered([copy], [one], answers) == [True]
-    assert answered([copy], [one], answers) == [True]
-    assert len(ran) == 2
+    assert answered([copy], [one], answers) == [code == 1]
+    assert answered([copy], [one], answers) == [code == 1]
+    assert len(ran) == len(first)
     with (copy / changed).open("a") as file:
         file.write("\n# longer\n")
-    assert answered([copy], [one], answers) == [False]
-    assert len(answers.read_text().splitlines()) == 2
+    assert answered([copy], [one], answers) == [counts]
+    assert len(answers.read_text().splitlines()) == (1 if counts else 2)
+
+
+def test_what_was_compiled_is_kept_but_for_the_module_and_all_that_import_it(tmp_path):
+    one = Mutation("registration", "pipeline/registration/residual.py", "core/NumberReplacer", 0, 1, "")
+    names = ["registration_1f/residual.a-1.nbc", "registration_1f/loop.b-2.nbi", "kernels_2e/trees.c-3.nbi"]
+    for name in names:
+        (tmp_path / testing.SOUND / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / testing.SOUND / name).touch()
+    testing._keep_compiled(tmp_path, one)
+    kept = (tmp_path / testing.FAULTY).rglob("*.nb?")
+    assert [path.relative_to(tmp_path / testing.FAULTY).as_posix() for path in kept] == names[2:]
 
 
 def test_reasons_belong_to_a_source_line_and_equivalent_mutants_are_counted_apart():
