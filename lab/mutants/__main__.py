@@ -8,6 +8,7 @@ import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
+from itertools import repeat
 from pathlib import Path
 
 from lab.mutants.mutations import GROUPS, Mutation, draw
@@ -64,16 +65,11 @@ def answered(copies: list[Path], drawn: list[Mutation], answers: Path) -> list[b
     """
     seen = _read(answers, copies[0], drawn)
     waiting = [one for one in drawn if one.name not in seen]
-    limits_s = {}
-    with ThreadPoolExecutor(len(copies)) as pool:
-        for group in GROUPS:
-            if some := [one for one in waiting if one.group == group]:
-                limits_s[group] = max(pool.map(lambda copy: time_limit_s(copy, group, some), copies))  # noqa: B023
 
-    def work(mutation: Mutation) -> None:
+    def work(mutation: Mutation, limit_s: float) -> None:
         copy = copies.pop()
         try:
-            answer = sees(copy, mutation, limits_s[mutation.group])
+            answer = sees(copy, mutation, limit_s)
         finally:
             copies.append(copy)
         line = {"name": mutation.name, "digest": digest(copy, mutation, answer.by), **asdict(answer)}
@@ -83,7 +79,11 @@ def answered(copies: list[Path], drawn: list[Mutation], answers: Path) -> list[b
         print(f"{'seen    ' if answer.seen else 'SURVIVED'} {mutation.name}", file=sys.stderr, flush=True)
 
     with ThreadPoolExecutor(len(copies)) as pool:
-        list(pool.map(work, waiting))
+        for group in GROUPS:
+            some = [one for one in waiting if one.group == group]
+            if some:
+                limit_s = max(pool.map(time_limit_s, copies, repeat(group), repeat(some)))
+                list(pool.map(work, some, repeat(limit_s)))
     return [seen[one.name] for one in drawn]
 
 

@@ -24,7 +24,7 @@ from packetmesh.errors import InputError
 PATIENCE = 5.0
 """Time limit of each test run, as a multiple of the time that the group's tests take without a fault; a fault
 that exceeds it counts as seen, because the run may never stop."""
-LONGEST_TEST_S = 100
+LONGEST_TEST_S = 200
 """Time limit of a single test; without a fault none takes a tenth of it."""
 UNSEEN = (0, 5)
 """Exit codes of pytest if all tests pass, and if there is none to run, as all of a file are skipped. With any
@@ -43,8 +43,9 @@ def copied(folder: Path) -> Path:
 
 
 def own_tests(copy: Path, mutation: Mutation) -> list[Path]:
-    """Return the test files named after the mutated module; they may be outside of its group's folders."""
-    return sorted(copy.glob(f"tests/**/test_{Path(mutation.path).stem}.py"))
+    """Return the package's test files named after the mutated module, some outside of its group's folders."""
+    package = Path(mutation.path).parts[0]
+    return sorted((copy / "tests" / package).glob(f"**/test_{Path(mutation.path).stem}.py"))
 
 
 def group_tests(copy: Path, group: str) -> list[Path]:

@@ -15,7 +15,7 @@ from lab.mutants.mutations import Mutation, draw
 from lab.mutants.page import WHYS, Score, page
 from packetmesh.errors import InputError
 
-FAILED = "FAILED tests/test_half.py::test_half - assert 4 == 1\n1 failed in 0.1s\n"
+FAILED = "FAILED tests/shop/half/test_half.py::test_half - assert 4 == 1\n1 failed in 0.1s\n"
 HALF = "LIMIT = 3\n\n\ndef half(x):\n    return x / 2\n"
 
 
@@ -25,7 +25,11 @@ def copy(tmp_path, monkeypatch):
     monkeypatch.setattr(mutations, "GROUPS", {"mac": (("shop/*.py",), ("tests/shop",))})
     monkeypatch.setattr(testing, "GROUPS", mutations.GROUPS)
     monkeypatch.setattr("lab.mutants.__main__.GROUPS", mutations.GROUPS)
-    for path, text in {"shop/half.py": HALF, "tests/shop/test_all.py": "", "tests/test_half.py": ""}.items():
+    for path, text in {
+        "shop/half.py": HALF,
+        "tests/shop/test_all.py": "",
+        "tests/shop/half/test_half.py": "",
+    }.items():
         (tmp_path / "copy" / path).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "copy" / path).write_text(text)
     return tmp_path / "copy"
@@ -109,10 +113,10 @@ def test_no_fault_is_planted_if_a_test_fails_without_one(copy, monkeypatch, tmp_
     [
         (0, "shop/half.py", False),
         (0, "tests/shop/test_all.py", False),
-        (0, "tests/test_half.py", False),
+        (0, "tests/shop/half/test_half.py", False),
         (1, "shop/half.py", False),
         (1, "tests/shop/test_all.py", True),  # another test than the one that saw the fault
-        (1, "tests/test_half.py", False),
+        (1, "tests/shop/half/test_half.py", False),
     ],
 )
 def test_an_answer_counts_until_the_module_or_a_test_that_matters_changes(
