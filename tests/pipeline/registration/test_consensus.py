@@ -64,6 +64,12 @@ def test_no_motion_from_less_than_three_pairs_or_from_a_line():
     assert not consensus(PointPairs(line_m, line_m, np.full(10, 0.01), np.ones(10)))
 
 
+def test_three_pairs_are_enough():
+    found, *others = consensus(_pairs(3, 0, 3, sigma_m=1e-6))
+    np.testing.assert_allclose(found.T_target_source, T_TRUE, atol=1e-5)
+    assert not others
+
+
 def test_a_mirrored_cloud_has_no_consensus():
     pairs = _pairs(100, 0, 2)
     mirrored_m = pairs.target_m * np.array([-1.0, 1.0, 1.0])

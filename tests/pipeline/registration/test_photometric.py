@@ -1,5 +1,7 @@
 """Motions along a bare wall by its texture, whose true motion is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -66,6 +68,20 @@ def test_a_slide_along_a_wall_is_found_in_any_light(turn_rad, shift_m, light):
     along_m = apart[:2, 3]  # the rest is what the surfaces must hold
     assert np.linalg.norm(along_m) < 0.002
     assert np.degrees(rotation_angle_rad(apart[:3, :3])) < 0.15
+
+
+def test_a_glare_in_one_photograph_hardly_moves_the_wall():
+    """Of a sixth of the image: its pixels differ by up to ten times the others' error, and weigh less."""
+    T_color = rigid(np.eye(3), np.array([0.04, 0.0, 0.0]))
+    rows, columns = np.mgrid[:120, :160]
+    glare = 90.0 * np.exp(-((columns - 50.0) ** 2 + (rows - 60.0) ** 2) / (2.0 * 18.0**2))
+    frame = seen(T_color, seed=1)
+    rgb = np.clip(frame.rgb + glare[..., None], 0.0, 255.0).astype(np.uint8)
+    source, target = photograph(replace(frame, rgb=rgb), DEPTH_IN_COLOR), photograph(seen(np.eye(4)), DEPTH_IN_COLOR)
+    true = inverse(DEPTH_IN_COLOR) @ T_color @ DEPTH_IN_COLOR
+    found = held_by_color(source, target, np.eye(4), np.eye(6)[:, 3:5])
+    assert found is not None
+    assert np.linalg.norm((inverse(true) @ found[0])[:2, 3]) < 0.001
 
 
 def test_nothing_moves_along_the_motions_that_are_held():
