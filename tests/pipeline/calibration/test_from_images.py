@@ -4,8 +4,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 
-from packetmesh.progress import drain
+from packetmesh.progress import Progress, drain
 from pipeline.calibration.board import Board
 from pipeline.calibration.from_images import image_files, iterate_calibration, paths_by_name
 from tests.pipeline.calibration.views import photograph, poses
@@ -30,6 +31,20 @@ def test_images_of_one_name_are_named_by_their_paths():
         str(files[1]): files[1],
         "color_01.png": files[2],
     }
+
+
+@pytest.mark.parametrize("pattern", ["chessboard", "circles"])
+def test_progress_never_falls_and_ends_before_the_whole(tmp_path, pattern):
+    board = Board(pattern, 5, 4, 0.05)
+    files = [tmp_path / f"{index}.png" for index in range(6)]
+    for path, T in zip(files, poses(board), strict=False):
+        cv2.imwrite(str(path), photograph(board, T))
+    shares = [
+        step.fraction for step in iterate_calibration(files, board, folds=2) if isinstance(step, Progress)
+    ]
+    assert shares == sorted(shares)
+    assert 0.0 <= shares[0] < 0.1
+    assert 0.6 < shares[-1] <= 1.0
 
 
 def test_a_warp_holds_out_every_view_even_if_no_others_are_held_out(tmp_path):

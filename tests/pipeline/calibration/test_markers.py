@@ -15,6 +15,7 @@ from pipeline.calibration.aprilgrid import tag_points
 from pipeline.calibration.board import Board
 from pipeline.calibration.detect import detect
 from pipeline.calibration.dictionaries import FAMILIES, dictionary, known_dictionary
+from pipeline.calibration.markers import Markers, fit
 from tests.pipeline.calibration.views import CAMERA, photograph, poses, seen
 
 PIXELS = 60
@@ -44,6 +45,18 @@ def test_the_dictionary_of_a_board_need_not_be_known(name):
     found = detect(picture, board)
     assert len(found.indices) == 20
     assert off_px(found, corners).max() < 0.5
+
+
+@pytest.mark.parametrize("along_px", [(0.0, 0.0), (10.0, 0.0), (7.0, 7.0)])
+def test_markers_at_one_place_or_on_one_line_fit_no_board(along_px):
+    """No map from pixels to the board follows from them."""
+    centres = np.stack(np.meshgrid(np.arange(3.0), np.arange(2.0)), axis=-1).reshape(-1, 2)
+    centres_px = 50.0 + np.arange(6)[:, None] * np.array(along_px)
+    square_px = np.array([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])
+    seen = Markers("4X4_50", np.arange(6), centres_px[:, None] + square_px)
+    assert fit(seen, centres, 1.0) is None
+    straight = Markers("4X4_50", np.arange(6), 50.0 + 10.0 * centres[:, None] + square_px)
+    assert fit(straight, centres, 1.0).in_place.all()
 
 
 @pytest.mark.parametrize("rows", [3, 4, 5])

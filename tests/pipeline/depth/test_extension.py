@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.depth.extension import SLOPE_SHARE, extrapolated
+from pipeline.depth.extension import SLOPE_SHARE, WINDOW_PX, _predict, _upsample, extrapolated
 
 GREY = np.full((240, 320, 3), 90, np.uint8)
 HOLE = np.s_[90:150, 120:200]
@@ -40,6 +40,32 @@ def test_a_slope_goes_on_past_the_rim_and_fades():
     steps = np.diff(filled[120, 199:])
     assert 0.5 * SLOPE_SHARE * slope < steps[:8].mean() <= slope
     assert steps[-30:].mean() < 0.5 * steps[:8].mean()
+
+
+@pytest.mark.parametrize("away", [(WINDOW_PX, 0), (-WINDOW_PX, 0), (0, WINDOW_PX), (0, -WINDOW_PX)])
+def test_a_pixel_is_predicted_from_any_side_of_its_window(away):
+    """By one known pixel at the window's rim, and by none beyond it."""
+    known = np.zeros((20, 20), bool)
+    v, u = 10, 9
+    at, beyond = (v + away[0], u + away[1]), (v + 4 * away[0] // 3, u + 4 * away[1] // 3)
+    known[at] = known[beyond] = True
+    values = np.zeros((20, 20, 3), np.float32)
+    values[at], values[beyond] = (0.25, 0.01, -0.02), (9.0, 0.0, 0.0)
+    weights, predicted = np.ones((7, 7)), np.empty(3)
+    _predict(values, known, np.zeros((20, 20, 3), np.float32), weights, v, u, predicted)
+    np.testing.assert_allclose(predicted[0], 0.25 - away[0] * 0.01 + away[1] * 0.02, rtol=1e-6)
+    np.testing.assert_allclose(predicted[1:], [0.97 * 0.01, -0.97 * 0.02], rtol=1e-6)
+
+
+def test_between_coarse_pixels_of_one_colour_a_plane_stays_a_plane():
+    step, shape = 3, (30, 42)
+    down, right = np.indices(shape).astype(np.float32)
+    plane = 0.5 + 0.02 * down - 0.03 * right
+    coarse = np.ascontiguousarray(plane[1::step, 1::step])
+    field, known = np.zeros(shape, np.float32), np.zeros(shape, bool)
+    _upsample(field, known, np.zeros((*shape, 3)), coarse, np.zeros((*coarse.shape, 3)), step)
+    inside = np.s_[1:-1, 1:-1]
+    np.testing.assert_allclose(field[inside], plane[inside], atol=1e-5)
 
 
 @pytest.mark.parametrize("axis", [0, 1])

@@ -367,6 +367,14 @@ def test_a_fifth_is_hidden_in_squares_apart():
     assert not hidden_squares(np.zeros((48, 64), bool)).any()
 
 
+@pytest.mark.parametrize("height", [240, 480, 700])
+def test_the_squares_are_a_twenty_fourth_of_the_width(height):
+    side, rows = round(640 / 24), height // round(640 / 24)
+    hidden = hidden_squares(np.ones((height, 640), bool))
+    squares = hidden[: rows * side, : 23 * side].reshape(rows, side, 23, side)
+    assert (squares == squares[:, :1, :, :1]).all()
+
+
 def test_depth_is_placed_in_the_middle_of_the_grid():
     plane = np.arange(12.0, dtype=np.float32).reshape(3, 4)
     whole = on_grid(plane, (4, 3), (5, 8))

@@ -36,6 +36,13 @@ def test_a_perfect_pair_weighs_less_than_one_at_the_mean():
     assert weights[0] < weights[1]
 
 
+def test_a_pair_too_far_to_have_any_density_weighs_nothing():
+    near_m = 0.005 + 5e-4 * np.random.default_rng(0).normal(size=3000)
+    kept = CeicpLiteral(0.4, "mm").weigh(pairs_at(np.append(near_m, 0.3)))
+    assert kept.weights[-1] == 0.0
+    assert kept.weights.sum() == pytest.approx(1.0)
+
+
 @pytest.mark.parametrize(("sigma", "positive"), [(0.398, False), (0.400, True)])
 def test_weights_turn_negative_below_0_399_units(sigma, positive):
     weights, fitted = density_information(5.0 + _with_deviation(sigma))

@@ -77,7 +77,10 @@ def test_a_glare_in_one_photograph_hardly_moves_the_wall():
     glare = 90.0 * np.exp(-((columns - 50.0) ** 2 + (rows - 60.0) ** 2) / (2.0 * 18.0**2))
     frame = seen(T_color, seed=1)
     rgb = np.clip(frame.rgb + glare[..., None], 0.0, 255.0).astype(np.uint8)
-    source, target = photograph(replace(frame, rgb=rgb), DEPTH_IN_COLOR), photograph(seen(np.eye(4)), DEPTH_IN_COLOR)
+    source, target = (
+        photograph(replace(frame, rgb=rgb), DEPTH_IN_COLOR),
+        photograph(seen(np.eye(4)), DEPTH_IN_COLOR),
+    )
     true = inverse(DEPTH_IN_COLOR) @ T_color @ DEPTH_IN_COLOR
     found = held_by_color(source, target, np.eye(4), np.eye(6)[:, 3:5])
     assert found is not None

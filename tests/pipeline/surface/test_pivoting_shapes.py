@@ -218,6 +218,16 @@ def test_a_list_of_radii_covers_at_least_what_open3d_does(make):
     assert (edges_and_faces(triangles)[1] == 1).sum() <= (edges_and_faces(expected)[1] == 1).sum()
 
 
+def test_each_edge_of_the_front_has_one_triangle_so_far():
+    points_m, normals = flat_grid(6, 6)
+    steps = list(iterate_roll(points_m, normals, (0.075,), batch=1))
+    assert len(steps) >= 50
+    for k, step in enumerate(steps):
+        edges, faces = edges_and_faces(np.concatenate([one.triangles for one in steps[: k + 1]]))
+        rims = set(map(tuple, edges[faces == 1].tolist()))
+        assert {tuple(sorted(edge)) for edge in step.front_edges.tolist()} <= rims
+
+
 def test_batches_show_the_front_and_can_be_cancelled():
     points_m, normals = flat_grid(40, 40)
     steps = iterate_roll(points_m, normals, (0.075, 0.2), batch=100)
