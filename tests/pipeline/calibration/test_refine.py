@@ -6,9 +6,9 @@ import pytest
 
 from pipeline.calibration.board import Board
 from pipeline.calibration.detect import detect
-from pipeline.calibration.estimate import View, calibrate, held_out, place, rms_px
+from pipeline.calibration.estimate import FittedView, View, calibrate, held_out, place, rms_px
 from pipeline.calibration.lens import Optics
-from pipeline.calibration.refine import refined_px
+from pipeline.calibration.refine import _samples, refined_px
 from pipeline.kernels.geometry import rigid, rotation_exp
 from tests.pipeline.calibration.views import CAMERA, photograph, seen
 
@@ -44,6 +44,19 @@ def test_centres_come_nearer_at_every_tilt_and_do_not_depend_on_it(board, tilt_d
     after_px = off_px(refined_px(gray, board, fitted, OPTICS), true_px)
     assert after_px < 0.8 * off_px(view.points_px, true_px)
     assert after_px < 0.02
+
+
+@pytest.mark.parametrize(("distance_m", "samples"), [(1.0, 60), (0.75, 80), (0.4, 121), (3.0, 41)])
+def test_a_neighbourhood_has_a_sample_a_pixel_within_limits(distance_m, samples):
+    """Of a circle whose nearest is 0.1 m away, seen flat by a lens of 600 px."""
+    board = Board("circles", 5, 4, 0.1)
+    optics = Optics(
+        "thesis", np.array([[600.0, 0.0, 319.5], [0.0, 600.0, 239.5], [0.0, 0.0, 1.0]]), np.zeros(5)
+    )
+    T = rigid(np.eye(3), np.array([0.0, 0.0, distance_m]))
+    points_px = optics.project(board.points_m, T)
+    view = FittedView("", T, np.zeros_like(points_px), points_px, board.points_m)
+    assert _samples(view, board) == pytest.approx(samples, abs=1)
 
 
 def test_the_camera_and_what_it_predicts_become_better():

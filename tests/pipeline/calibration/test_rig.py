@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from packetmesh.errors import InputError, ReconstructionError
 from pipeline.calibration import rig
@@ -113,6 +114,30 @@ def test_covariances_are_those_of_least_squares_with_their_degrees_of_freedom():
     told = found.adjusted.camera_covariance, *found.adjusted.lens_covariances
     for covariance, sds in zip(told, (expected[0], *expected[2:]), strict=True):
         np.testing.assert_allclose(np.sqrt(np.diag(covariance)), sds, rtol=1e-4)
+
+
+@pytest.mark.parametrize(("camera", "reference"), [("node_01", "node_00"), ("node_02", "node_01")])
+def test_the_covariance_between_two_cameras_is_the_cameras_own_carried_over(camera, reference):
+    """With the change of the relative pose by differences."""
+    given = session(cameras=3, moments=4, noise_px=0.3)
+    found = calibrate_rig(given.lenses(), given.seen, BOARD)
+    bundle, names = found.adjusted.bundle, list(found.names)
+    a, b = names.index(reference), names.index(camera)
+
+    def pose(step):
+        placed = bundle.moved(np.append(step, np.zeros(sum(bundle.sizes) - len(step)))).T_camera_first
+        return placed[a] @ inverse(placed[b])
+
+    def change(step):
+        before, after = pose(-step), pose(step)
+        turn = Rotation.from_matrix(after[:3, :3] @ before[:3, :3].T).as_rotvec()
+        return np.append(turn, after[:3, 3] - before[:3, 3]) / 2e-6
+
+    J = np.stack([change(h) for h in 1e-6 * np.eye(bundle.sizes[0])], axis=1)
+    expected = J @ found.adjusted.camera_covariance @ J.T
+    told = found.relative(camera, reference).covariance
+    size = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(told / np.outer(size, size), expected / np.outer(size, size), atol=1e-5)
 
 
 def test_a_rig_knows_its_lenses_better_than_each_camera_does_and_so_its_poses():

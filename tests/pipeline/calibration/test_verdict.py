@@ -37,6 +37,7 @@ def test_the_word_follows_from_the_probability(found, probability, word):
     assert judged.probability == pytest.approx(probability)
     assert (judged.passed, judged.failed) == (word == "pass", word == "fail")
     assert judged.word == word
+    assert "At 2 m a point is placed within 5 mm over 95 % of the image with a" in judged.sentence
     assert f"with a probability of {percent(probability)}, and within" in judged.sentence
     assert re.search(rf": {word}\.", judged.sentence)
 
