@@ -90,7 +90,7 @@ class Candidates:
     chance: FloatArray
     """(C, T) float32 chance of each candidate to measure each target."""
     overlap_shares: FloatArray
-    """(C,)"""
+    """(C,) share of each candidate's image on measured surface that one present camera sees, too."""
     allowed: BoolArray
     """(C,) True for candidates with enough overlap."""
 

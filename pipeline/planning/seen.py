@@ -1,4 +1,4 @@
-"""Everything that the present cameras know of a place, by which a camera is judged that is not there yet."""
+"""Knowledge of the present cameras about a place, from which candidates for new cameras are judged."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pipeline.types import BoolArray, Surface
 
 @dataclass(frozen=True, slots=True)
 class SeenPlace:
-    """Everything that judges a camera which is not there yet."""
+    """Everything by which a candidate for a new camera is judged."""
 
     surface: Surface
     whole: o3d.t.geometry.RaycastingScene

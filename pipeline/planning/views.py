@@ -1,4 +1,4 @@
-"""What the present cameras see: measured surface, guesses, nothing, and what is dark to the sensor."""
+"""Views of the present cameras: measured surface, guesses, nothing, and what is dark to the sensor."""
 
 from __future__ import annotations
 
