@@ -237,7 +237,7 @@ def rectangle(
 
 
 def together(points_m: FloatArray, residuals_m: FloatArray, spacing_m: float) -> float:
-    """Return how many neighbours err together: 1 for independent residuals.
+    """Return how many neighbouring vertices have one common error on average: 1 for independent residuals.
 
     It is 1 + the sum of the residuals' correlations with all others, up to the first distance without any.
 
@@ -250,11 +250,11 @@ def together(points_m: FloatArray, residuals_m: FloatArray, spacing_m: float) ->
     if variance_m2 <= 0.0 or len(points_m) < LEAST_POINTS:
         return 1.0
     every = max(1, len(points_m) // COMPARED)
-    asked = np.arange(0, len(points_m), every)
-    pairs = cKDTree(points_m[asked]).sparse_distance_matrix(
+    compared = np.arange(0, len(points_m), every)
+    pairs = cKDTree(points_m[compared]).sparse_distance_matrix(
         cKDTree(points_m), LAGS * spacing_m, output_type="ndarray"
     )
-    here, there, lag = asked[pairs["i"]], pairs["j"], pairs["v"] / spacing_m
+    here, there, lag = compared[pairs["i"]], pairs["j"], pairs["v"] / spacing_m
     others = here != there
     bins = np.minimum(np.rint(lag[others]).astype(int), LAGS - 1)
     count = np.bincount(bins, minlength=LAGS)
@@ -263,4 +263,4 @@ def together(points_m: FloatArray, residuals_m: FloatArray, spacing_m: float) ->
     noise = 3.0 / np.sqrt(np.maximum(count, 1))
     silent = np.flatnonzero((count > 0) & (correlation <= noise))
     last = int(silent[0]) if len(silent) else LAGS
-    return 1.0 + float((count[:last] * correlation[:last]).sum()) / len(asked)
+    return 1.0 + float((count[:last] * correlation[:last]).sum()) / len(compared)
