@@ -19,7 +19,8 @@ class RigPlan:
     """The next cameras of a rig, and the cost of sending their images."""
 
     seen: SeenPlace
-    """What the present cameras know of the place; of a plan without dark surface, ``without_dark`` of it."""
+    """Knowledge of the present cameras about the place; in a plan that leaves dark surface out, without
+    it."""
     rig: Rig
     """The registered present cameras, at the poses that registration found."""
     plan: Plan

@@ -38,7 +38,7 @@ PREVIEW_WIDTH_PX = 48
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """What a candidate would add."""
+    """Chances and overlap of one candidate."""
 
     chance: FloatArray
     """(T,) float32 chance that it measures each of the targets."""
@@ -47,7 +47,7 @@ class Judged:
 
 
 def judge(seen: SeenPlace, T_world_camera: FloatArray, sensor: Sensor) -> Judged:
-    """Estimate what a camera at this pose would measure of the targets.
+    """Estimate the chance of each target to be measured by a camera at this pose.
 
     A target counts if no surface stands between it and the camera, nor between it and the sensor's projector
     or second camera. Its chance is then the product of those by angle, distance and darkness.

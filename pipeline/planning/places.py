@@ -1,4 +1,4 @@
-"""Where a camera may stand and what it may look at: on walls, ceilings, furniture and tripods."""
+"""Candidates for new cameras: places on walls, ceilings, furniture and tripods, and aims of the view."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ BY_HAND: Literal["by hand"] = "by hand"
 
 @dataclass(frozen=True, slots=True)
 class PlanConfig:
-    """What may be planned."""
+    """Settings of a plan: number and kind of its cameras, and where they may stand."""
 
     cameras: int = 1
     """Cameras to be added."""
@@ -58,7 +58,7 @@ class PlannedCamera:
     T_world_camera: FloatArray
     where: Where | Literal["by hand"]
     promise: Promise
-    """What it adds to the present cameras and to those before it in the plan."""
+    """Its gain over the present cameras and those before it in the plan."""
     overlap_share: float
     """Share of its image on measured surface that one present camera sees, too."""
 
@@ -71,7 +71,7 @@ class Plan:
     sensor: Sensor
     cameras: tuple[PlannedCamera, ...]
     total: Promise
-    """What all of them add together."""
+    """Gain of all of them together."""
     at_least_of_best: float
     """Share of the expected gain that the best choice among these candidates could have, at least."""
     candidates: int

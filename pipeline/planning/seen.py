@@ -28,7 +28,7 @@ class SeenPlace:
     guessed: BoolArray
     """(F,) True for guessed triangles."""
     views: tuple[PresentView, ...]
-    """What each registered camera sees."""
+    """View of each registered camera."""
     targets: Targets
     space: FreeSpace
     measured_share: float

@@ -1,4 +1,4 @@
-"""The rays of the present cameras that meet no measured surface: what a new camera can add."""
+"""Targets of new cameras: the rays of the present cameras that meet no measured surface."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ ASIDE_PX = 2
 
 
 class Meets(IntEnum):
-    """What a pixel's ray meets."""
+    """Kind of surface that a pixel's ray meets."""
 
     MEASURED = 0
     GUESSED = 1
