@@ -24,12 +24,12 @@ _AGAIN = "try a test with iperf3 --json again"
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """What iperf3 says about an interval, all its streams together."""
+    """An interval of a test by iperf3, all its streams together."""
 
     start_s: float
     duration_s: float
     rate_bps: float
-    """What TCP delivered, or the datagrams that UDP sent."""
+    """Rate at which TCP delivered, or at which UDP sent datagrams."""
     round_trip_s: float | None
     """Mean of the streams; only the sender of TCP measures it."""
     loss: float | None
