@@ -33,6 +33,7 @@ LEAST_SPREAD = 1.0
 FLAT = 0.35
 """Largest ratio of the seed's thickness to its width; a corner or an edge is thicker."""
 MOST_PASSES = 15
+"""Most times that a plane is fitted and its part is grown again."""
 COMPARED = 800
 """Most vertices whose residuals are compared for their correlation."""
 LAGS = 12
@@ -188,7 +189,7 @@ def fitted(surface: MeasuredSurface, part: IntArray, inner: IntArray | None = No
     own_m = surface.sigma_m[rows] * np.einsum("vi,i->v", surface.rays[rows], normal)
     variance_m2 = max(float(share @ residuals_m**2) / freedom, float(share @ own_m**2))
     spacing_m = lookup_of(surface).spacing_m
-    independent = 1.0 / float(share @ share) / together(arms_m[:, 1:], residuals_m, spacing_m)
+    independent = 1.0 / float(share @ share) / correlated_neighbours(arms_m[:, 1:], residuals_m, spacing_m)
     covariance = variance_m2 / max(independent, 1.0) * np.linalg.inv(information)
     covariance[1:, 0], covariance[0, 1:] = -covariance[1:, 0], -covariance[0, 1:]
     nodes, counts = np.unique(surface.nodes[rows], return_counts=True)
@@ -236,7 +237,7 @@ def rectangle(
     return axes, low_m, high_m
 
 
-def together(points_m: FloatArray, residuals_m: FloatArray, spacing_m: float) -> float:
+def correlated_neighbours(points_m: FloatArray, residuals_m: FloatArray, spacing_m: float) -> float:
     """Return how many neighbouring vertices have one common error on average: 1 for independent residuals.
 
     It is 1 + the sum of the residuals' correlations with all others, up to the first distance without any.

@@ -25,7 +25,7 @@ class Brightness:
         self._recording = recording
         self._keyframe: tuple[int, Photograph | None] = (-1, None)
 
-    def held(
+    def corrected(
         self, source: int, keyframe: int, T_keyframe_source: FloatArray, motions: FloatArray
     ) -> tuple[FloatArray, FloatArray] | None:
         """Correct a frame's pose by colour (``held_by_color``); None also if an image cannot be read."""
