@@ -24,7 +24,9 @@ SERIAL_POINTS = 512
 CORES = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 """Cores of this machine, or the lower ``NUMBA_NUM_THREADS``, set for processes that run in parallel."""
 _MOST_LEVELS = 64
+"""Rows of a search's stack: more than any tree has levels."""
 _MOST_GUESSES = 64
+"""Most thresholds that are tried to find the ``count`` smallest values."""
 compiled = numba.njit(cache=True, nogil=True)
 
 

@@ -12,7 +12,9 @@ from pipeline.surface.pivoting import roll
 from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud
 
 NEIGHBOURS = 24
+"""Nearest neighbours whose triangles around a point are computed."""
 SAMPLES = 2_000
+"""Most points at which the needed radius is computed."""
 LEVELS = {"finest": 0.50, "even": 0.90, "widest": 0.99}
 """Share of the surface that each suggested ball has to be wide enough for."""
 _AGREES = 0.5

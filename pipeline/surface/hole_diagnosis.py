@@ -33,6 +33,7 @@ _PLACES = 8
 _WHOLE = 6.0
 """A rim up to this many ball radii around its centre is examined completely."""
 _SAMPLES = 200
+"""Number of points that are drawn in a hole."""
 
 
 @dataclass(frozen=True, slots=True)
