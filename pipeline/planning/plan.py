@@ -73,13 +73,13 @@ class Plan:
     total: Promise
     """Gain of all of them together."""
     at_least_of_best: float
-    """Share of the expected gain that the best choice among these candidates could have, at least."""
+    """Lower bound on the plan's expected gain, as a share of the largest possible with these candidates."""
     candidates: int
     """Number of candidates that could be chosen: they could be registered, and none was barred."""
     barred: int
     """Number of candidates that could be registered, but were barred."""
     measured_share: float
-    """Share of the present cameras' rays on measured surface, before."""
+    """Share of the present cameras' rays on measured surface, without the new cameras."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +176,7 @@ def moved_plan(
         seen: the place.
         plan: the plan before.
         T_world_camera: (4, 4) pose of each camera, in the order of the plan.
-        judged: what a camera at each of these poses would measure.
+        judged: chances and overlap of a camera at each of these poses.
     """
     targets = seen.targets
     missed: FloatArray = np.ones(len(targets.points_m))
