@@ -1,7 +1,6 @@
 """A k-d tree of points with compiled searches, which run on all cores without Python's lock.
 
-Unlike SciPy's tree, a search can start from a known bound (the distance to an earlier neighbour), as
-iterations need, and the points of a leaf are adjacent in memory.
+Unlike in SciPy's tree, a search can start from a known bound, the distance to an earlier neighbour.
 """
 
 from __future__ import annotations
