@@ -123,8 +123,8 @@ class NodesConfig:
     bytes_by_node: tuple[int, ...] = ()
     """Size of each node's own image, depth included; empty gives every node both sizes above."""
     first_bytes_by_node: tuple[int, ...] = ()
-    """Bytes of its image that each node sends first; it sends the others when the sink requests them, which
-    has then these of all nodes. Empty: nodes send their whole images without a request."""
+    """Bytes of its image that each node sends first. The sink waits for these of all nodes, then requests the
+    others. Empty: nodes send their whole images without a request."""
     request_bytes_by_node: tuple[int, ...] = ()
     """Bytes of the sink's request to each node, without its header, if nodes wait for one."""
     request_after_s: float = 1.0
@@ -298,9 +298,10 @@ class NetworkConfig:
                     f"mac.kind is {self.mac.kind}, which puts several packets into a frame, but vehicles "
                     "send one after the other; try ieee80211b"
                 )
-            key, size_bytes = "scheme.datagram_bytes", self.scheme.datagram_bytes + self.scheme.headers_bytes
+            key, data_bytes = "scheme.datagram_bytes", self.scheme.datagram_bytes
+            headers_bytes = self.scheme.headers_bytes
         else:
-            key, size_bytes = "nodes.payload_bytes", self.nodes.payload_bytes
+            key, data_bytes, headers_bytes = "nodes.payload_bytes", self.nodes.payload_bytes, 0
         if self.nodes.first_bytes_by_node and not self.mac.reaches_nodes:
             confirmed = self.mac.kind == "lora"
             raise InputError(
@@ -315,11 +316,13 @@ class NetworkConfig:
                 f"radio.capture_db is {capture_db}, with which {self.mac.kind} would receive two frames at "
                 "once; try at least 0"
             )
+        size_bytes = data_bytes + headers_bytes
         if most is not None and size_bytes > most:
             by = {
                 "lora": f" with mac.spreading_factor={self.mac.spreading_factor}",
                 "ieee80211ah": f" with mac.mcs={self.mac.mcs} and mac.bandwidth_hz={self.mac.bandwidth_hz:g}",
             }.get(self.mac.kind, "")
             raise InputError(
-                f"{key} makes packets of {size_bytes} bytes, but {self.mac.kind} carries {most}{by}"
+                f"{key} makes packets of {size_bytes} bytes, but {self.mac.kind} carries {most}{by}; "
+                f"try {key}={most - headers_bytes}"
             )

@@ -34,10 +34,10 @@ class PacketKind(IntEnum):
     SUMMARY = 1
     """Tags of images that a node offers."""
     REQUEST = 2
-    """What the collector asks for: ids of images, or in a collection the parts that follow an image's first
-    bytes."""
+    """Request of the collector: ids of images, or in a collection the bytes after the first ones of an
+    image."""
     STATUS = 3
-    """Which fragments of an image the sink is missing."""
+    """Fragments of an image that the sink is missing."""
 
 
 class EventKind(IntEnum):

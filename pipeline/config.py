@@ -180,10 +180,10 @@ class RegistrationConfig:
     with_scale: bool = False
     """Estimate a similarity instead of a rigid motion (point metric only)."""
     gate_m: float = 0.3
-    """Largest pair distance T_d of CEICP."""
+    """Largest pair distance T_d of CEICP; the shift at which every method stops is in proportion to it."""
     sigma_min_m: float | None = None
-    """Smallest weight scale of CEICP-A; None takes 0.6 times the target's median spacing, or its median
-    depth noise where that is larger."""
+    """Smallest weight scale of CEICP-A and CEICP-R; None takes the largest of 0.6 times the target's median
+    spacing, its median depth noise, and a thousandth of the gate."""
     sigma_decay: float = 0.85
     """Factor rho by which CEICP-A's scale shrinks in each iteration."""
     trim: float = 0.9

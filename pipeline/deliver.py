@@ -115,24 +115,24 @@ def _moments(sending: Sending, processes: int) -> Iterator[Moment]:
         for index in others:
             yield drain(here.moment(index))
         return
-    pool = process_pool(processes, _start, sending)
+    pool = process_pool(processes, _start_worker, sending)
     try:
-        yield from pool.map(_moment_there, others)
+        yield from pool.map(_moment_in_worker, others)
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-_there: Rebuilder
+_rebuilder: Rebuilder
 """The ``Rebuilder`` of a worker process."""
 
 
-def _start(sending: Sending) -> None:
-    global _there
-    _there = Rebuilder(sending)
+def _start_worker(sending: Sending) -> None:
+    global _rebuilder
+    _rebuilder = Rebuilder(sending)
 
 
-def _moment_there(index: int) -> Moment:
-    return drain(_there.moment(index))
+def _moment_in_worker(index: int) -> Moment:
+    return drain(_rebuilder.moment(index))
 
 
 def _last(sending: Sending, lossless: Reconstruction) -> Reconstruction | None:

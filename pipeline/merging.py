@@ -89,21 +89,19 @@ def merge_fused(
             for the sensors' noise.
         smoothing_passes: how many times every point is moved onto the plane of its neighbours.
     """
-    beside = threads("merging", 2)
+    pool = threads("merging", 2)
     keep: list[BoolArray | None] = [None] * len(nodes)
     if mode == "fill":
-        keep = list(
-            beside.map(partial(not_guessed_in_view, frames, nodes, T_world_camera), range(len(nodes)))
-        )
+        keep = list(pool.map(partial(not_guessed_in_view, frames, nodes, T_world_camera), range(len(nodes))))
     joint = partial(_joint, nodes, keep)
     voxel_m = _voxel_m(nodes, joint(), T_world_camera, max_points)
     if mode != "fill":
         fused = replace(merge(joint(), T_world_camera, voxel_m, smoothing_passes), sigma_m=None)
         return FusedCloud(fused, voxel_m, *spacing(fused.points_m), None)
-    own = beside.submit(thinned, (node.sensor for node in nodes), T_world_camera, voxel_m)
+    own = pool.submit(thinned, (node.sensor for node in nodes), T_world_camera, voxel_m)
     whole = thinned(joint(), T_world_camera, voxel_m)
     sensors = own.result()
-    smoothed = beside.submit(smooth, sensors, smoothing_passes)
+    smoothed = pool.submit(smooth, sensors, smoothing_passes)
     guesses = smooth(whole, smoothing_passes, guessed_alone(sensors, whole, voxel_m))
     measured = smoothed.result()
     labelled = replace(measured, source=np.full(len(measured), PointSource.SENSOR, np.uint8))

@@ -116,7 +116,7 @@ network parallel to the outlier filter would save less than .1 s and take 0.2 GB
 
 
 def whole_s(timings_s: Mapping[str, float]) -> float:
-    """Return the time of all stages together, of those that run in parallel that of the longer one."""
+    """Return the time of all stages together; of two that run in parallel only the longer one counts."""
     hidden_s = (min(timings_s.get(stage, 0.0) for stage in pair) for pair in SIDE_BY_SIDE)
     return sum(timings_s.values()) - sum(hidden_s)
 

@@ -125,12 +125,12 @@ def run(
         if stage in results:
             continue
         if following and (stage, following) in SIDE_BY_SIDE and _ready(following, results):
-            beside = threads("stage", 1).submit(drain, compute(spec, following, cache))
+            parallel = threads("stage", 1).submit(drain, compute(spec, following, cache))
             try:
                 results[stage] = yield from compute(spec, stage, cache)
             finally:
-                wait([beside])
-            results[following] = beside.result()
+                wait([parallel])
+            results[following] = parallel.result()
         else:
             results[stage] = yield from compute(spec, stage, cache)
     return results

@@ -1,4 +1,4 @@
-"""Bytes of depth and colour images by coding, beside other lossless coders and at equal likeness."""
+"""Bytes of depth and colour images: our codings and other programs', lossless and at equal likeness."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class DepthCoder:
 
     name: str
     pieces: str
-    """What is lost with a lost byte."""
+    """Part of the image that is lost with a lost byte."""
     write: Callable[[DepthArray], list[Packed]]
     read: Callable[[list[Packed], tuple[int, int]], DepthArray]
 

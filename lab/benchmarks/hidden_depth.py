@@ -18,9 +18,11 @@ EDGE_STEP = 1.08
 BLOB_RADII = (0.015, 0.05)
 """Least and largest half axis of a blob, in shares of the image's diagonal."""
 LARGEST_SHARE = 0.9
+"""Largest share of the measured pixels that can be hidden."""
 LEAST_OF_DISC = 0.8
 """Least share of a disc's pixels that have depth to hide."""
 MOST_MISSES = 100
+"""Consecutive shapes that hide nothing new, after which no more are drawn."""
 
 
 def hide(sensor: DepthMap, rng: np.random.Generator, share: float) -> BoolArray:

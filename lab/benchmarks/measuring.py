@@ -50,11 +50,11 @@ def _line(group: Row) -> str:
     low, high = group["coverage_ci95"]
     unit, times = UNITS.get(group["kind"], (" mm", 1000.0))
     ratio = group["error_over_raw"]
-    beside = "" if ratio is None else f", {ratio:.2f} x that of single measurements"
+    ratio_text = "" if ratio is None else f", {ratio:.2f} x that of single measurements"
     return (
         f"{group['kind']}, {'guessed' if group['guessed'] else 'measured'}: {group['measures']} in "
         f"{group['rooms']} rooms, {100.0 * group['coverage']:.1f} % of the intervals hold "
         f"({100.0 * low:.1f} to {100.0 * high:.1f} %), median error {times * group['median_error']:.2f}{unit}"
-        f"{beside}, median half width {times * group['median_half_width']:.2f}{unit}, "
+        f"{ratio_text}, median half width {times * group['median_half_width']:.2f}{unit}, "
         f"{1000.0 * group['p95_s']:.0f} ms at the 95th percentile"
     )

@@ -45,7 +45,7 @@ def control(task: Task) -> list[Row]:
     for name in REMEDIED:
         masks = METHODS[name].masks(rig, poses)
         row = {"rig": task.rig, "poses": task.poses, "method": f"{name}, registered with the base layers"}
-        row["told_bytes"] = float(METHODS[name].told_bytes(task.rig, masks))
+        row["told_bytes"] = float(METHODS[name].received_bytes(task.rig, masks))
         rows.append(row | saved(task.rig, masks) | _remedied(rig, frames_sent(rig, masks)))
     return rows
 

@@ -59,8 +59,8 @@ class Method:
 
     masks: Callable[[Rig, Sequence[FloatArray]], Masks]
     """Returns the tiles, given a rig and its believed poses."""
-    told_bytes: Callable[[str, Masks], int]
-    """Returns the bytes that nodes must receive for it, given the rig's name and the tiles."""
+    received_bytes: Callable[[str, Masks], int]
+    """Returns the bytes that nodes must receive from others for it, given the rig's name and the tiles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,11 +94,11 @@ def rprr(known: Known, thresholds: Thresholds) -> Method:
         ]
         return predicted_tiles(views, thresholds)
 
-    return Method(masks, partial(_depth_bytes_told, known))
+    return Method(masks, partial(_received_depth_bytes, known))
 
 
-def _depth_bytes_told(known: Known, name: str, masks: Masks) -> int:
-    """Return the bytes of depth that nodes must receive from all cameras before them."""
+def _received_depth_bytes(known: Known, name: str, masks: Masks) -> int:
+    """Return the bytes of depth that all nodes together must receive: each that of all cameras before it."""
     sizes = [
         size.base_depth if known == "base" else int(size.tiles.depth[~mask].sum())
         for size, mask in zip(sizes_of_rig(name), masks, strict=True)
@@ -112,7 +112,7 @@ METHODS = {
     "RPRR, others' exact depth": rprr("exact", Thresholds(sigmas=5.0, share=0.8)),
 }
 """Methods that are judged. Of the thresholds tried on eight validation rooms, these save most bytes with a
-mean loss of at most .1 points of F-score at 5 cm and .3 at 1 cm, each method by itself."""
+mean loss of at most .1 points of F-score at 5 cm and .3 at 1 cm; each method was tuned separately."""
 AT_RIGHT_POSES = {"ours, strict": ours(STRICT)}
 """Methods that are judged at the right poses only."""
 
@@ -234,7 +234,7 @@ def trial(task: Task, methods: dict[str, Method], ways: Iterable[Way]) -> list[R
         masks = method.masks(rig, poses)
         row: Row = {"rig": task.rig, "poses": task.poses, "method": name}
         row["believed_error_m"] = camera_error_m(rig, poses)
-        row["told_bytes"] = float(method.told_bytes(task.rig, masks))
+        row["told_bytes"] = float(method.received_bytes(task.rig, masks))
         rows.append(row | saved(task.rig, masks) | meshes(rig, frames_sent(rig, masks), poses, ways))
     return rows
 

@@ -1,4 +1,4 @@
-"""D12 and D13: what a planned camera promises beside what it gives (SPEC 12)."""
+"""D12 and D13: the gain that a planned camera promises, compared with its real gain (SPEC 12)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from packetmesh.progress import Progress
 from pipeline.types import FloatArray
 
 FIRST_ROOM, ROOMS = 60, 20
-"""The judged rooms of the split ``test``: earlier ones had a part in the promise, or showed its faults."""
+"""The judged rooms of the split ``test``: earlier rooms set the promise's constants, or showed its faults."""
 FEW_ROOMS = 3
 """Number of rooms that are judged by default; each takes some minutes."""
 STEPS = 5

@@ -57,12 +57,12 @@ def find(root: Path) -> list[Load]:
     scenes = [file.parent for file in sorted(root.rglob("disp0.pfm"))]
     archives = sorted(root.rglob(ARCHIVE))
     return [
-        *(partial(_load_scene, folder) for folder in scenes if _there(folder, "im0.png", "calib.txt")),
-        *(partial(_load_motorcycle, file) for file in archives if _there(file.parent, ARCHIVE_PICTURE)),
+        *(partial(_load_scene, folder) for folder in scenes if _has_files(folder, "im0.png", "calib.txt")),
+        *(partial(_load_motorcycle, file) for file in archives if _has_files(file.parent, ARCHIVE_PICTURE)),
     ]
 
 
-def _there(folder: Path, *names: str) -> bool:
+def _has_files(folder: Path, *names: str) -> bool:
     return all((folder / name).is_file() for name in names)
 
 

@@ -21,13 +21,13 @@ SETS: dict[str, Callable[[Path], list[Load]]] = {
 }
 """For each kind of set, the function that finds its pairs in a folder."""
 EXPECTED = {
-    "nyu": "nyu_depth_v2_labeled.mat, or pictures *.jpg beside 16-bit depth *.png",
+    "nyu": "nyu_depth_v2_labeled.mat, or pictures *.jpg next to 16-bit depth *.png",
     "kitti": "DATE/DATE_drive_NUMBER_sync/image_02/data with ground-truth PNG or velodyne files",
     "sunrgbd": "folders with image/ and depth_bfx/ or depth/",
     "tum": "sequences with rgb.txt and depth.txt, less than 20 ms apart",
     "folder": "color/NAME and depth/NAME.png, NAME_rgb and NAME_depth.png, or color.png and depth.png",
     "middlebury": "im0.png, disp0.pfm and calib.txt, or motorcycle_left.png and motorcycle_disp.npz",
-    "sr300": "depth_M_color.txt beside chateau.xml, and castel/image_0000.pgm with its depth_image_0000.bin",
+    "sr300": "depth_M_color.txt next to chateau.xml, and castel/image_0000.pgm with its depth_image_0000.bin",
 }
 """The files of each kind of set, for the error message if they are missing."""
 

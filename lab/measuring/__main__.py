@@ -1,4 +1,4 @@
-"""Print what set a constant of measuring: ``python -m lab.measuring guesses|misfit|poses [ROOMS]``."""
+"""Print the basis of a constant of measuring: ``python -m lab.measuring guesses|misfit|poses [ROOMS]``."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ def guesses(rooms: int) -> None:
             all_rooms += some[:MOST_OF_A_ROOM]
     for some in errors:
         values = ", ".join(f"{value:.3f}" for value in np.quantile(some, CHANCES))
-        _say(f"    ({values}),")
+        _write(f"    ({values}),")
 
 
 def misfit(rooms: int) -> None:
@@ -52,7 +52,7 @@ def misfit(rooms: int) -> None:
     for factor in FACTORS:
         with _set(views, "MISFIT_FACTOR", factor):
             scores = np.concatenate([_depth_scores(room) for room in _rooms(rooms)])
-        _say(
+        _write(
             f"MISFIT_FACTOR {factor:g}: {100.0 * np.mean(np.abs(scores) < Z95):.1f} % of {len(scores)} "
             "depths are inside their intervals"
         )
@@ -69,7 +69,7 @@ def poses(rooms: int) -> None:
             found = np.array([_pose_error(room) for room in _rooms(rooms)])
         turn, shift = np.sqrt(np.mean(found[:, :2] ** 2, axis=0)) / FOCAL_SD
         held = 100.0 * np.mean(found[:, 2] < chi2.ppf(0.95, 6))
-        _say(
+        _write(
             f"WEAK_SHARE {share:g}: {held:.0f} % of {len(found)} poses are in their 95 % ellipsoid, "
             f"root mean square turn {turn:.2f}, shift {shift:.2f} (SLACK_OF_SCALE, each direction)"
         )
@@ -124,5 +124,5 @@ def _set(module: ModuleType, name: str, value: float) -> Iterator[None]:
         setattr(module, name, before)
 
 
-def _say(line: str) -> None:
+def _write(line: str) -> None:
     sys.stdout.write(f"{line}\n")

@@ -49,9 +49,9 @@ def cut_pair(
 ) -> CutPair:
     """Return two overlapping parts of a room's visible surface, cut by two parallel upright planes.
 
-    The planes are perpendicular to a random level direction. One cloud is all before the farther plane, the
-    other all behind the nearer one. The points are drawn independently for both, at most ``POINTS`` each,
-    with ``NOISE_M`` of noise.
+    The planes are perpendicular to a random level direction. One cloud is the part in front of the farther
+    plane, the other the part behind the nearer one. The points of both are drawn independently, at most
+    ``POINTS`` each, with ``NOISE_M`` of noise.
 
     Args:
         split: ``VALIDATION`` or ``HELD_OUT`` of ``lab.places.pairs``; the rooms are those of ``pair``.
@@ -94,7 +94,7 @@ def _visible_surface(scene: Scene, rng: Rng) -> FloatArray:
 
 
 def _halves(surface_m: FloatArray, overlap: float, rng: Rng) -> tuple[FloatArray, FloatArray]:
-    """Return the points before one plane and those behind another, drawn and with noise.
+    """Return the points in front of one plane and those behind another, drawn and with noise.
 
     With a share h of the surface in each half, (2 h - 1) / h of each is common, so h = 1 / (2 - overlap).
     """

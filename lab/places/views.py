@@ -29,7 +29,7 @@ NEAREST_M = 0.4
 CLEARANCE_M = 0.25
 """The line between the two cameras must be free, and this much of its extension behind the second one."""
 SHELL_PARTS = (1, 6)
-"""Ceiling and walls of a random room: its parts from the first index to before the second."""
+"""Ceiling and walls of a random room: its parts from the first index up to, but not including, the second."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from lab.trials import iterate_trials
 from packetmesh.progress import drain
 
 GAINS = ("room", "rank", "promised", "low", "high", "real", "placed")
-"""What the output has of each suggestion."""
+"""Values of each suggestion that are printed."""
 
 
 def main() -> None:

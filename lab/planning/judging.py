@@ -1,4 +1,4 @@
-"""Suggested cameras in one room: what was promised of each, and what came of it."""
+"""Suggested cameras in one room: the promised and the real gain of each."""
 
 from __future__ import annotations
 
@@ -40,16 +40,18 @@ class Suggested:
     """Place among the room's suggestions by the promise; 0 is what the planner would choose."""
     where: str
     promised: float
-    """Points (%) of the present cameras' rays; the others as well."""
+    """Promised gain, like all gains here in points (%) of the present cameras' rays."""
     low: float
     high: float
+    """Ends of the promise's interval."""
     real: float
+    """Gain after the camera was rendered and added to the rig; 0 if it sees too little."""
     placed: bool
     overlap_share: float
     searched: float
-    """What the exhaustive search finds that it measures, and"""
+    """Gain of this camera by the exhaustive search, which renders the depth of every allowed candidate."""
     best_searched: float
-    """the most that it finds for any candidate of the room."""
+    """Largest gain that the exhaustive search finds for a candidate of the room."""
 
 
 def judged_room(seed: int) -> list[Row]:
@@ -103,7 +105,7 @@ def ranked(judged: Candidates) -> IntArray:
 def _searched(
     seen: SeenPlace, judged: Candidates, scene: Scene, renderer: Renderer, truth: RigTruth, seed: int
 ) -> FloatArray:
-    """Return (C,) share of the rays that each candidate's rendered depth measures newly."""
+    """Return (C,) share of the rays that each rendered candidate newly measures; 0 for those not allowed."""
     points_m = _true_points_m(seen, truth)
     small = scaled(scene.intrinsics, SEARCH_SCALE)
     shares = np.zeros(len(judged.candidates))

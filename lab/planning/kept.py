@@ -1,4 +1,4 @@
-"""One promise and what came of it: a suggested camera, rendered and added to its rig."""
+"""Real gain of a suggested camera: it is rendered, added to its rig, and the rig reconstructed again."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pipeline.types import CameraIntrinsics, DepthMap, FloatArray, RgbdFrame, Ri
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a camera added to the surface after it was rendered and registered."""
+    """Real gain of a camera after it was rendered and added to the rig."""
 
     gain_share: float
     """Share of the earlier cameras' rays that meet measured surface now and did not before."""

@@ -12,7 +12,7 @@ from pipeline.types import FloatArray
 
 
 def measures(rows: Sequence[Row]) -> dict[str, float]:
-    """Return how the promises of suggestions in several rooms compare with what came of them.
+    """Return how the promises of suggestions in several rooms compare with their real gains.
 
     Points are per cent of the present cameras' rays. ``rank_correlation`` is Spearman's over all suggestions,
     ``share_of_search`` what the best suggestions measure in the exhaustive search over its best, summed over

@@ -12,11 +12,11 @@ def between_cameras(numbers: Row) -> str:
     parts = [
         "Rigs of three cameras, coding `exact`. Each method leaves out tiles of a camera that another one "
         "shows; *ours* is that of `deliver --leave-out-seen`, without the network. Its limits were chosen on "
-        "validation rooms, those of RPRR, whose sender predicts its tiles from what other cameras have sent, "
-        "in the same way. *To the nodes*: what nodes receive for it. The differences of F-score, in points, "
-        "are those of a rig with itself, all tiles being sent; in brackets the 95 % interval over rigs, then "
-        "the worst rig. *At the true poses* the clouds are merged there; *by the chain* what was sent is "
-        "registered from the believed poses."
+        "validation rooms, like those of RPRR, in which a sender predicts its tiles from what other cameras "
+        "have sent. *To the nodes*: bytes that nodes receive for the method. Differences of the F-score, in "
+        "points, are to the same rig with all tiles sent; in brackets the 95 % interval over rigs, then the "
+        "worst rig. *At the true poses* the clouds are merged at these poses; *by the chain* the clouds of "
+        "what was sent are registered from the believed poses."
     ]
     for kind in dict.fromkeys(entry["rooms"] for entry in entries):
         some = [entry for entry in entries if entry["rooms"] == kind]

@@ -22,11 +22,11 @@ def codings(numbers: Row) -> str:
     """Return the tables of the record, group after group."""
     runs = numbers["codings"]["runs"]
     parts = [
-        "Depth: all coders are lossless; pieces are what a lost byte costs. Tables of ours come from "
-        "training rooms. Colour: of each coder the lowest quality at which an image is as like its original "
-        "as JPEG's of quality 90 (SSIM); the error is the root mean square over pixels with depth, of 255. "
-        "Pieces are without headers. The program sends AVIF of quality 82, the lowest at which each image of "
-        "the validation rooms is as like its original. Times are medians of one core."
+        "Depth: all coders are lossless; *pieces*: what one lost byte destroys. The tables of our coders "
+        "come from training rooms. Colour: of each coder the lowest quality at which an image is as like its "
+        "original as JPEG's of quality 90 (SSIM); the error is the root mean square over pixels with depth, "
+        "of 255. Pieces are without headers. The program sends AVIF of quality 82, the lowest at which each "
+        "image of the validation rooms is as like its original. Times are medians of one core."
     ]
     for (kind, group), rows in groupby(runs, key=lambda run: (run["kind"], run["group"])):
         found = list(rows)

@@ -14,9 +14,9 @@ from pipeline.depth.slopes import GRID_WIDTH_PX
 
 TARGET, TARGET_PX = 0.75, 40
 """Target: error over that of the best other program, at discs of at least this many pixels."""
-SAID = "80% to 90%"
+REPORTED_BIN = "80% to 90%"
 """The bin of confidence that the text reports."""
-SAID_SHARES = (80.0, 90.0)
+REPORTED_SHARES = (80.0, 90.0)
 TUNING = (
     "Which sets had a part in tuning: the validation rooms had; held-out rooms, demo scenes and real frames "
     "had none."
@@ -63,7 +63,7 @@ def target(runs: Sequence[Row]) -> str:
     rest = f"; elsewhere it has {min(missed):.2f} to {max(missed):.2f} times that error" if missed else ""
     return (
         f"**The target.** Completion was to have at most {TARGET} times the error of the best of the others "
-        f"at discs of {TARGET_PX} px and more. It has at {listed(reached)}{rest}."
+        f"at discs of {TARGET_PX} px and more. It reaches this at {listed(reached)}{rest}."
     )
 
 
@@ -95,29 +95,30 @@ def reasons() -> str:
     return (
         f"**Why no better.** It was trained on {images:,} frames in {minutes} minutes of two cores, and "
         f"its loss was still falling. Its grid has {GRID_WIDTH_PX} cells across, and what is smaller "
-        "is blurred. And near a rim the measurements around it say nearly all there is to know: whoever "
-        "continues them does well."
+        "is blurred. Near a rim the surrounding measurements nearly determine the depth, so that simple "
+        "programs, which continue them, do well."
     )
 
 
 def trust(claim: Row) -> str:
     """Return a paragraph on the pixels whose confidence is 80 to 90 %: the share that is right, by group."""
     (bins,) = (found for found in claim["tables"] if found["title"] == "Confidence in bins")
-    rows = [row for row in bins["rows"] if row[1] == SAID]
+    rows = [row for row in bins["rows"] if row[1] == REPORTED_BIN]
     shares = {group: true for group, _, _, _, true in rows}
     pixels = [int(str(row[2]).replace(",", "")) for row in rows]
     right = sum(count * _share(true) for count, true in zip(pixels, shares.values(), strict=True))
-    low, high = SAID_SHARES
+    low, high = REPORTED_SHARES
     modest = [group for group, true in shares.items() if _share(true) > high]
     sure = [group for group, true in shares.items() if _share(true) < low]
     measured = "; ".join(f"{group}: {true}" for group, true in shares.items())
     return (
-        f"**Its confidence.** Of pixels said to be right with {low:.0f} to {high:.0f} %, so many are: "
-        f"{measured}; of all of them together {right / sum(pixels):.1f} %. "
+        f"**Its confidence.** Share of right pixels among those with a confidence of {low:.0f} to "
+        f"{high:.0f} %: {measured}; of all groups together {right / sum(pixels):.1f} %. "
         f"Confidence too low in: {'; '.join(modest) or 'none'}; too high in: {'; '.join(sure) or 'none'}. A "
         "sensor's own holes are where it fails: dark, shiny and far things, unlike what surrounds them. "
-        "Hidden shapes lie where it measured, on things that are easier to continue, so there its "
-        "confidence follows other odds; both were fitted on validation rooms, hole pixels counting alike."
+        "Hidden shapes are where the sensor had measured, on things that are easier to continue, so their "
+        "confidence has odds of its own; both odds were fitted on validation rooms, all hole pixels counting "
+        "the same."
     )
 
 

@@ -52,7 +52,7 @@ def recordings(numbers: Row) -> str:
         "whose images are in memory. OMP_NUM_THREADS=1 and NUMBA_NUM_THREADS=1 give each program one core, "
         "but for threads that Open3D still starts. A walk is lost if its ATE is over 20 cm or half of its "
         "frames have no pose. F-scores compare the surface with the part of the room that the walk looks at "
-        "within 4 m; rays without a surface are those from viewpoints 25 cm beside the camera's."
+        "within 4 m; rays without a surface are those from viewpoints 25 cm to the camera's side."
     ]
     parts += [f"![Error of the trajectory over frames a second, by program]({PICTURE})"]
     for case, result in numbers.items():

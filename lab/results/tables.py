@@ -69,7 +69,7 @@ its own, so that it can grow while rays without a surface become fewer.
 
 {table(header, rows)}
 
-What fills a hole is a guess, and fewer missing rays do not say that it is right: the F-score does, and it
+What fills a hole is a guess, and fewer missing rays do not show that it is right. The F-score shows it, and
 falls in {_falls(numbers)}."""
 
 
@@ -89,10 +89,10 @@ def real_frames(numbers: Row) -> str:
     ]
     lower, frames = (sum(found[key] for found in numbers.values()) for key in ("lower_after", "frames"))
     return f"""Before → after fusion by the preset `packetmesh`, means over the frames; no truth is needed.
-*Within*: of the measured pixels, those whose ray meets the surface so near to the measurement. No network was
-trained on any of these frames. The desk and the basket are Kinect frames, `sr300` frames of a
+*Within*: of the measured pixels, those whose ray meets the surface within this share of the measurement. No
+network was trained on any of these frames. The desk and the basket are Kinect frames, `sr300` frames of a
 RealSense SR300 in Debian's visp-images-data, `middlebury` the motorcycle in the wheel of scikit-image 0.17.2;
-`PACKETMESH_DEPTH_SETS` names where the last two lie.
+`PACKETMESH_DEPTH_SETS` names the folders of the last two.
 
 {table(header, rows)}
 
@@ -163,14 +163,14 @@ def filling(numbers: Row) -> str:
 was measured; rooms and demo scenes also have their own holes, judged by the truth. AbsRel over all hole
 pixels, in brackets its 95 % interval / share of all hole pixels filled within 5 %. What a program leaves
 empty takes the nearest measured depth. Intervals resample rooms and demo scenes, but of the real frames
-only the hidden parts: they say nothing of other frames. *Flat guess*: one depth everywhere, aligned and
+only the hidden parts: they do not hold for other frames. *Flat guess*: one depth everywhere, aligned and
 judged as ours. *Pixel baseline*: our network's depth along one robust line through the pixels that the
 sensor has.
 
 {pivot(shapes, "program", ("group",), lambda run: f"{error(run)} / {percent(run['close_share'])}")}
 
-Smallest error, and most pixels within 5 %: {"; ".join(best)}. Error less ours on the same pixels, its 95 %
-interval; above 0 it is larger than ours, and where 0 lies within nobody is better:
+Smallest error, and most pixels within 5 %: {"; ".join(best)}. Error minus ours on the same pixels, 95 %
+interval: above 0 the error is larger than ours; if the interval contains 0, neither is better:
 
 {pivot(others, "program", ("group",), _excess)}
 

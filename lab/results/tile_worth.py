@@ -14,12 +14,13 @@ def tile_worth(numbers: Row) -> str:
         "Rigs of three cameras, coding `exact`, given poses off by some centimetres and degrees. The surface "
         "is that of the whole chain at 5 cm, from the base layers, their colours and the first depth tiles "
         "of each node; its F-score is measured at a few shares of the depth and interpolated between them. "
-        "`layered` has the same depth tiles and base layers in the same own order: until its colour begins, "
-        "its bytes are those of `exact`. *kB*: all nodes' images until then, the base layers with them; "
-        "*of own*: of each rig's kB in the coding's own order. Seconds and joules of the nodes are those of "
-        "the network model until the sink has as many bytes, lost packets being sent again: over five seeds, "
-        "losses in bursts of eight packets. *With colour*: rigs that need colour images too; they "
-        "count with all bytes. By worth, the nodes wait for the request, and for the second in "
+        "The coding `layered` begins with the same base layers and depth tiles in the same order, so these "
+        "numbers hold for it until its colour begins. *kB*: bytes of all nodes' images, base layers "
+        "included, until the surface has that share of the F-score; *of own*: these bytes as a share of "
+        "those in the coding's own order, rig by rig. Seconds and joules of the nodes are those of the "
+        "network model until the sink has as many bytes; lost packets are sent again; five seeds, losses in "
+        "bursts of eight packets. *With colour*: rigs that need colour images, too; they count with all "
+        "their bytes. In the order by worth, times include the wait for the sink's request and the second in "
         "which the sink computes it. In brackets the 95 % interval over rigs.",
         *(_first(entry) for entry in numbers["first"]),
     ]

@@ -45,7 +45,7 @@ The probability that our verdict states, and how often the camera was good:
 
 
 def _cells(counts: Row) -> tuple[Cell, ...]:
-    """Return the numbers of a row, wrong ones with their share."""
+    """Return the numbers of a row, those of wrong verdicts with their share."""
     cells: list[Cell] = [counts["judged"]]
     for word, of_these in (
         ("pass", "pass, wrong"),

@@ -15,6 +15,7 @@ from pipeline.types import FloatArray
 
 _UPHOLSTERED = ("sofa", "couch", "armchair", "bed", "cushion", "pouf", "puff", "ottoman", "curtain")
 _OPENING_DEPTH_M = 0.06
+"""Largest depth of a door or window in a room."""
 
 
 def dressed(

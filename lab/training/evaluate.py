@@ -22,6 +22,7 @@ FIRST_TEST_ROOM = FIRST_SEED["test"]
 """First seed of the test split's rooms."""
 MODES: tuple[AlignmentMode, ...] = ("none", "median", "affine_depth", "affine_inverse", "local")
 BLOCK_PX = 32
+"""Side of the blocks of a real frame that align or evaluate."""
 SHOWN = ("abs_rel", "rmse_m", "rmse_log", "delta_1", "silog")
 
 

@@ -47,7 +47,7 @@ class SensedView:
     depth: DepthArray
     """(H, W) millimetres as a Kinect's depth camera gives them."""
     registered: DepthArray
-    """(H, W) millimetres of a depth camera beside the colour camera, registered to its pixels."""
+    """(H, W) millimetres of a depth camera next to the colour camera, registered to its pixels."""
 
 
 def sensed_views(seed: int, views: int = VIEWS) -> Iterator[SensedView]:

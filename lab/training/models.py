@@ -17,8 +17,10 @@ Kind = Literal["matt", "glossy", "glass", "mirror", "glowing"]
 GRID = 24
 """Cells along each side of a model's map of heights."""
 _CUBES = 40_000
+"""About the number of colour cubes of a model's surface."""
 _TRIANGLES_PER_M, _FEWEST, _MOST = 2000, 300, 3500
 _KEPT_AREA = 0.75
+"""Least share of the area that a simplified mesh must keep."""
 _FRAME = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Rotation from the catalogue's frame (Y up, front towards +Z) to a piece's (Z up, front towards -Y)."""
 

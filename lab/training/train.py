@@ -103,12 +103,12 @@ def stop_on_signals() -> Iterator[Tensor]:
     stop = torch.zeros(1, dtype=torch.bool).share_memory_()
     usual = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 
-    def ask(number: int, _: object) -> None:
+    def request_stop(number: int, _: object) -> None:
         stop.fill_(True)
         signal.signal(number, usual[signal.Signals(number)])
 
     for number in usual:
-        signal.signal(number, ask)
+        signal.signal(number, request_stop)
     try:
         yield stop
     finally:
@@ -123,7 +123,7 @@ def device_of(config: TrainingConfig) -> torch.device:
         InputError: the device is cuda and there is no GPU.
     """
     if config.device == "cuda" and not torch.cuda.is_available():
-        raise InputError("Device cuda was asked for, but torch finds no GPU here: use cpu or auto.")
+        raise InputError("device is cuda, but torch finds no GPU on this machine: use cpu or auto.")
     return torch.device("cuda" if config.device != "cpu" and torch.cuda.is_available() else "cpu")
 
 

@@ -72,7 +72,7 @@ GROUPS = (
 
 
 def counts(verdicts: Sequence[dict[str, Any]]) -> dict[str, int]:
-    """Count verdicts, the wrong ones, and the good cameras on which there is no decision."""
+    """Count verdicts, the wrong ones among them, and the good cameras among the undecided."""
     numbers = {"judged": len(verdicts)}
     for word, wrong_if in (("pass", False), ("fail", True), ("not decided", True)):
         found = [one for one in verdicts if one["word"] == word]

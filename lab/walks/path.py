@@ -158,7 +158,7 @@ def walk_poses(scene: Scene, camera: CameraIntrinsics, count: int, rng: Rng) -> 
             size = min(size, curve.size_in(duration_s))
             if curve.times_s(size)[-1] > duration_s:  # the gaze alone takes longer
                 continue
-            poses = _held(curve, size, count, rng)
+            poses = _handheld_poses(curve, size, count, rng)
             eyes_m = np.array([T[:3, 3] for T in poses])
             if space.distances_m(eyes_m).min() >= CLEARANCE_M and all(
                 is_usable(meter.look(T)) for T in poses
@@ -210,7 +210,7 @@ def _with_pitch(curve: _Curve, size: float, spread: float, meter: OverlapMeter, 
     return _Curve(curve.center_m, curve.offsets_m, gaze_rad)
 
 
-def _held(curve: _Curve, size: float, count: int, rng: Rng) -> list[FloatArray]:
+def _handheld_poses(curve: _Curve, size: float, count: int, rng: Rng) -> list[FloatArray]:
     """Return T_world_camera of a curve's frames, equally spaced in time, with the hand's jitter."""
     times_s = curve.times_s(size)
     u = np.interp(np.linspace(0.0, times_s[-1], count), times_s, np.linspace(0.0, 1.0, _FINE + 1))

@@ -91,13 +91,13 @@ def _seen_m(room: Mesh, frames: Sequence[Camera]) -> FloatArray:
 
 def _without_surface(mesh: Mesh, room: Mesh, frames: Sequence[Camera]) -> float:
     """Return the share of the rays to the room, from places next to the cameras, that miss the mesh."""
-    beside = [
+    cameras = [
         Camera(
             one.intrinsics, one.T_world_camera @ rigid(np.eye(3), np.array([(-1) ** k * BESIDE_M, 0.0, 0.0]))
         )
         for k, one in enumerate(frames)
     ]
-    true_depths, own_depths = (hit_depths(some.vertices_m, some.triangles, beside) for some in (room, mesh))
+    true_depths, own_depths = (hit_depths(some.vertices_m, some.triangles, cameras) for some in (room, mesh))
     missed = [
         np.isnan(own.z_m[true.z_m < JUDGED_TO_M]) for true, own in zip(true_depths, own_depths, strict=True)
     ]

@@ -1,7 +1,7 @@
 """Rendering of board views: photographs and biased depth by the cameras of a rig (SPEC 1.2, 1.5).
 
 The sheet is sampled with ``OVER`` x ``OVER`` rays per pixel through the true lens, lit by the room's lamps.
-Objects before it hide it; the room behind it is traced once per camera.
+Objects in front of it hide it; the room behind it is traced once per camera.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class BoardImage:
 
 @dataclass(frozen=True, slots=True)
 class BoardViews:
-    """A board at several moments before several cameras."""
+    """A board at several moments in front of several cameras."""
 
     board: Board
     cameras: tuple[BoardCamera, ...]
@@ -167,7 +167,7 @@ def _with_board(
     camera: BoardCamera,
     rng: np.random.Generator,
 ) -> Exposure:
-    """Return the exposure of the room with the board in it, where no object is before the board."""
+    """Return the exposure of the room with the board in it; objects in front of the board hide it."""
     T_camera_board = inverse(camera.T_world_camera) @ T_world_board
     window = _window(board, T_camera_board, camera.intrinsics)
     if window is None:
@@ -211,7 +211,7 @@ def _window(board: Board, T_camera_board: FloatArray, intrinsics: CameraIntrinsi
         InputError: the sheet is partly behind the camera.
     """
     if is_partly_behind(board, T_camera_board):
-        raise InputError("A board stands beside a camera, partly behind it; move it before the camera")
+        raise InputError("A board is partly behind a camera; move all of it in front of the camera")
     corners_m = apply(T_camera_board, sheet_corners_m(board))
     if (corners_m[:, 2] <= NEAREST_M).any():
         return None

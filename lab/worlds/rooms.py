@@ -59,7 +59,7 @@ def random_room(seed: int) -> Scene:
 
 
 def _dress_walls(plan: _Plan, rng: Rng) -> list[FloatArray]:
-    """Add skirting, windows, doors, pictures and shelves; return (3,) positions of light before windows."""
+    """Add skirting, windows, doors, pictures and shelves; return (3,) places of light at windows."""
     windows = []
     skirting = Material(paint(muted(rng, 1, 0.1, 0.8)[0], 2)) if rng.random() < 0.6 else None
     for wall in range(4):

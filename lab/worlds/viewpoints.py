@@ -208,7 +208,7 @@ def _is_bare(part: IntArray, most: float) -> bool:
 
 
 def _sees_enough(z_m: FloatArray, part: IntArray, close: bool) -> bool:
-    """Return whether nothing is close before the lens and the picture is not mostly walls and ceiling."""
+    """Return whether nothing is close to the lens and the picture is not mostly walls and ceiling."""
     if _is_bare(part, 0.45 if close else 0.65):
         return False
     nearest, middle, far = np.percentile(z_m, [2.0, 50.0, 95.0])

@@ -68,7 +68,7 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """What one node sends."""
+    """The tiles that one node sends, with their sizes."""
 
     pieces: Pieces
     order: IntArray

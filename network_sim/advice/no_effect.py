@@ -36,6 +36,7 @@ _POWER_LAW = ("radio.path_loss_exponent", "radio.reference_m")
 _PLACES = ("nodes.layout", "nodes.spacing_m", "nodes.places_m")
 _PDC = ("scheme.r_low", "scheme.r_high", "scheme.observation_s", "scheme.control_s")
 _EQUAL_RTOL = 1e-9
+"""Relative difference below which two links are equal."""
 Reasons = Iterator[tuple[Iterable[str], str]]
 """Keys of settings, and why they change nothing."""
 

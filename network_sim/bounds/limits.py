@@ -29,6 +29,7 @@ _MOST = {
 _LEAST = {"s": 1e-9, "m": 1e-9, "hz": 1.0, "bps": 1.0, "gain": 1e-9}
 """Smallest value above 0; times are simulated in nanoseconds."""
 MOST_NODES = 10_000
+"""Largest number of nodes, vehicles or access points."""
 _LEAST_BY_NAME = {"reference_m": 1e-3}
 _MOST_BY_NAME = {
     "path_loss_exponent": 20.0,

@@ -1,4 +1,4 @@
-"""Sizes of what nodes send before the sink's request, and of these requests."""
+"""Bounds on the bytes that nodes send before the sink requests the others, and on the requests."""
 
 from __future__ import annotations
 

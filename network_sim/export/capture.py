@@ -1,6 +1,6 @@
 """Packet captures (pcap) of a run, for Wireshark, tshark and other readers.
 
-A capture holds every frame that was on the air, as a sniffer beside its sender sees it: frames that collided
+A capture holds every frame that was on the air, as a sniffer next to its sender sees it: frames that collided
 or were lost are in it, unharmed. A record's time is the start of its frame's preamble, from the start of the
 run, in nanoseconds. Addresses are the number of each node in the trace, plus 1.
 """
@@ -29,6 +29,7 @@ LINKTYPE_IEEE802_15_4 = 195
 
 _MAGIC_NS = 0xA1B23C4D
 _MOST_BYTES = 1 << 18
+"""Largest size of a frame (snapshot length) that the file's header states."""
 _FILE_HEADER = Struct("<IHHiIII").pack
 _RECORD_HEADER = Struct("<IIII").pack
 

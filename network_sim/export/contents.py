@@ -1,4 +1,4 @@
-"""What each packet of a run carries, as the bytes of its frame's payload."""
+"""Content of each packet of a run, as the bytes of its frame's payload."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from network_sim.export.datagrams import IPV4_BYTES, LOWPAN_BYTES, ipv4_datagram
 from network_sim.trace.log import NetworkTrace
 from network_sim.types import EventKind, PacketKind
 
-NOBODY = -1
+NO_NODE = -1
+"""Index where no node, or no single one, is meant."""
 
 
 class OnAir(NamedTuple):
@@ -47,7 +48,7 @@ class Contents:
         )
         self._headers, self._data_bytes, self._names = header_bytes(config), most, trace.names
         self._lowpan = config.mac.kind == "ieee802154"
-        self._last = NOBODY if street else len(trace.names) - 1
+        self._last = NO_NODE if street else len(trace.names) - 1
         entered = trace.events.of(EventKind.ENQUEUE)
         packets, first = np.unique(entered.packet, return_index=True)
         self._sources = _by_id(packets, entered.node[first])
@@ -77,7 +78,7 @@ class Contents:
         return ipv4_datagram(*ends, packet, padded(text, size_bytes - IPV4_BYTES))
 
     def _destination(self, row: OnAir) -> int:
-        if self._last == NOBODY:
+        if self._last == NO_NODE:
             return row.peer
         to_camera = row.packet_kind in (PacketKind.STATUS, PacketKind.REQUEST)
         return int(self._cameras[row.image]) if to_camera else self._last
@@ -94,6 +95,6 @@ class Contents:
 
 def _by_id(ids: NDArray[np.int32], values: NDArray[np.generic]) -> NDArray[np.int32]:
     """Return an array that holds the value of each id at its index, and -1 elsewhere."""
-    found = np.full(int(ids.max(initial=-1)) + 1, NOBODY, np.int32)
+    found = np.full(int(ids.max(initial=-1)) + 1, NO_NODE, np.int32)
     found[ids] = values
     return found

@@ -1,6 +1,6 @@
 """Contents of packets as bytes: a datagram where the configured headers have room for one, else raw data.
 
-A simulated packet has a size and no content. A line of text says what it carries; zeros fill it up.
+A simulated packet has a size and no content. Here it gets a line of text on its content, followed by zeros.
 """
 
 from __future__ import annotations

@@ -54,8 +54,8 @@ def data_frame(
         sequence: sequence number, 0 to 4095.
         retry: whether the frame was sent before.
         reserved_us: time for which the channel is reserved after the frame.
-        ether_type: what the payload is.
-        payload: what the frame carries after LLC and SNAP.
+        ether_type: EtherType of the payload.
+        payload: content of the frame after the headers LLC and SNAP.
     """
     return _data(_DATA, sender, receiver, sequence, retry, reserved_us, b"", ether_type, payload)
 

@@ -108,7 +108,7 @@ def _lost(events: Events) -> NDArray[np.bool_]:
 
 
 def _entered_ns(ended: Events, entered: Events) -> NDArray[np.int64]:
-    """Return when each packet entered the node's buffer, (N,); a packet that came twice, the last time."""
+    """Return (N,) times at which packets entered the node's buffer; of one that came twice, the last time."""
     order = np.argsort(entered.packet, kind="stable")
     at = np.searchsorted(entered.packet[order], ended.packet, side="right") - 1
     return entered.t_ns[order[at]]

@@ -19,7 +19,7 @@ _RATE_STEP_BPS = 500_000
 _HEAD = Struct("<BBHI").pack
 _AH_MHZ, _900_MHZ_OFDM = 915, 0x44
 _TLVS = 1 << 28
-"""What follows is type, length and value."""
+"""The fields that follow have a type, a length and a value."""
 _S1G_TYPE, _S1G_SHORT, _S1G_2_MHZ = 32, 1, 1 << 8
 _S1G_KNOWN = 0b110101
 """Format, guard interval, bandwidth and MCS are known."""

@@ -25,6 +25,7 @@ PAUSE_NS = NS_PER_S // 50
 """Mean pause after the second unacknowledged packet in a row, doubled with each further one; without it,
 hidden nodes collide for ever."""
 MAX_DOUBLINGS = 8
+"""Most times that the mean pause is doubled."""
 GUARD_NS = to_ns(GUARD_S)
 
 
@@ -290,7 +291,7 @@ class Camera:
         self._settle_if_done(outgoing)
 
     def _settle_if_done(self, outgoing: Outgoing) -> None:
-        """Stop sending an image if nothing of it is left to send, or start to wait for the sink's word."""
+        """Stop sending an image if nothing of it is left to send, or start to wait for the sink's answer."""
         shared = self._shared
         all_sent = not outgoing.to_send and not outgoing.queued
         if all_sent and not shared.config.retransmit and not outgoing.waits:

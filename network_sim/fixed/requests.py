@@ -17,16 +17,16 @@ from network_sim.fixed.nodes import Shared, Station
 from network_sim.types import Cause, Packet, PacketKind, to_ns
 
 MOST_SILENCES = 4
-"""Times ``Shared.status_after_ns`` without new first bytes after which the sink decides without those that
-are missing, where nodes send lost packets again: a camera repeats its last fragment after twice this time.
-Where they do not, the sink waits for one such time."""
+"""If no new first bytes arrive for this many times ``Shared.status_after_ns``, the sink decides without the
+missing ones. Cameras that send lost packets again repeat their last fragment after twice ``status_after_ns``,
+so it can still arrive. If nodes send nothing again, the sink waits for one such time only."""
 
 ON_AIR = (Cause.CHANNEL, Cause.RETRIES, Cause.LINK)
-"""Why the medium access gives up a packet that can be sent again at once."""
+"""Causes for which the medium access gives up a packet that can be sent again at once."""
 
 
 class Requests:
-    """The sink's state: which first bytes it waits for, and when it requested what of whom."""
+    """The sink's state: the first bytes that it waits for, and the time of its request to each node."""
 
     def __init__(self, shared: Shared, station: Station) -> None:
         """Start waiting; ``station`` sends the requests."""

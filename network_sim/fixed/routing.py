@@ -15,6 +15,7 @@ from network_sim.radio.places import Places
 from network_sim.radio.propagation import Radio, modulation
 
 _QUANTILES = 64
+"""Quantiles of the fading over which the success of a frame is averaged."""
 
 
 @dataclass(frozen=True, slots=True)

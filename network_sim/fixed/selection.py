@@ -55,7 +55,10 @@ def view_quality(
 
 
 def coverage(q: FloatArray, cameras: Sequence[int], weights: FloatArray | None = None) -> float:
-    """Return F of a set of cameras; ``weights`` (V,) are one by default."""
+    """Return F of a set of cameras, the expected weight of the voxels that at least one of them sees.
+
+    F = sum_v w_v (1 - prod_i (1 - q_iv)) over voxels v (SPEC 6.3); ``weights`` w (V,) are one by default.
+    """
     missed = np.prod(1.0 - q[list(cameras)], axis=0)
     return float(_weights(q, weights) @ (1.0 - missed))
 

@@ -96,7 +96,8 @@ def cumulative_radio_j(counters: Counters, nodes: NDArray[np.bool_], config: Ene
         config: power of each state.
 
     Returns:
-        (M + 1,) joules until each of ``counters.edges_ns``, starting with 0 at the end of the warm-up.
+        (K + 1,) joules until each of ``counters.edges_ns`` from the end of the warm-up on, where they are 0;
+        K minutes follow the warm-up.
     """
     after = slice(counters.warmup_minutes, None)
     elapsed_s = np.diff(counters.edges_ns[after]) / NS_PER_S

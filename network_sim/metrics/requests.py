@@ -1,4 +1,4 @@
-"""The sink's requests for what follows the first bytes of images: their time, grounds and arrival."""
+"""The sink's requests for the bytes after the first ones of images: their time, basis and arrival."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class Requested:
     requested_ns: int | None
     """Time of the first request; None if the sink has sent none."""
     first_arrived: tuple[bool, ...]
-    """Whether the sink had all first bytes of a node when it began to compute the requests."""
+    """By node: whether the sink had all its first bytes when it began to compute the requests."""
     answered: tuple[bool, ...]
-    """Whether a node has received its request."""
+    """By node: whether it has received its whole request."""
 
 
 def requested(trace: NetworkTrace) -> Requested:
@@ -34,8 +34,8 @@ def requested(trace: NetworkTrace) -> Requested:
     packets = trace.events.where(trace.events.packet_kind == PacketKind.REQUEST)
     sent, heard = packets.of(EventKind.ENQUEUE), packets.of(EventKind.RECEIVE)
     if not len(sent):
-        nobody = (False,) * config.count
-        return Requested(None, nobody, nobody)
+        none = (False,) * config.count
+        return Requested(None, none, none)
     requested_ns = int(sent.t_ns.min())
     early = came.t_ns <= requested_ns - to_ns(config.request_after_s)
     first_arrived, answered = [], []

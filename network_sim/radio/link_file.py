@@ -1,4 +1,4 @@
-"""Files of recorded links: text with a column each for time, rate, round trip and loss, or of others."""
+"""Files of recorded links: text with columns of time, rate, round trip and loss, or other programs' files."""
 
 from __future__ import annotations
 
@@ -116,7 +116,9 @@ def _read(path: str | Path) -> tuple[LinkTrace, str]:
     lines = list(_lines(text))
     rows = [line for line in lines if not line.is_comment]
     if not rows:
-        raise InputError(f"The recorded link {path} has no rows; try columns of {', '.join(_wanted())}")
+        raise InputError(
+            f"The recorded link {path} has no rows; try columns of {', '.join(_usual_columns())}"
+        )
     form = _form(rows, str(path))
     header, rows = _header(lines, rows, form, str(path))
     usual: list[Column | None] = [Column(index, None) for index in range(len(QUANTITIES))]
@@ -141,7 +143,7 @@ def _read(path: str | Path) -> tuple[LinkTrace, str]:
     return trace, note
 
 
-def _wanted() -> list[str]:
+def _usual_columns() -> list[str]:
     return [f"{name} in {unit}" for name, unit in zip(QUANTITIES, (*USUAL[:3], "0 to 1"), strict=True)]
 
 
@@ -255,9 +257,9 @@ def _row(form: Form, line: Line, width: int, order: Sequence[int], path: str) ->
     fields, where = form.fields(line.text), f"{path}, line {line.number}"
     if len(fields) != width:
         count = f"{len(fields)} column{'s' * (len(fields) != 1)}"
-        raise InputError(f"{where} has {count}; try {width}: {', '.join(_wanted())}")
+        raise InputError(f"{where} has {count}; try {width}: {', '.join(_usual_columns())}")
     row = []
-    for name, index in zip(_wanted(), order, strict=True):
+    for name, index in zip(_usual_columns(), order, strict=True):
         value = form.number(fields[index])
         if value is None:
             raise InputError(f"{where} has '{fields[index]}' as {name}; try a number, or # before a comment")

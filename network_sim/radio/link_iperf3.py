@@ -24,12 +24,12 @@ _AGAIN = "try a test with iperf3 --json again"
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """What iperf3 says about an interval, all its streams together."""
+    """An interval of a test by iperf3, all its streams together."""
 
     start_s: float
     duration_s: float
     rate_bps: float
-    """What TCP delivered, or the datagrams that UDP sent."""
+    """Rate at which TCP delivered, or at which UDP sent datagrams."""
     round_trip_s: float | None
     """Mean of the streams; only the sender of TCP measures it."""
     loss: float | None
@@ -44,8 +44,8 @@ def iperf3_link(test: Record, path: str) -> tuple[LinkTrace, str]:
         path: its file, for messages.
 
     Returns:
-        The link, and a sentence about what the test did not measure. Where there are no losses in the
-        intervals of UDP, each has those of the whole test.
+        The link, and a sentence about what the test did not measure. Intervals of UDP that count no losses
+        have the share lost in the whole test.
 
     Raises:
         InputError: there are no intervals, or a number is missing or out of range.
@@ -55,8 +55,8 @@ def iperf3_link(test: Record, path: str) -> tuple[LinkTrace, str]:
     ]
     if not records:
         reason = test.get("error")
-        said = f" (iperf3 said: {reason})" if isinstance(reason, str) else ""
-        raise InputError(f"The recorded link {path} has no intervals of iperf3{said}; {_AGAIN}")
+        error = f" (iperf3 said: {reason})" if isinstance(reason, str) else ""
+        raise InputError(f"The recorded link {path} has no intervals of iperf3{error}; {_AGAIN}")
     settings = _record(_record(test.get("start")).get("test_start"))
     udp = settings.get("protocol") == "UDP"
     datagram_bytes = _number(settings, "blksize", "test_start", path) if udp else None

@@ -87,8 +87,8 @@ class PathLoss:
         return self.far_w * held_m**-self.far_exponent
 
     def distance_m(self, power_w: float) -> float:
-        """Return the largest distance at which the mean received power is still ``power_w``, for any
-        ``power_w`` below the power at ``least_m``."""
+        """Return the largest distance at which the mean received power is at least ``power_w``, which must be
+        below the power at ``least_m``."""
         far_m = (self.far_w / power_w) ** (1.0 / self.far_exponent)
         return far_m if far_m >= self.break_m else (self.near_w / power_w) ** (1.0 / self.near_exponent)
 
@@ -353,8 +353,8 @@ class Radio:
         Args:
             sinr: ratio of signal to noise and interference, as a factor.
             size_bytes: bytes sent with this modulation.
-            kind: modulation of these bytes. A frame of LoRa is lost if it is below the least ratio of signal
-                to noise, and received above it.
+            kind: modulation of these bytes. A frame of LoRa is received if ``sinr`` is at least what
+                its spreading factor needs, and lost otherwise.
         """
         if kind == "lora":
             return 0.0 if sinr >= self._lora_sinr else 1.0
@@ -371,7 +371,7 @@ _CAPTURE_DB: dict[Modulation, float] = {"oqpsk": OQPSK_CAPTURE_DB, "lora": LORA_
 
 
 def _capture_db(mac: MacConfig) -> float:
-    """Return the capture ratio if ``radio.capture_db`` is None; OFDM needs what it needs over noise."""
+    """Return the capture ratio if ``radio.capture_db`` is None; OFDM needs the same ratio as over noise."""
     if mac.kind in OFDM_KINDS:
         return ofdm.SCHEMES[ofdm_modulation(mac)].needed_db
     return _CAPTURE_DB.get(modulation(mac), DSSS_CAPTURE_DB)

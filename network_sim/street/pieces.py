@@ -26,7 +26,7 @@ class Part(NamedTuple):
 
 
 class Cuts:
-    """Where images are cut, and what parts of them cost."""
+    """Edges of the pieces of images, and the bytes of some consecutive pieces."""
 
     def __init__(self, config: SchemeConfig) -> None:
         """Compute the edges of the pieces."""

@@ -133,10 +133,10 @@ class Street:
         shown = snapshots.pieces(vehicle, captured_ns) if scheme.by_pieces else cells
         parts = scheme.parts(shown, captured_ns, int(env.now))
         requested = len(parts)
-        if scheme.asks:
+        if scheme.on_request:
             requested = yield from self._send_request(vehicle, access_point, len(parts))
-        wanted = [part.row for part in parts]
-        images, taken_ns = heard[wanted].tolist(), captured_ns[wanted].tolist()
+        rows = [part.row for part in parts]
+        images, taken_ns = heard[rows].tolist(), captured_ns[rows].tolist()
         sent = yield from self._upload(vehicle, access_point, leave_ns, images[:requested], taken_ns, parts)
         missed = set(images).difference(sent)
         for image, part, image_ns in zip(images, parts, taken_ns, strict=True):

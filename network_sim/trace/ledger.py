@@ -13,6 +13,7 @@ from network_sim.types import NS_PER_S
 BINS_PER_DECADE = 200
 """Bins of the delay histogram per decade; each bin is 1.16 % wide."""
 SHORTEST_S = 1e-6
+"""Shortest delay with a bin of its own."""
 _BINS = 12 * BINS_PER_DECADE
 _UNSEEN = np.iinfo(np.int64).max
 

@@ -11,7 +11,7 @@ The log satisfies these invariants; ``network_sim.trace.conservation`` checks th
    instead (``node`` is the source, ``peer`` the destination).
 5. An image is CAPTUREd once (``node`` took it, ``peer`` is the road cell that it shows, or -1) and closed at
    most once: by ARRIVE (``node`` took it, ``peer`` has received all its bytes, or the bytes
-   [first_byte, first_byte + size_bytes) that it asked for) or EXPIRE (``node`` took it).
+   [first_byte, first_byte + size_bytes) that it requested) or EXPIRE (``node`` took it).
 6. AIR and ACK carry their start time and duration, and are recorded within a second of the start.
 7. DOWN means a failure with ``Cause.NODE_DOWN`` and sleep with ``Cause.NONE``; UP is the end of either.
 

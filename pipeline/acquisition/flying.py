@@ -33,13 +33,13 @@ def flying_score(planes: LocalPlanes) -> FloatArray:
         (H, W) float32; 0 for pixels that cannot be judged. Pixels above ``FARTHEST_SD`` are flying.
     """
     score = np.zeros(planes.inverse.shape, np.float32)
-    rows, columns = map(np.ascontiguousarray, np.nonzero(beside_a_step(planes)))
+    rows, columns = map(np.ascontiguousarray, np.nonzero(next_to_a_step(planes)))
     parts = planes.inverse, planes.right, planes.down, planes.sd
     score[rows, columns] = judged(_distances_sd(*parts, rows, columns, planes.reach_px))
     return score
 
 
-def beside_a_step(planes: LocalPlanes) -> BoolArray:
+def next_to_a_step(planes: LocalPlanes) -> BoolArray:
     """Return (H, W) True next to unknown pixels or depth steps above the noise: only these pixels can fly."""
     inverse, window = planes.inverse, np.ones((3, 3), np.uint8)
     apart = np.maximum(cv2.dilate(inverse, window) - inverse, inverse - cv2.erode(inverse, window))
@@ -65,16 +65,16 @@ def _distances_sd(
         reach_px: most steps on a side; the distance is NaN if all of them meet unknown pixels.
     """
     found = np.full((len(LINES), 2, len(rows)), np.nan, np.float32)
-    for line, (below, beside) in enumerate(LINES):
+    for line, (dv, du) in enumerate(LINES):
         for side in range(2):
             way = 2 * side - 1
             for i in range(len(rows)):
                 for steps in range(1, reach_px + 1):
-                    v, u = rows[i] + way * steps * below, columns[i] + way * steps * beside
+                    v, u = rows[i] + way * steps * dv, columns[i] + way * steps * du
                     if not (0 <= v < inverse.shape[0] and 0 <= u < inverse.shape[1]):
                         break
                     if inverse[v, u] > 0.0:
-                        slope = np.float32(way * below) * down[v, u] + np.float32(way * beside) * right[v, u]
+                        slope = np.float32(way * dv) * down[v, u] + np.float32(way * du) * right[v, u]
                         plane = inverse[v, u] - np.float32(steps) * slope
                         noise = np.hypot(sd[rows[i], columns[i]], sd[v, u])
                         off = inverse[rows[i], columns[i]] - plane

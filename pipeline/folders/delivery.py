@@ -128,7 +128,7 @@ def _ordered_of(ordered: Ordered, node: int) -> str:
 
 
 def _tiles_of_half(worth: Worth) -> int:
-    """Return the number of tiles, those that are sent first, with half of the area that all add."""
+    """Return how many tiles, counted from the first sent, add half of the area that all tiles add."""
     added = np.cumsum(worth.area_m2.ravel()[worth.order])
     return int(np.searchsorted(added, 0.5 * added[-1])) + 1
 
@@ -152,7 +152,7 @@ def _left_out_of(left_out: LeftOut, node: int, names: list[str]) -> str:
 
 
 def _left_out(sending: Sending) -> dict[str, Any]:
-    """Return what was left out and by whose decision; nothing if all nodes send all without asking."""
+    """Return what was left out and by whose decision; nothing if all nodes send all without a request."""
     left_out, names = sending.left_out, [frame.name for frame in sending.rig.frames]
     if left_out is None:
         return {}

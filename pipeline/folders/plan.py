@@ -129,14 +129,14 @@ def dark_points(promise: Promise) -> str:
 
 
 def dark_part(promise: Promise) -> str:
-    """Say how much of a promise is on dark surface, as a part of a sentence; empty if nothing is."""
+    """Return the part of a sentence on how much of a promise is on dark surface; empty if nothing is."""
     if promise.dark_share < LEAST_NAMED:
         return ""
     return f", {dark_points(promise)} of them on a dark surface that may stay without depth"
 
 
 def dark_sentence(planned: RigPlan) -> str:
-    """Say that a plan leaves dark surface out, or how to; empty if little of its promise is dark."""
+    """Return a sentence that dark surface is left out, or a warning if most of the promise is on it."""
     plan = planned.plan
     if not plan.config.dark_surface:
         return "Surface that looks dark to a present sensor is left out of this plan"
@@ -149,7 +149,7 @@ def dark_sentence(planned: RigPlan) -> str:
 
 
 def promise_sentence(planned: RigPlan) -> str:
-    """Say what all cameras of a plan promise together."""
+    """Return a sentence on what all cameras of a plan promise together."""
     plan, count = planned.plan, len(planned.plan.cameras)
     who = "The camera promises" if count == 1 else f"The {count} cameras together promise"
     return (
@@ -160,7 +160,7 @@ def promise_sentence(planned: RigPlan) -> str:
 
 
 def best_sentence(planned: RigPlan) -> str:
-    """Say how far a plan can be from the best choice."""
+    """Return a sentence on how far a plan can be from the best choice."""
     plan = planned.plan
     least = f"{plan.at_least_of_best:.0%}"
     share = "as much as" if least == "100%" else f"at least {least} of what"
@@ -171,30 +171,29 @@ def best_sentence(planned: RigPlan) -> str:
 
 
 def times_sentence(planned: RigPlan) -> str:
-    """Say of what the times are, and where the sink and the walls are from."""
+    """Return a sentence on what was sent for the times and joules, and where the sink stands."""
     delivery, radio = planned.delivery, planned.radio
     x_m, y_m = delivery.sink_m
     by = ", where its weakest link to a camera is strongest" if radio.sink_m == "best" else ""
     return (
         f"Times and joules are for one image from each present and new camera at once, coded by "
         f"{radio.coding}, to a sink at {x_m:.2f}, {y_m:.2f} (x, y in metres{by}); a new image counts as "
-        f"{delivery.image_bytes:,} bytes, the present ones' mean, because its content is not known, and so "
-        f"not its surface either"
+        f"{delivery.image_bytes:,} bytes, the present ones' mean, because its content is not known yet"
     )
 
 
-def fewer_sentence(planned: RigPlan, asked: int) -> str:
-    """Say that a plan has fewer cameras than were asked for; empty if it has all."""
+def fewer_sentence(planned: RigPlan, requested: int) -> str:
+    """Return a sentence that a plan has fewer cameras than ``requested``; empty if it has all."""
     found, radio = len(planned.plan.cameras), planned.radio
-    if found >= asked:
+    if found >= requested:
         return ""
-    if planned.plan.config.cameras < asked:
-        return f"The budget of {radio.budget_j:g} J allows {found} of the {asked} cameras"
-    return f"Only {found} of the {asked} cameras would add anything; allow more kinds of places for more"
+    if planned.plan.config.cameras < requested:
+        return f"The budget of {radio.budget_j:g} J allows {found} of the {requested} cameras"
+    return f"Only {found} of the {requested} cameras would add anything; allow more kinds of places for more"
 
 
 def level_sentence(planned: RigPlan) -> str:
-    """Say that the upward direction is assumed, where no camera has a pose; empty if one has."""
+    """Return a sentence that the upward direction is assumed; empty if a camera has a pose."""
     if any(frame.pose_known for frame in planned.rig.frames):
         return ""
     return (

@@ -161,7 +161,10 @@ def config_of(spec: Spec) -> dict[str, Any]:
 
 
 def clouds_of(clouds: MergedClouds) -> dict[str, PointCloud]:
-    """Return the clouds of a run by the names of their files."""
+    """Return the clouds of a run by the names of their files.
+
+    Without labels of the points' source, the inferred cloud is the whole fused one.
+    """
     fused = clouds.fused
     inferred = fused.select(fused.source == PointSource.INFERRED) if fused.source is not None else fused
     return dict(zip(CLOUD_FILES, (clouds.sensor, inferred, fused), strict=True))

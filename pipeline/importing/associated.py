@@ -35,7 +35,8 @@ def read_associated(folder: Path, intrinsics: Path | None) -> Sequence:
     """Read the pairs of colour and depth that a list names, with 5000 units in a metre.
 
     Raises:
-        InputError: a line is not a time and a file, twice; no files exist; or the camera has another size.
+        InputError: a line does not hold two times, each with a file; no files exist; or the camera has
+            another size.
     """
     file = _list_in(folder)
     assert file is not None
@@ -48,7 +49,8 @@ def read_associated(folder: Path, intrinsics: Path | None) -> Sequence:
     if not there:
         missing = next((path for pair in pairs for path in pair if not path.is_file()), file)
         raise InputError(
-            f"{file} has no line whose two files exist, such as {missing}; try to unpack the images beside it"
+            f"{file} has no line whose two files exist, such as {missing}; try to unpack the images "
+            "next to it"
         )
     depth = 0 if _is_depth(pairs[there[0]][0]) else 1
     times_s = np.array([_time_of_color(rows[k], depth) for k in there])

@@ -13,7 +13,7 @@ from pipeline.importing.bag_depth import BagScale, place_of_depth
 from pipeline.importing.bag_messages import color_of
 from pipeline.importing.bag_reader import BagReader, opened_bag
 from pipeline.importing.bag_times import moments_from_middle, moments_of, times_of
-from pipeline.importing.bag_topics import Topic, iterate_scan, message_of, of_separate_cameras, pairs_of
+from pipeline.importing.bag_topics import Topic, iterate_scan, largest_of_each_camera, message_of, pairs_of
 from pipeline.importing.bag_transforms import Transforms
 from pipeline.importing.rig_folder import NodeImages
 from pipeline.importing.sequence import left_out_note
@@ -62,7 +62,7 @@ def iterate_bag(path: Path, frames: int, depth_scale: float | None) -> Generator
         scanned = yield from part(iterate_scan(reader), "messages", 0.0, 0.8, detail=True)
         transforms = scanned.transforms
         pairs, left_out = pairs_of(path, reader, scanned.colors, scanned.depths)
-        pairs, smaller = of_separate_cameras(pairs)
+        pairs, smaller = largest_of_each_camera(pairs)
         notes = [*scanned.notes, *left_out, *smaller]
         topics = [topic for pair in pairs for topic in pair]
         times_s, time_notes = times_of(topics)

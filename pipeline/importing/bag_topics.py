@@ -146,7 +146,7 @@ def pairs_of(
     return pairs[:MAX_NODES], notes
 
 
-def of_separate_cameras(
+def largest_of_each_camera(
     pairs: list[tuple[Topic, Topic]],
 ) -> tuple[list[tuple[Topic, Topic]], list[str]]:
     """Return the pairs without those whose camera another pair has in more pixels, and notes on these."""

@@ -14,6 +14,7 @@ LEAST_OVERLAP = 0.5
 MOST_COMPARED = 150
 """Largest number of frames, spread over the recording, that are compared; the work grows with its square."""
 _GRID_PX = 12
+"""Longer side of the grid of points that represents a camera's image."""
 _DEPTHS = (0.6, 1.0, 1.6)
 """Depths, as multiples of the typical depth, of the points that represent a camera's view."""
 

@@ -114,7 +114,7 @@ def _noted_dense(sequence: Sequence) -> Sequence:
 
 
 def _noted_measured(depth_units: float, sequence: Sequence) -> Sequence:
-    """Return the sequence with a note on the model's unit, which has so many units of the depth images."""
+    """Return the sequence with a note on the model's unit: ``depth_units`` units of the depth images."""
     metres = depth_units / sequence.units_per_metre
     note = f"A unit of the model is {metres:.4g} m by the depth that was measured at its points"
     return replace(sequence, notes=(*sequence.notes, note))
@@ -128,7 +128,7 @@ def _with_depth(folder: Path, model: Model) -> list[tuple[ModelImage, Path, Path
     """
     images, listed = model.images, model.files["images"].name
     photographed = [
-        (image, color) for image in images if (color := _beside(folder, _IMAGE_FOLDERS, image.name, listed))
+        (image, color) for image in images if (color := _file_in(folder, _IMAGE_FOLDERS, image.name, listed))
     ]
     found = [
         (image, color, depth)
@@ -228,7 +228,7 @@ def _model_folder(folder: Path, suffix: str) -> Path | None:
     return next((place for place in places if all((place / name).is_file() for name in names)), None)
 
 
-def _beside(folder: Path, places: tuple[str, ...], name: str, listed: str) -> Path | None:
+def _file_in(folder: Path, places: tuple[str, ...], name: str, listed: str) -> Path | None:
     """Return a file that ``listed`` names, in the first subfolder of ``places`` that has it; else None."""
     named_inside(folder, name, listed)
     return next((path for place in places if (path := folder / place / name).is_file()), None)
@@ -236,8 +236,8 @@ def _beside(folder: Path, places: tuple[str, ...], name: str, listed: str) -> Pa
 
 def _depth(folder: Path, name: str, listed: str) -> Path | None:
     dense = (f"{name}.{kind}.bin" for kind in ("geometric", "photometric"))
-    maps = (_beside(folder, ("stereo/depth_maps",), file, listed) for file in dense)
+    maps = (_file_in(folder, ("stereo/depth_maps",), file, listed) for file in dense)
     measured = (
-        _beside(folder, _DEPTH_FOLDERS, str(Path(name).with_suffix(kind)), listed) for kind in DEPTH_SUFFIXES
+        _file_in(folder, _DEPTH_FOLDERS, str(Path(name).with_suffix(kind)), listed) for kind in DEPTH_SUFFIXES
     )
     return next((path for path in (*maps, *measured) if path), None)

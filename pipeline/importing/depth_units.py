@@ -29,6 +29,7 @@ MEDIUM_WEIGHT = 0.25
 """Factor of the weight in the map of depth with medium confidence, as if its standard deviation were twice as
 large. It is assumed, not measured, because telephones state no deviation."""
 _ROTATED_SHARE = 0.95
+"""Least share of nonzero values that are multiples of 8 in an image with rotated bits."""
 
 
 def depth_in(candidate: Candidate, sequence: Sequence) -> ReadDepth:
@@ -41,10 +42,12 @@ def depth_in(candidate: Candidate, sequence: Sequence) -> ReadDepth:
 
 
 def weighted_depth_in(candidate: Candidate, sequence: Sequence) -> tuple[ReadDepth, FloatArray | None]:
-    """Read a depth image as ``depth_in``, and the factor of its weights as ``DepthView.weight`` has it.
+    """Read a depth image as ``depth_in``, and (H, W) the factor of each pixel's weight in the map.
+
+    The factor, ``DepthView.weight``, is None without a confidence image.
 
     Raises:
-        InputError: as ``depth_in``.
+        InputError: as ``depth_in``; NoDepthError if no depth can be used.
     """
     read = _depth_in(candidate.depth, sequence)
     if candidate.confidence is None:

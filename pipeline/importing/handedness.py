@@ -19,6 +19,7 @@ _MIRROR = np.diag([1.0, -1.0, 1.0, 1.0])
 _STEPS = (1, 2, 5, 10, 20, 50, 100)
 """Distances, in frames, between two frames that are compared."""
 _EVERY_PX = 8
+"""Every so many rows and columns of a depth image are compared."""
 _WITHIN = 0.02
 """Share of the depth within which two frames agree."""
 _CLEARLY = 1.1

@@ -57,7 +57,7 @@ def read_nerfstudio(folder: Path, intrinsics: Path | None) -> Sequence:
             for k, own in enumerate(frames)
         ],
         str(folder / _FILE),
-        "try to unpack the images beside it",
+        "try to unpack the images next to it",
     )
     candidates, without, notes = posed(named, f"transform_matrix in {_FILE}", poses)
     if poses.T_world_camera:

@@ -49,7 +49,7 @@ def read_seven_scenes(folder: Path, intrinsics: Path | None) -> Sequence:
         if depth is not None:
             found.append((color, depth, folder / f"{stem}.pose.txt"))
     stem = colors[0].name.split(".")[0]
-    require(found, folder, f"{stem}.depth.png beside {colors[0].name}")
+    require(found, folder, f"{stem}.depth.png next to {colors[0].name}")
     candidates, without, notes = _with_poses(found, found[0][2].name)
     default = _SEVEN_SCENES, "those of 7-Scenes; its depth is registered only roughly"
     camera, assumed = camera_of(folder, candidates[0].color, intrinsics, *default)
@@ -67,17 +67,17 @@ def read_scannet(folder: Path, intrinsics: Path | None) -> Sequence:
     found = [(pair.color, pair.depth, folder / "pose" / f"{pair.color.stem}.txt") for pair in pairs]
     candidates, without, lost = _with_poses(found, f"pose/{found[0][2].name}")
     notes = (*unpaired, *lost)
-    first, beside = candidates[0], folder / "intrinsic"
+    first, intrinsic = candidates[0], folder / "intrinsic"
     height_px, width_px = read_color_of(first.color).shape[:2]
     if intrinsics is None:
-        camera = read_intrinsics(beside / "intrinsic_color.txt", (width_px, height_px))
+        camera = read_intrinsics(intrinsic / "intrinsic_color.txt", (width_px, height_px))
     else:
         camera, _ = camera_of(folder, first.color, intrinsics, None, "")
     depth_height_px, depth_width_px = first_depth_values(folder, (one.depth for one in candidates)).shape
     if (depth_height_px, depth_width_px) == (height_px, width_px):
         return Sequence(candidates, camera, without_poses=without, notes=notes)
-    depth_camera = read_intrinsics(beside / "intrinsic_depth.txt", (depth_width_px, depth_height_px))
-    extrinsics = [beside / f"extrinsic_{of}.txt" for of in FRAMES]
+    depth_camera = read_intrinsics(intrinsic / "intrinsic_depth.txt", (depth_width_px, depth_height_px))
+    extrinsics = [intrinsic / f"extrinsic_{of}.txt" for of in FRAMES]
     (T_body_color, color_off), (T_body_depth, depth_off) = map(_transform_or_identity, extrinsics)
     notes += rounding_note("A rotation of the extrinsics", max(color_off, depth_off))
     missing = " and ".join(file.name for file in extrinsics if not file.is_file())

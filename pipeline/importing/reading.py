@@ -22,7 +22,7 @@ MOST_FRAMES, MOST_CANDIDATES = 5000, 12_000
 time and memory."""
 
 
-def of_many(frames: int, most: int) -> tuple[slice, tuple[str, ...]]:
+def slice_of_frames(frames: int, most: int) -> tuple[slice, tuple[str, ...]]:
     """Return a slice with at most ``most`` of a recording's frames, and a note if it lacks some."""
     step = max(1, -(-frames // most))
     note = f"One in {step} of the {frames} frames is used (at most {most})"
@@ -63,7 +63,7 @@ def read_sequence(
         sequence = sequence.with_scale(depth_scale)
     sequence = sequence.completed(sequence)
     candidates, repeated = distinct(sequence.candidates)
-    chosen, rare = of_many(len(candidates), most)
+    chosen, rare = slice_of_frames(len(candidates), most)
     candidates = candidates[chosen]
     confident = (CONFIDENCE_NOTE,) if any(one.confidence is not None for one in candidates) else ()
     notes = (*sequence.notes, *repeated, *rare, *confident)

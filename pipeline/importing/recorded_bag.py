@@ -26,7 +26,7 @@ from pipeline.importing.depth_views import (
     frame_of,
     view_of,
 )
-from pipeline.importing.reading import MOST_FRAMES, of_many
+from pipeline.importing.reading import MOST_FRAMES, slice_of_frames
 from pipeline.io.images import NoDepthError, ReadDepth
 from pipeline.types import CameraIntrinsics, FloatArray, IntArray, RgbdFrame
 
@@ -126,7 +126,7 @@ def iterate_bag_recording(path: Path, depth_scale: float | None) -> Generator[Pr
     place, place_notes = place_of_depth(color, depth, shape, scanned.transforms)
     if place is not None:
         _check_size(depth.name, shape, (place.camera.height_px, place.camera.width_px))
-    chosen, thinned = of_many(len(moments), MOST_FRAMES)
+    chosen, thinned = slice_of_frames(len(moments), MOST_FRAMES)
     moments = moments[chosen]
     frames_s = times_s[0][moments[:, 0]]
     poses, pose_notes = _poses(scanned.transforms, color, frames_s, bool(time_notes))

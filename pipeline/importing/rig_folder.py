@@ -28,7 +28,7 @@ class NodeImages:
     """File or topic of the colour image."""
     depth_name: str
     rgb: ByteArray
-    """(H, W, 3)."""
+    """(H, W, 3) RGB."""
     depth: DepthMap
     """(H, W), or (h, w) of a separate depth camera."""
     camera: CameraIntrinsics
@@ -43,7 +43,7 @@ class NodeImages:
 
 
 def check_new(out: Path) -> None:
-    """Raise an InputError for a folder that is neither new nor empty; what was left by a kill is nothing."""
+    """Raise an InputError for a folder that is neither new nor empty; what killed imports left is ignored."""
     if out.is_dir():
         if len(list(out.iterdir())) > len(_unfinished(out, out.resolve().name)):
             raise InputError(f"The folder {out} is not empty; try another name")
@@ -59,9 +59,9 @@ def _unfinished(folder: Path, name: str) -> list[Path]:
 
 @contextmanager
 def new_folder(out: Path) -> Iterator[Path]:
-    """Create a hidden folder whose contents become those of ``out`` if the body succeeds, else deleted.
+    """Create a hidden folder; its contents are moved to ``out`` if the body succeeds, and deleted otherwise.
 
-    Those that killed processes left are deleted. An empty folder ``out`` stays the same folder: it may be the
+    Hidden folders of killed imports are deleted. An empty folder ``out`` stays the same folder: it may be the
     working folder of this process.
 
     Raises:

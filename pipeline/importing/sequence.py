@@ -72,7 +72,8 @@ class Sequence:
     notes: tuple[str, ...] = ()
     """Assumptions, one sentence each."""
     completed: Callable[[Sequence], Sequence] = field(default=_unchanged, compare=False, repr=False)
-    """Returns the sequence with what depends on the depth scale: it is called when that is known."""
+    """Returns the sequence with the notes and poses that depend on the depth scale; called when it is
+    known."""
 
     def with_scale(self, units_per_metre: float) -> Sequence:
         """Return the sequence with another depth scale."""

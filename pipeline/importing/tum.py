@@ -68,7 +68,7 @@ def read_tum(folder: Path, intrinsics: Path | None) -> Sequence:
             for i, j in pairs
         ],
         f"{folder / 'rgb.txt'} or depth.txt",
-        "try to unpack the images beside it",
+        "try to unpack the images next to it",
     )
     candidates, without, notes = posed(
         there,

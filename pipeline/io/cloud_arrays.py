@@ -8,7 +8,7 @@ from pathlib import PurePath
 import numpy as np
 
 from packetmesh.errors import InputError
-from pipeline.io.cloud_columns import say_columns, table_named, table_of_columns
+from pipeline.io.cloud_columns import log_columns, table_named, table_of_columns
 from pipeline.io.cloud_table import POSITION, Layout, check_count
 from pipeline.io.numpy_files import array_in
 from pipeline.types import AnyPath, FloatArray
@@ -78,7 +78,7 @@ def parse_sweep(path: AnyPath, data: bytes, layout: Layout) -> np.ndarray:
     _check_positions(path, rows[:, :3])
     names = (*POSITION, *(["_"] * (width - 3)))
     if width == _NUSCENES:
-        say_columns(path, names, ("x", "y", "z", "intensity", "ring index"))
+        log_columns(path, names, ("x", "y", "z", "intensity", "ring index"))
     return table_named(rows, names)
 
 
@@ -160,5 +160,6 @@ def _check_positions(path: AnyPath, points: FloatArray) -> None:
         or not (np.abs(np.nan_to_num(points, nan=np.inf)) < FARTHEST_M).any(axis=0).all()
     ):
         raise InputError(
-            f"The numbers in {path} are no positions; a .bin file is read as a sweep of KITTI or nuScenes"
+            f"The numbers in {path} are no positions; a .bin file is read as a sweep of KITTI or nuScenes: "
+            "try --columns with a name for each number of a point, or to export it as PLY"
         )

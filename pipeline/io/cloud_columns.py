@@ -98,7 +98,7 @@ def guessed_columns(path: AnyPath, rows: FloatArray, places: Sequence[int] | Non
     return tuple(names)
 
 
-def say_columns(
+def log_columns(
     path: AnyPath, names: Sequence[str], titles: Sequence[str] | None = None, decimal_comma: bool = False
 ) -> None:
     """Log the field as which each column is read.
@@ -131,7 +131,7 @@ def table_of_columns(path: AnyPath, rows: FloatArray, given: tuple[str, ...] | N
         return table_named(rows, checked_width(path, given, rows.shape[1]))
     names = guessed_columns(path, rows)
     if UNUSED in names:
-        say_columns(path, names)
+        log_columns(path, names)
     return table_named(rows, names)
 
 

@@ -15,7 +15,7 @@ from pipeline.io.cloud_columns import (
     UNUSED,
     checked_width,
     guessed_columns,
-    say_columns,
+    log_columns,
     table_named,
 )
 from pipeline.io.cloud_decimals import Dialect, dialect_of, split_titles
@@ -93,7 +93,7 @@ def parse_text(path: AnyPath, data: bytes, layout: Layout) -> np.ndarray:
         raise InputError(f"The point cloud {path} has {width} columns; try one with a point on each line")
     if layout.columns is None and any(line.startswith(_COLMAP) for line in lines.comments):
         names = (UNUSED, *POSITION, *COLOR)
-        say_columns(path, (*names, UNUSED), [*_COLMAP.split(", "), "the list of observations"])
+        log_columns(path, (*names, UNUSED), [*_COLMAP.split(", "), "the list of observations"])
         return _table(path, lines.numbers, dialect, names, more=True)
     if layout.columns is not None:
         checked_width(path, layout.columns, width)
@@ -104,7 +104,7 @@ def parse_text(path: AnyPath, data: bytes, layout: Layout) -> np.ndarray:
     if header is None:
         return _guessed(path, lines, dialect, width)
     if not header.plain or dialect.decimal_comma:
-        say_columns(path, header.names, header.titles, dialect.decimal_comma)
+        log_columns(path, header.names, header.titles, dialect.decimal_comma)
     table = _table(path, lines.numbers, dialect, header.names)
     metres = header.metres_per_unit
     if layout.header_unit and metres is not None and metres != 1.0:
@@ -257,7 +257,7 @@ def _guessed(path: AnyPath, lines: _Lines, dialect: Dialect, width: int) -> np.n
     for place, name in zip(places, found, strict=True):
         names[place] = name
     if (UNUSED in names and not pts) or dialect.decimal_comma:
-        say_columns(path, names, decimal_comma=dialect.decimal_comma)
+        log_columns(path, names, decimal_comma=dialect.decimal_comma)
     return table_named(rows, found)
 
 

@@ -117,7 +117,10 @@ def _in_view(points_m: FloatArray, limits: tuple[FloatArray, FloatArray]) -> Boo
 def _covered(
     sides_m: FloatArray, center_m: FloatArray, camera: CameraIntrinsics
 ) -> tuple[IntArray, FloatArray, BoolArray]:
-    """Return (P,) colour pixels covered by pieces, their depth, and False where only OVERLAP covers them."""
+    """Return (P,) colour pixels covered by pieces, their depth, and False where only OVERLAP covers them.
+
+    A piece is a parallelogram; (s, t) is the position of a pixel from its centre, in units of its sides.
+    """
     sides = np.stack([project(camera, side_m) for side_m in sides_m])
     center = project(camera, center_m)
     imaged = np.isfinite(sides).all(axis=(0, 2)) & np.isfinite(center).all(axis=1)
@@ -126,20 +129,27 @@ def _covered(
     across, down = right - left, below - above
     wide = 1.0 + OVERLAP / REACH
     half = np.minimum(0.5 * wide * (np.abs(across) + np.abs(down)), 0.5 * WIDEST_PX)
+    piece, pixel = _pixels_around(center, half, camera)
+    s, t = _shares(pixel - center[piece], across[piece], down[piece])
+    touched = np.maximum(np.abs(s), np.abs(t)) <= REACH + OVERLAP
+    piece, pixel, s, t = piece[touched], pixel[touched], s[touched], t[touched]
+    slope_m = sides_m[[1, 3], :, 2] - sides_m[[0, 2], :, 2]
+    seen_m = center_m[piece, 2] + slope_m[0, piece] * s + slope_m[1, piece] * t
+    within = np.maximum(np.abs(s), np.abs(t)) <= REACH
+    return pixel[:, 1] * camera.width_px + pixel[:, 0], seen_m.astype(np.float32), within
+
+
+def _pixels_around(
+    center: FloatArray, half: FloatArray, camera: CameraIntrinsics
+) -> tuple[IntArray, IntArray]:
+    """Return (P,) centre and (P, 2) position of each pixel at most (N, 2) ``half`` from (N, 2) centres."""
     first = np.maximum(np.ceil(center - half), 0.0).astype(np.int64)
     last = np.minimum(np.floor(center + half), (camera.width_px - 1, camera.height_px - 1)).astype(np.int64)
     extent = np.maximum(last - first + 1, 0)
     counts = extent.prod(axis=1)
-    of = np.repeat(np.arange(len(counts)), counts)
-    number = np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
-    at = first[of] + np.stack([number % extent[of, 0], number // extent[of, 0]], axis=1)
-    s, t = _shares(at - center[of], across[of], down[of])
-    touched = np.maximum(np.abs(s), np.abs(t)) <= REACH + OVERLAP
-    of, at, s, t = of[touched], at[touched], s[touched], t[touched]
-    slope_m = sides_m[[1, 3], :, 2] - sides_m[[0, 2], :, 2]
-    seen_m = center_m[of, 2] + slope_m[0, of] * s + slope_m[1, of] * t
-    within = np.maximum(np.abs(s), np.abs(t)) <= REACH
-    return at[:, 1] * camera.width_px + at[:, 0], seen_m.astype(np.float32), within
+    row = np.repeat(np.arange(len(counts)), counts)
+    number = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return row, first[row] + np.stack([number % extent[row, 0], number // extent[row, 0]], axis=1)
 
 
 def _shares(offset: FloatArray, across: FloatArray, down: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,4 +1,4 @@
-"""Triangles in the order of a walk over their mesh, in which half of them name the vertex that comes next."""
+"""Renumbering of a mesh by a walk over it, so that neighbouring vertices and triangles get near numbers."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
 """A k-d tree of points with compiled searches, which run on all cores without Python's lock.
 
-Unlike SciPy's tree, a search can start from a known bound (the distance to an earlier neighbour), as
-iterations need, and the points of a leaf are adjacent in memory.
+Unlike in SciPy's tree, a search can start from a known bound, the distance to an earlier neighbour.
 """
 
 from __future__ import annotations
@@ -24,7 +23,9 @@ SERIAL_POINTS = 512
 CORES = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 """Cores of this machine, or the lower ``NUMBA_NUM_THREADS``, set for processes that run in parallel."""
 _MOST_LEVELS = 64
+"""Rows of a search's stack: more than any tree has levels."""
 _MOST_GUESSES = 64
+"""Most thresholds that are tried to find the ``count`` smallest values."""
 compiled = numba.njit(cache=True, nogil=True)
 
 

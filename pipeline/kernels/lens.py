@@ -22,6 +22,7 @@ _UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
 _MISSED_PX = 1e-7
 """A position that projects farther than this from its pixel is computed again by Newton's method."""
 _STEPS = 20
+"""Steps of Newton's method."""
 _TABLE = 2000
 """Entries of the table of radii from which Newton's method starts."""
 _FARTHEST = math.radians(89.9)

@@ -38,7 +38,7 @@ def hit_depth(
 
 
 def hit_depths(vertices_m: FloatArray, triangles: IntArray, cameras: Sequence[Camera]) -> Iterator[DepthMap]:
-    """Render a mesh's depth image in each camera."""
+    """Yield a mesh's depth image in each camera, rendered one after the other."""
     scene = triangle_scene(vertices_m, triangles)
     for camera in cameras:
         yield depth_of(camera_hits(scene, camera))

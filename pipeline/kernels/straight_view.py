@@ -17,6 +17,7 @@ from pipeline.types import ByteArray, CameraIntrinsics, DepthMap, FloatArray
 WIDEST = math.tan(math.radians(60.0))
 """Largest |x / z| and |y / z| that a straight view shows: farther out, images would be mostly stretched."""
 _OUTSIDE_PX = -10.0
+"""Coordinate, outside every image, that stands for a pixel that the other camera does not see."""
 
 
 def bends_strongly(camera: CameraIntrinsics) -> bool:

@@ -113,7 +113,7 @@ def box_of_part(surface: MeasuredSurface, point_m: FloatArray) -> Measure:
 
 
 def _guess_half_m(range_m: float, confidence: float) -> float:
-    """Return half of the 95 % interval of a guessed side's place: as if it faced its camera."""
+    """Return the half width of a guessed side's 95 % interval, metres, as if the side faced its camera."""
     return relative_half(confidence) * (range_m if np.isfinite(range_m) else UNKNOWN_RANGE_M)
 
 

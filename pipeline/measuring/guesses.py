@@ -25,7 +25,7 @@ narrow."""
 
 
 def class_of(confidence: float) -> int:
-    """Return the class of a confidence, 0 to 1; an unknown one (NaN) is in the least."""
+    """Return the class of a confidence, 0 to 1; an unknown one (NaN) is in the lowest class."""
     if not confidence >= CONFIDENCES[1]:
         return 0
     return int(np.searchsorted(CONFIDENCES[1:-1], confidence, side="right"))

@@ -44,8 +44,8 @@ def hole_area(surface: MeasuredSurface, point_m: FloatArray) -> Measure:
     area_m2 = float(np.linalg.norm(vector_m2))
     slopes_m = 0.5 * np.cross(chord_m, vector_m2 / max(area_m2, 1e-12))
     along_m2 = np.einsum("vi,vi->v", slopes_m, surface.rays[loop]) * surface.sigma_m[loop]
-    beside = range(-min(BORDER, (len(loop) - 1) // 2), min(BORDER, (len(loop) - 1) // 2) + 1)
-    together_m4 = float(sum(np.abs(along_m2) @ np.abs(np.roll(along_m2, shift)) for shift in beside))
+    shifts = range(-min(BORDER, (len(loop) - 1) // 2), min(BORDER, (len(loop) - 1) // 2) + 1)
+    together_m4 = float(sum(np.abs(along_m2) @ np.abs(np.roll(along_m2, shift)) for shift in shifts))
     ragged_m4 = float(np.sum(slopes_m**2)) * (0.5 * spacing_m) ** 2
     variance = together_m4 + ragged_m4 + (2.0 * area_m2 * surface.scale_sd) ** 2
     guessed = bool(np.mean(surface.guessed[loop]) > 0.5)

@@ -193,8 +193,8 @@ def _on_edge(surface: MeasuredSurface, own: Mark) -> Mark:
 def _on_corner(surface: MeasuredSurface, own: Mark) -> Mark | None:
     """Move a mark to the point in which three planes near it meet, or two end; None if there is none.
 
-    Where the third face of a corner was not seen, the vertices of the other two stop somewhere within the
-    planes' rounded border before it: their line is taken to go on by half of that border.
+    Where the third face of a corner was not seen, the vertices of the other two stop short of the corner,
+    within the planes' rounded border: their line is taken to go on by half of that border.
     """
     planes = _faces_near(surface, own, 3)
     corner = _where_meeting(surface, own, planes) if len(planes) == 3 else None

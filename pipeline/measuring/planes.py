@@ -33,6 +33,7 @@ LEAST_SPREAD = 1.0
 FLAT = 0.35
 """Largest ratio of the seed's thickness to its width; a corner or an edge is thicker."""
 MOST_PASSES = 15
+"""Most times that a plane is fitted and its part is grown again."""
 COMPARED = 800
 """Most vertices whose residuals are compared for their correlation."""
 LAGS = 12
@@ -188,7 +189,7 @@ def fitted(surface: MeasuredSurface, part: IntArray, inner: IntArray | None = No
     own_m = surface.sigma_m[rows] * np.einsum("vi,i->v", surface.rays[rows], normal)
     variance_m2 = max(float(share @ residuals_m**2) / freedom, float(share @ own_m**2))
     spacing_m = lookup_of(surface).spacing_m
-    independent = 1.0 / float(share @ share) / together(arms_m[:, 1:], residuals_m, spacing_m)
+    independent = 1.0 / float(share @ share) / correlated_neighbours(arms_m[:, 1:], residuals_m, spacing_m)
     covariance = variance_m2 / max(independent, 1.0) * np.linalg.inv(information)
     covariance[1:, 0], covariance[0, 1:] = -covariance[1:, 0], -covariance[0, 1:]
     nodes, counts = np.unique(surface.nodes[rows], return_counts=True)
@@ -236,8 +237,8 @@ def rectangle(
     return axes, low_m, high_m
 
 
-def together(points_m: FloatArray, residuals_m: FloatArray, spacing_m: float) -> float:
-    """Return how many neighbours err together: 1 for independent residuals.
+def correlated_neighbours(points_m: FloatArray, residuals_m: FloatArray, spacing_m: float) -> float:
+    """Return how many neighbouring vertices have one common error on average: 1 for independent residuals.
 
     It is 1 + the sum of the residuals' correlations with all others, up to the first distance without any.
 
@@ -250,11 +251,11 @@ def together(points_m: FloatArray, residuals_m: FloatArray, spacing_m: float) ->
     if variance_m2 <= 0.0 or len(points_m) < LEAST_POINTS:
         return 1.0
     every = max(1, len(points_m) // COMPARED)
-    asked = np.arange(0, len(points_m), every)
-    pairs = cKDTree(points_m[asked]).sparse_distance_matrix(
+    compared = np.arange(0, len(points_m), every)
+    pairs = cKDTree(points_m[compared]).sparse_distance_matrix(
         cKDTree(points_m), LAGS * spacing_m, output_type="ndarray"
     )
-    here, there, lag = asked[pairs["i"]], pairs["j"], pairs["v"] / spacing_m
+    here, there, lag = compared[pairs["i"]], pairs["j"], pairs["v"] / spacing_m
     others = here != there
     bins = np.minimum(np.rint(lag[others]).astype(int), LAGS - 1)
     count = np.bincount(bins, minlength=LAGS)
@@ -263,4 +264,4 @@ def together(points_m: FloatArray, residuals_m: FloatArray, spacing_m: float) ->
     noise = 3.0 / np.sqrt(np.maximum(count, 1))
     silent = np.flatnonzero((count > 0) & (correlation <= noise))
     last = int(silent[0]) if len(silent) else LAGS
-    return 1.0 + float((count[:last] * correlation[:last]).sum()) / len(asked)
+    return 1.0 + float((count[:last] * correlation[:last]).sum()) / len(compared)

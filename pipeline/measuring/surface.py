@@ -25,7 +25,7 @@ from pipeline.surface.radii import spacing
 from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud, PointSource, Rig, Surface
 
 MEASURING = "measuring.npz"
-"""File of a run with what ``read_measured`` reads."""
+"""File of a run that ``read_measured`` reads."""
 SAMPLED = 500
 """About the number of a node's points whose mean is taken as the middle of what it sees."""
 

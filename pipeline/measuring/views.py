@@ -20,7 +20,8 @@ WIDTH_PX = 320
 WINDOW = 0.5
 """Standard deviation of the window over which the surface's misfit is averaged, in spacings."""
 MISFIT_FACTOR = 1.25
-"""Ratio of a vertex's standard deviation to the root mean square of this misfit less noise, with long tails.
+"""Factor with which this misfit's root mean square, after the noise of averaged depth is subtracted from its
+square, enters a vertex's standard deviation; it exceeds 1 because misfits have long tails.
 ``python -m lab.measuring misfit`` prints how often the depths in rendered rooms are inside their intervals by
 several factors."""
 LEAST_WINDOW_PX = 1.5

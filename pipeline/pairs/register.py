@@ -41,6 +41,7 @@ _MOST_EXTENTS = 1e4
 EVALUATED_POINTS = 20_000
 """Both clouds are thinned to about this many points before their distance is measured."""
 SHAPE_POINTS = 3000
+"""Most points of the target by which its shape is checked."""
 
 
 @dataclass(frozen=True, slots=True)

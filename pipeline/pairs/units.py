@@ -24,6 +24,7 @@ _KILO = 300.0, 3000.0
 _SIMILAR, _SAME = 0.35, 0.02
 """Largest relative deviation of the quantiles' ratios for similar and for the same shapes."""
 _LEAST_FACTOR = 1.05
+"""Smaller factors are never taken for another unit."""
 _NOTED_FACTOR = 1.01
 """From this factor on clouds of the same shape get a note about their sizes."""
 _OF_DEVIATION = 3.0

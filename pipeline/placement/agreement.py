@@ -12,7 +12,7 @@ from pipeline.types import CameraIntrinsics, DepthMap, FloatArray, PointCloud
 
 WITHIN = 0.02
 """Two measurements that differ by less than this share of the depth belong to the same surface."""
-ASKED_POINTS = 4000
+COMPARED_POINTS = 4000
 """Largest number of a cloud's points that are compared with another camera's image."""
 
 
@@ -54,22 +54,22 @@ def agreement(
     the pose, because the camera saw through its place; this detects wrong poses at which nearest points fit.
 
     Args:
-        cloud: measured points in any frame, of which those of ``asked`` are compared.
+        cloud: measured points in any frame, of which those of ``compared_points`` are compared.
         T_camera_cloud: (4, 4) from that frame to the other camera's.
         intrinsics: the other camera.
         depth: the other camera's measured depth.
     """
-    asked_m = asked(cloud).points_m
-    points_m = apply(T_camera_cloud, asked_m)
+    compared_m = compared_points(cloud).points_m
+    points_m = apply(T_camera_cloud, compared_m)
     points_m = points_m[points_m[:, 2] > 1e-6]
     pixels = np.rint(project(intrinsics, points_m))
     inside = np.all((pixels >= 0) & (pixels < (intrinsics.width_px, intrinsics.height_px)), axis=1)
     u, v = pixels[inside].astype(np.int64).T
     ratio = points_m[inside, 2] / depth.z_m[v, u]
     shared = ratio[ratio <= BEHIND]  # excludes NaN, where nothing was measured
-    return Agreement(len(asked_m), len(shared), int(np.count_nonzero(np.abs(shared - 1.0) <= WITHIN)))
+    return Agreement(len(compared_m), len(shared), int(np.count_nonzero(np.abs(shared - 1.0) <= WITHIN)))
 
 
-def asked(cloud: PointCloud) -> PointCloud:
-    """Return at most ``ASKED_POINTS`` points of a cloud, evenly selected, without other columns."""
-    return PointCloud(cloud.points_m[:: max(1, -(-len(cloud) // ASKED_POINTS))])
+def compared_points(cloud: PointCloud) -> PointCloud:
+    """Return at most ``COMPARED_POINTS`` points of a cloud, evenly selected, without other columns."""
+    return PointCloud(cloud.points_m[:: max(1, -(-len(cloud) // COMPARED_POINTS))])

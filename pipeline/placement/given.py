@@ -1,4 +1,4 @@
-"""Given poses as evidence: they hold what the nodes' surfaces leave open (SPEC 4.14).
+"""Given poses as evidence: they determine the motions that the nodes' surfaces leave open (SPEC 4.14).
 
 Two cameras that share a bare wall can slide along it: registration from the given poses then ends anywhere,
 and a small wrong pair moves a node by decimetres. What the surfaces do determine they determine thirty times

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.config import NodePoints, RegistrationConfig
 from pipeline.kernels import geometry
 from pipeline.nodes import NodeClouds
-from pipeline.placement.agreement import Agreement, agreement, asked
+from pipeline.placement.agreement import Agreement, agreement, compared_points
 from pipeline.registration.neighbourhood import Normals
 from pipeline.registration.sample import draw
 from pipeline.types import FloatArray, PointCloud, RgbdFrame
@@ -60,7 +60,7 @@ def sample_of(
     cloud = draw(getattr(node, align_with), config.max_points, config.seed, node.name).cloud
     if cloud.normals is None:
         cloud = replace(cloud, normals=Normals(cloud.points_m).all)
-    return NodeSample(frame, cloud, PointCloud(asked(node.sensor).points_m.copy()))
+    return NodeSample(frame, cloud, PointCloud(compared_points(node.sensor).points_m.copy()))
 
 
 def both_ways(source: NodeSample, target: NodeSample, T_target_source: FloatArray) -> Agreement:

@@ -46,19 +46,20 @@ def verdicts_of(
             shared[one].append((other, found))
             shared[other].append((one, found))
 
-    def beside(others: set[int], node: int) -> Agreement:
+    def with_others(others: set[int], node: int) -> Agreement:
         return reduce(add, (found for other, found in shared[node] if other in others), NOTHING_SHARED)
 
     def without_worst(kept: set[int], least: float) -> set[int]:
-        while suspects := [index for index in kept if less(beside(kept, index), least)]:
-            kept = kept - {min(suspects, key=lambda index: (beside(kept, index).within_2pct_share, -index))}
+        while suspects := [index for index in kept if less(with_others(kept, index), least)]:
+            shares = {index: with_others(kept, index).within_2pct_share for index in suspects}
+            kept = kept - {min(suspects, key=lambda index: (shares[index], -index))}
         return kept
 
     placed = without_worst(set(group), LEAST_AGREEMENT)
     sure = without_worst(placed, SURE_AGREEMENT)
     verdicts = []
     for index, name in enumerate(names):
-        found, sentence = beside(placed, index), ""
+        found, sentence = with_others(placed, index), ""
         if index not in group:
             sentence = _lost(names, known, index, group, tried)
         elif index not in placed:

@@ -15,7 +15,7 @@ from pipeline.types import RgbdFrame
 
 
 def place_walked(frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds]) -> Placement:
-    """Return the given poses, and the agreement of each two views' measurements at them.
+    """Return the given poses, and the agreement of the measurements of each pair of views that share some.
 
     Args:
         frames: the images, with their final poses.
@@ -25,15 +25,15 @@ def place_walked(frames: Sequence[RgbdFrame], nodes: Sequence[NodeClouds]) -> Pl
         (source, target): _both_ways(frames, nodes, source, target)
         for target, source in combinations(range(len(frames)), 2)
     }
-    met = {pair: one for pair, one in found.items() if one.shared}
+    sharing = {pair: one for pair, one in found.items() if one.shared}
     verdicts = tuple(
         NodeVerdict(
-            frame.name, True, reduce(add, (one for pair, one in met.items() if k in pair), NOTHING_SHARED)
+            frame.name, True, reduce(add, (one for pair, one in sharing.items() if k in pair), NOTHING_SHARED)
         )
         for k, frame in enumerate(frames)
     )
     names = [frame.name for frame in frames]
-    agreements = tuple(NodeAgreement(names[i], names[j], one) for (i, j), one in met.items())
+    agreements = tuple(NodeAgreement(names[i], names[j], one) for (i, j), one in sharing.items())
     return Placement((), tuple(frame.T_world_camera for frame in frames), verdicts, agreements)
 
 

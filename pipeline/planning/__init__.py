@@ -1,1 +1,1 @@
-"""Where the next cameras stand: candidates, what each would add to the surface, and the choice of a few."""
+"""Plans of the next cameras: candidates, the gain of each in measured surface, and the choice of a few."""

@@ -16,10 +16,11 @@ from pipeline.types import Rig
 
 @dataclass(frozen=True, slots=True)
 class RigPlan:
-    """The next cameras of a rig, and what it takes to send their images."""
+    """The next cameras of a rig, and the cost of sending their images."""
 
     seen: SeenPlace
-    """What the present cameras know of the place, ``without_dark`` if the plan is."""
+    """Knowledge of the present cameras about the place; in a plan that leaves dark surface out, without
+    it."""
     rig: Rig
     """The registered present cameras, at the poses that registration found."""
     plan: Plan
@@ -30,7 +31,7 @@ class RigPlan:
 def plan(
     result: Rig | Reconstruction, config: PlanConfig | None = None, radio: PlanRadio | None = None
 ) -> RigPlan:
-    """Say where the next cameras of a rig stand best, what they add, and what their images cost by radio.
+    """Plan where the next cameras of a rig stand best, what they add, and what their images cost by radio.
 
     Args:
         result: images, or their reconstruction, which several plans share.

@@ -20,14 +20,16 @@ ASKEW, FACING = 0.1, 0.6
 """Cosines between ray and normal at which a guessed surface is never and always measured: its normal is
 uncertain, and the rays along it are those that miss it."""
 DARK_CHANCE, DARK_RATIOS = 0.7, (0.5, 3.0)
-"""Largest chance of surface from which a present sensor got no return for darkness, and how many times as
-much light as that sensor a camera must get for none of it and for all."""
+"""Largest chance of measuring a surface that was too dark for a present sensor; and the ratios, of the light
+that a new camera gets to the light that this sensor got, at which the chance is 0 and at which it is the
+largest."""
 DARK_APART_RAD = np.radians(1.0)
 """Angle from the nearest pixel with depth over which that chance falls to 1/e. A sensor gets some returns
 from surface that is only a little too dark for it; from glass, a screen or the sky it gets none."""
 APART_RAD, APART_FADE_RAD = np.radians(0.9), np.radians(2.7)
-"""Other missing depth: angle from the nearest pixel with depth up to which it does not matter, and over which
-the chance then falls to 1/e. All five were chosen on fourteen validation rooms."""
+"""Depth that is missing for other reasons: the chance is not reduced up to the first angle from the nearest
+pixel with depth; over each further second angle it falls to 1/e. All five were chosen on fourteen validation
+rooms."""
 MARGIN = 0.02
 """Border of an image, as a share of its size, that registered depth does not reach."""
 PREVIEW_WIDTH_PX = 48
@@ -36,7 +38,7 @@ PREVIEW_WIDTH_PX = 48
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """What a candidate would add."""
+    """Chances and overlap of one candidate."""
 
     chance: FloatArray
     """(T,) float32 chance that it measures each of the targets."""
@@ -45,7 +47,7 @@ class Judged:
 
 
 def judge(seen: SeenPlace, T_world_camera: FloatArray, sensor: Sensor) -> Judged:
-    """Estimate what a camera at this pose would measure of the targets.
+    """Estimate the chance of each target to be measured by a camera at this pose.
 
     A target counts if no surface stands between it and the camera, nor between it and the sensor's projector
     or second camera. Its chance is then the product of those by angle, distance and darkness.

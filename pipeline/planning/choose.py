@@ -22,7 +22,7 @@ class Choice:
     gains: FloatArray
     """(k, T) chance of each to be the first of them that measures each target."""
     best_at_most: float
-    """No choice of as many candidates gains more than this."""
+    """Upper bound on the gain of any choice of as many candidates."""
 
     @property
     def gain(self) -> float:

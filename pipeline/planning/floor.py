@@ -19,9 +19,11 @@ TALLEST_M = 2.0
 PIXEL_M = 0.01
 """Least size of a pixel of the image from which outlines are taken."""
 MOST_PX = 2000
+"""Largest side of that image."""
 CLOSED_M = 0.03
 """Gaps and spots narrower than twice this are left out of the outlines."""
 WEDGE_RAYS = 41
+"""Number of points along the arc of a field of view."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ from pipeline.surface.holes import Hole, beyond_m
 from pipeline.types import FloatArray, Surface
 
 SAMPLES = 200
+"""Number of points drawn in a hole, or most edges of a rim that are used."""
 
 
 def hole_targets(surface: Surface, hole: Hole, views: Sequence[PresentView], reach_m: float) -> Targets:

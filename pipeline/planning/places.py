@@ -1,4 +1,4 @@
-"""Where a camera may stand and what it may look at: on walls, ceilings, furniture and tripods."""
+"""Candidates for new cameras: places on walls, ceilings, furniture and tripods, and aims of the view."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ STEEPEST = np.sin(np.radians(80.0))
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A camera that is not there yet."""
+    """A possible new camera."""
 
     T_world_camera: FloatArray
     where: Where
@@ -141,7 +141,7 @@ def _carried(seen: SeenPlace, kind: Where) -> FloatArray:
 
 
 def _tripods(seen: SeenPlace) -> FloatArray:
-    """Return (N, 3) places above the floor, and beside the present cameras."""
+    """Return (N, 3) places above the floor, and to both sides of the present cameras."""
     normals, middles_m, _ = triangles_of(seen)
     on_floor_m = middles_m[(normals[:, 2] > 0.9) & (middles_m[:, 2] < floor_m(seen) + 0.1)]
     on_floor_m = _apart(on_floor_m)

@@ -28,7 +28,7 @@ BY_HAND: Literal["by hand"] = "by hand"
 
 @dataclass(frozen=True, slots=True)
 class PlanConfig:
-    """What may be planned."""
+    """Settings of a plan: number and kind of its cameras, and where they may stand."""
 
     cameras: int = 1
     """Cameras to be added."""
@@ -58,7 +58,7 @@ class PlannedCamera:
     T_world_camera: FloatArray
     where: Where | Literal["by hand"]
     promise: Promise
-    """What it adds to the present cameras and to those before it in the plan."""
+    """Its gain over the present cameras and those before it in the plan."""
     overlap_share: float
     """Share of its image on measured surface that one present camera sees, too."""
 
@@ -71,15 +71,15 @@ class Plan:
     sensor: Sensor
     cameras: tuple[PlannedCamera, ...]
     total: Promise
-    """What all of them add together."""
+    """Gain of all of them together."""
     at_least_of_best: float
-    """Share of the expected gain that the best choice among these candidates could have, at least."""
+    """Lower bound on the plan's expected gain, as a share of the largest possible with these candidates."""
     candidates: int
     """Number of candidates that could be chosen: they could be registered, and none was barred."""
     barred: int
     """Number of candidates that could be registered, but were barred."""
     measured_share: float
-    """Share of the present cameras' rays on measured surface, before."""
+    """Share of the present cameras' rays on measured surface, without the new cameras."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,7 @@ class Candidates:
     chance: FloatArray
     """(C, T) float32 chance of each candidate to measure each target."""
     overlap_shares: FloatArray
-    """(C,)"""
+    """(C,) share of each candidate's image on measured surface that one present camera sees, too."""
     allowed: BoolArray
     """(C,) True for candidates with enough overlap."""
 
@@ -176,7 +176,7 @@ def moved_plan(
         seen: the place.
         plan: the plan before.
         T_world_camera: (4, 4) pose of each camera, in the order of the plan.
-        judged: what a camera at each of these poses would measure.
+        judged: chances and overlap of a camera at each of these poses.
     """
     targets = seen.targets
     missed: FloatArray = np.ones(len(targets.points_m))

@@ -1,4 +1,4 @@
-"""What a plan promises, with its interval: shares of the present cameras' rays on measured surface."""
+"""Promise of a plan, with its interval: shares of the present cameras' rays on measured surface."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ from pipeline.surface.quality import guessed_share, missed_share, seen_by
 from pipeline.types import FloatArray
 
 LEAST_HALF = 0.013
-"""Least half of the 95 % interval, a share of all rays."""
+"""Least half width of the 95 % interval, a share of all rays."""
 HALF = 1.0
-"""Half of the interval as a share of the promise; the three halves are added as squares."""
+"""Half width of the interval by the promised gain, as a share of it. This half width, the least one and the
+one by dark surface are combined: the result is the root of the sum of their squares."""
 DARK_HALF = 2.0
-"""Half of the interval as a share of what is promised of dark surface, which is lost or won together."""
+"""Half width by the gain on dark surface, as a share of it: such surface is either all measured or all
+missed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +34,7 @@ class Promise:
 
 
 def promise(chance: FloatArray, targets: Targets) -> Promise:
-    """Return what (T,) chances of the targets promise together.
+    """Return the gain that is expected from (T,) chances of measuring the targets.
 
     The interval was widened by two thirds until it held the real gains of 95 % of 200 cameras in twenty
     rendered rooms; in twenty others it held 91.5 % (``python -m lab.planning --skip 60``).

@@ -1,4 +1,4 @@
-"""What the radio makes of a plan: when the new cameras' images arrive, and what they cost in energy."""
+"""Delivery of a plan's images by radio: when the new cameras' images arrive, and what they cost in energy."""
 
 from __future__ import annotations
 
@@ -68,6 +68,7 @@ class CameraDelivery:
     seconds_to_90_s: float
     """Until 90 % of its bytes have arrived."""
     seconds_to_99_s: float
+    """Until 99 % of its bytes have arrived."""
     joules: float
     """Energy of radio and platform until 99 % have arrived, or until the run's end."""
     battery_days: float
@@ -93,7 +94,7 @@ class PlanDelivery:
 
 @dataclass(frozen=True, slots=True)
 class _Sending:
-    """What is the same for all plans of a rig."""
+    """Values that are the same for all plans of a rig."""
 
     rig: Rig
     present_bytes: tuple[int, ...]
@@ -179,7 +180,7 @@ def _seconds(came: Arrivals, node: int, least_bytes: float) -> float:
 
 
 def _battery_days(camera: CameraDelivery, radio: PlanRadio) -> float:
-    """Return the days on a battery: each period costs an image, and sleep for the rest."""
+    """Return the days on a battery: in each period the camera sends one image and then sleeps."""
     energy = radio.network.energy
     busy_s = min(camera.seconds_to_99_s, radio.every_s)
     asleep_w = energy.sleep_w + energy.platform_sleep_w
@@ -224,7 +225,7 @@ def plan_within(
 
 
 def ruled_out(plan: Plan, deadline_s: float | None) -> str:
-    """Say by what candidates of a plan were barred, if any were, as the end of a sentence on the others."""
+    """Return the end of a sentence on the candidates that were not barred; empty if none was barred."""
     if not plan.barred:
         return ""
     return f" and are not ruled out by the {'radio' if deadline_s is None else 'deadline'}"

@@ -1,4 +1,4 @@
-"""Everything that the present cameras know of a place, by which a camera is judged that is not there yet."""
+"""Knowledge of the present cameras about a place, from which candidates for new cameras are judged."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from packetmesh.errors import InputError
 from pipeline.kernels.open3d_runtime import o3d
 from pipeline.kernels.rays import Camera, guessed_triangles, triangle_scene
 from pipeline.planning.space import FreeSpace, free_space
-from pipeline.planning.targets import Targets, of_rows, targets_of
+from pipeline.planning.targets import Targets, targets_at, targets_of
 from pipeline.planning.views import Meets, PresentView, view_of
 from pipeline.reconstruct import Reconstruction
 from pipeline.types import BoolArray, Surface
@@ -18,7 +18,7 @@ from pipeline.types import BoolArray, Surface
 
 @dataclass(frozen=True, slots=True)
 class SeenPlace:
-    """Everything that judges a camera which is not there yet."""
+    """Everything by which a candidate for a new camera is judged."""
 
     surface: Surface
     whole: o3d.t.geometry.RaycastingScene
@@ -28,7 +28,7 @@ class SeenPlace:
     guessed: BoolArray
     """(F,) True for guessed triangles."""
     views: tuple[PresentView, ...]
-    """What each registered camera sees."""
+    """View of each registered camera."""
     targets: Targets
     space: FreeSpace
     measured_share: float
@@ -37,7 +37,7 @@ class SeenPlace:
 
 def without_dark(seen: SeenPlace) -> SeenPlace:
     """Return the place without those targets that look dark to a present sensor."""
-    return replace(seen, targets=of_rows(seen.targets, seen.targets.dark_return == 0.0))
+    return replace(seen, targets=targets_at(seen.targets, seen.targets.dark_return == 0.0))
 
 
 def seen_place(done: Reconstruction) -> SeenPlace:

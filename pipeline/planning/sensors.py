@@ -1,4 +1,4 @@
-"""Depth cameras that can be planned: their lens, range, and what their second lens does not see."""
+"""Depth cameras that can be planned: their lens, range, and distance to a projector or second lens."""
 
 from __future__ import annotations
 

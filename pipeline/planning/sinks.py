@@ -1,4 +1,4 @@
-"""Where the sink of planned cameras stands best by radio."""
+"""Choice of the place of the sink from which the weakest radio link to a camera is the strongest."""
 
 from __future__ import annotations
 

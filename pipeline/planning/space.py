@@ -1,4 +1,4 @@
-"""Free space: where the present cameras see through, so that a camera may stand there."""
+"""Free space: cells through which a present camera sees, so that a new camera may stand there."""
 
 from __future__ import annotations
 

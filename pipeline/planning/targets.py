@@ -1,4 +1,4 @@
-"""The rays of the present cameras that meet no measured surface: what a new camera can add."""
+"""Targets of new cameras: the rays of the present cameras that meet no measured surface."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def sensed(points_m: FloatArray, views: Sequence[PresentView]) -> tuple[FloatArr
     return largest, np.where(np.isfinite(apart_rad), apart_rad, 0.0)
 
 
-def of_rows(targets: Targets, rows: BoolArray) -> Targets:
+def targets_at(targets: Targets, rows: BoolArray) -> Targets:
     """Return those targets whose (T,) row is True."""
     arrays = ("points_m", "normals", "view", "dark_return", "apart_rad")
     return replace(targets, **{name: getattr(targets, name)[rows] for name in arrays})

@@ -1,4 +1,4 @@
-"""What the present cameras see: measured surface, guesses, nothing, and what is dark to the sensor."""
+"""Views of the present cameras: measured surface, guesses, nothing, and what is dark to the sensor."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ASIDE_PX = 2
 
 
 class Meets(IntEnum):
-    """What a pixel's ray meets."""
+    """Kind of surface that a pixel's ray meets."""
 
     MEASURED = 0
     GUESSED = 1

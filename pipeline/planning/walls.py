@@ -19,8 +19,11 @@ WITHIN_M = 0.08
 GAP_M = 0.4
 """A wall ends where no surface follows for this length."""
 SHORTEST_M = 1.0
+"""Least length of a wall."""
 MOST_WALLS = 20
+"""Most walls that are found."""
 TRIES = 200
+"""Random points through which each next wall is tried."""
 
 
 def walls_of(seen: SeenPlace) -> FloatArray:

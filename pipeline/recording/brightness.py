@@ -25,10 +25,10 @@ class Brightness:
         self._recording = recording
         self._keyframe: tuple[int, Photograph | None] = (-1, None)
 
-    def held(
+    def corrected(
         self, source: int, keyframe: int, T_keyframe_source: FloatArray, motions: FloatArray
     ) -> tuple[FloatArray, FloatArray] | None:
-        """Return ``held_by_color`` of a frame and its keyframe; None also if an image cannot be read."""
+        """Correct a frame's pose by colour (``held_by_color``); None also if an image cannot be read."""
         if self._keyframe[0] != keyframe:
             self._keyframe = keyframe, self._read(keyframe)
         target, own = self._keyframe[1], self._read(source)

@@ -34,7 +34,7 @@ CONVENTIONS: dict[str, Callable[[FloatArray], FloatArray]] = {
     "from world to camera": inverse,
     "from world to camera with OpenGL's axes": lambda T: inverse(T) @ OPENGL,
 }
-"""What a written pose means, and how it becomes one from camera to world with OpenCV's axes."""
+"""Possible meanings of a written pose, each with its conversion to T_world_camera with OpenCV's axes."""
 
 
 @dataclass(frozen=True, slots=True)

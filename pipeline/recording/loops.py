@@ -54,6 +54,8 @@ Pair = tuple[int, int]
 
 @dataclass(frozen=True, slots=True)
 class _Candidate:
+    """A pair of keyframes that may show the same place."""
+
     source: int
     target: int
     T_target_source: FloatArray

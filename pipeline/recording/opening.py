@@ -44,7 +44,7 @@ MOVED_M = 0.1
 PHOTOGRAPHS = 3
 """Photographs of which the median colour is taken: an object that is in one of them only is left out."""
 READERS = 2
-"""Threads that read depth images: decoding takes longer than what is done with them."""
+"""Threads that read depth images: decoding takes longer than their processing."""
 NAME = "camera"
 """Name of the node."""
 

@@ -101,7 +101,7 @@ class Blend:
         self._total, self._weights = np.zeros((len(points), 3)), np.zeros(len(points))
 
     def add(self, frame: RgbdFrame) -> None:
-        """Add what a frame shows of the points."""
+        """Add the colours that a frame shows of the points."""
         rows, pixels, own_m = measured_in(frame, self._points.points_m)
         u, v = np.rint(pixels).astype(int).T
         distance_m = np.linalg.norm(own_m, axis=1)

@@ -97,7 +97,7 @@ def _confirmed(
         return []
     correction = poses[target] @ found.T_target_source @ inverse(poses[source])
     confirming = []
-    for later, earlier in _beside(list(poses), source, target):
+    for later, earlier in _neighbouring_pairs(list(poses), source, target):
         T = inverse(poses[earlier]) @ correction @ poses[later]
         one = loop_link(clouds, later, earlier, T, GATE_M)
         if one is not None:
@@ -105,7 +105,7 @@ def _confirmed(
     return [found, *confirming] if confirming else []
 
 
-def _beside(order: list[int], source: int, target: int) -> list[tuple[int, int]]:
+def _neighbouring_pairs(order: list[int], source: int, target: int) -> list[tuple[int, int]]:
     """Return the pairs in which one of the two is replaced by its neighbour in time."""
     i, j = order.index(source), order.index(target)
     pairs = [(i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)]

@@ -197,7 +197,7 @@ class _Tracker:
             self._search(k, cloud)
             return
         if follows:
-            found = self._held(k, cloud, found)
+            found = self._corrected_by_color(k, cloud, found)
         self._motion = inverse(self._pose) @ found.T_target_source if follows else np.eye(4)
         self._pose, self._last = found.T_target_source, k
         if found.overlap_share < NEW_BELOW:
@@ -205,15 +205,15 @@ class _Tracker:
         else:
             self._frames.append(Tracked(self._keyframe, found.T_target_source))
 
-    def _held(self, k: int, cloud: OrganisedCloud, found: Registered) -> Registered:
+    def _corrected_by_color(self, k: int, cloud: OrganisedCloud, found: Registered) -> Registered:
         """Return a registration with open motions corrected by photographs, unless depth then disagrees."""
         motions = open_motions(found.information)
         if not motions.size:
             return found
-        held = self._brightness.held(k, self._keyframe, found.T_target_source, motions)
-        if held is None:
+        corrected = self._brightness.corrected(k, self._keyframe, found.T_target_source, motions)
+        if corrected is None:
             return found
-        T, information = held
+        T, information = corrected
         moved = checked(cloud, self._clouds[self._keyframe], T, found.information + information)
         return moved if moved.may_hold else found
 

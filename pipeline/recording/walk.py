@@ -136,9 +136,10 @@ def _world(
 
 
 def iterate_views(trajectory: Trajectory, track: Track) -> Generator[Progress, None, list[int]]:
-    """Choose keyframes until each keyframe shares ``SHOWN`` with one of them, at most ``MOST_VIEWS``.
+    """Choose keyframes as views until each keyframe is seen to ``SHOWN`` by one, at most ``MOST_VIEWS``.
 
-    Those that most others share with come first. Of many keyframes ``MOST_COMPARED`` are compared.
+    In each step the keyframe is chosen that sees most of those left. Of many keyframes ``MOST_COMPARED`` are
+    compared. Returns frame numbers, ascending.
     """
     numbers = spread(list(trajectory.keyframes), MOST_COMPARED)
     T = np.array([trajectory.keyframes[number] for number in numbers])

@@ -12,7 +12,9 @@ from pipeline.surface.pivoting import roll
 from pipeline.types import BoolArray, FloatArray, IntArray, PointCloud
 
 NEIGHBOURS = 24
+"""Nearest neighbours whose triangles around a point are computed."""
 SAMPLES = 2_000
+"""Most points at which the needed radius is computed."""
 LEVELS = {"finest": 0.50, "even": 0.90, "widest": 0.99}
 """Share of the surface that each suggested ball has to be wide enough for."""
 _AGREES = 0.5
@@ -28,10 +30,10 @@ def suggest_radii(cloud: PointCloud) -> tuple[Suggestion, ...]:
 
     A ball bridges the triangles around a point if it is at least as wide as the largest of their
     circumcircles (``needed_radii_m``); the radii are quantiles of that over a fixed sample. Points
-    at a border need an infinite ball and are left out. A sufficient width is necessary, but not
-    sufficient: at an edge, in a fold or between doubled layers a ball rests on some points and never
-    reaches those behind them, more so the larger it is. So each ball is rolled once, and ``share`` is
-    the share that it closed: in the living room 0.49 at 50 %, 0.88 and 0.85 at 90 %, 0.94 and 0.86
+    at a border need an infinite ball and are left out. Such a width is necessary, but not sufficient:
+    at an edge, in a fold or between doubled layers a ball rests on some points and never reaches those
+    behind them, more so the larger it is. So each ball is rolled once, and ``share`` is the share that
+    it closed: in the living room 0.49 at 50 %, 0.88 and 0.85 at 90 %, 0.94 and 0.86
     at 99 % (sensor cloud, fused cloud).
 
     Args:

@@ -134,7 +134,7 @@ def check_shape(points_m: FloatArray) -> None:
     widths = np.sqrt(np.maximum(np.linalg.eigvalsh(centered.T @ centered), 0.0))
     if widths[1] <= _LINE * widths[2]:
         raise InputError(
-            f"The {len(points_m)} points of the cloud lie on one line; a surface needs points beside it"
+            f"The {len(points_m)} points of the cloud lie on one line; a surface needs points off that line"
         )
 
 

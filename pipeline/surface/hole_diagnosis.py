@@ -33,6 +33,7 @@ _PLACES = 8
 _WHOLE = 6.0
 """A rim up to this many ball radii around its centre is examined completely."""
 _SAMPLES = 200
+"""Number of points that are drawn in a hole."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,7 +287,7 @@ def _sentences(reason: Reason, place: _Place, surface: SurfaceResult, found: _Fi
             "Points are there, but their normals contradict each other: if they agreed, balls of up to "
             f"{_length(surface.radii_m[-1])} would close {found.gained:.0%} more of "
             f"{'this rim' if place.ends else 'the hole'}.",
-            "Take more smoothing passes, or estimate the normals from more neighbours.",
+            "Take more smoothing passes, which make neighbouring normals agree.",
         )
     if reason == "no points":
         return _unmeasured_sentences(place, surface, found)

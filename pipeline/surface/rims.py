@@ -279,9 +279,9 @@ def _angles(points_m: FloatArray, triangles: IntArray) -> FloatArray:
     return np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), np.sum(one * other, axis=1))
 
 
-def _among(keys: IntArray, wanted: IntArray) -> BoolArray:
-    """Return for each wanted key whether the sorted keys have it."""
+def _among(keys: IntArray, searched: IntArray) -> BoolArray:
+    """Return for each searched key whether it is among the sorted ``keys``."""
     if not len(keys):
-        return np.zeros(len(wanted), bool)
-    found: BoolArray = keys[np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)] == wanted
+        return np.zeros(len(searched), bool)
+    found: BoolArray = keys[np.minimum(np.searchsorted(keys, searched), len(keys) - 1)] == searched
     return found

@@ -164,22 +164,22 @@ def _nearest(place_px: float, size_px: int) -> int:
 
 def _chosen(scores: FloatArray, triangles: IntArray) -> IntArray:
     """Return (F,) best camera of each triangle by (C, F) scores smoothed over neighbours; -1 for none."""
-    most, beside = np.maximum(scores.max(axis=0), 1e-12), _neighbours(triangles)
+    most, neighbours = np.maximum(scores.max(axis=0), 1e-12), _neighbours(triangles)
     best, best_score = np.full(len(triangles), -1, np.int32), np.full(len(triangles), -1.0)
     for camera, own in enumerate(scores):
-        smoothed = _smoothed(own / most, beside)
+        smoothed = _smoothed(own / most, neighbours)
         better = (own > 0.0) & (smoothed > best_score)
         best[better], best_score[better] = camera, smoothed[better]
     return best
 
 
 @compiled
-def _smoothed(scores: FloatArray, beside: IntArray) -> FloatArray:
+def _smoothed(scores: FloatArray, neighbours: IntArray) -> FloatArray:
     """Return (F,) scores averaged with those of the (F, 3) neighbours ``SMOOTHING_ROUNDS`` times."""
     now, then = scores.copy(), np.empty_like(scores)
     for _ in range(SMOOTHING_ROUNDS):
         for f in range(len(scores)):
-            then[f] = 0.25 * (now[f] + now[beside[f, 0]] + now[beside[f, 1]] + now[beside[f, 2]])
+            then[f] = 0.25 * (now[f] + now[neighbours[f, 0]] + now[neighbours[f, 1]] + now[neighbours[f, 2]])
         now, then = then, now
     return now
 
@@ -191,10 +191,10 @@ def _neighbours(triangles: IntArray) -> IntArray:
     keys = edges[:, 0] << 32 | edges[:, 1]
     order = np.argsort(keys, kind="stable")
     first = np.flatnonzero(keys[order[:-1]] == keys[order[1:]])
-    beside = np.repeat(np.arange(count), 3)
+    neighbours = np.repeat(np.arange(count), 3)
     one, other = order[first], order[first + 1]
-    beside[one], beside[other] = other // 3, one // 3
-    return beside.reshape(count, 3)
+    neighbours[one], neighbours[other] = other // 3, one // 3
+    return neighbours.reshape(count, 3)
 
 
 def _gains(seen: BoolArray, middles: IntArray, pictures: Sequence[ByteArray]) -> FloatArray:

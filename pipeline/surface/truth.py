@@ -19,6 +19,7 @@ TOLERANCES_M = (0.01, 0.03, 0.05)
 SAMPLES = 20_000
 """Number of points drawn on each surface: a standard error of at most 0.4 percentage points."""
 _CLOSE_DEPTH = 0.05
+"""A ray is right if the mesh's depth is within this share of the true depth."""
 _SELF_HIT_M = 1e-3
 """A hit within this distance of a ray's target point is the point itself."""
 _DRAWS_A_SAMPLE = 4

@@ -14,6 +14,7 @@ _COUNT_TOLERANCE = 0.02
 _FINEST = 1e-6
 """Smallest voxel that is tried, as a share of the cloud's extent."""
 _MAX_TRIALS = 40
+"""Most voxel edges that are tried."""
 
 
 def voxel_average(cloud: PointCloud, voxel_m: float) -> PointCloud:

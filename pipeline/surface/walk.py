@@ -18,7 +18,9 @@ from pipeline.types import ByteArray, FloatArray, IntArray
 _NO_TURN_RAD = 1e-3
 """A backward turn smaller than this is rounding: the ball met its next point at once."""
 _REPORTED = 0.02
+"""Progress from one report to the next, as a share of the work."""
 _PLACES_TRIED = 100
+"""About the number of places that are compared."""
 
 
 class Kind(IntEnum):

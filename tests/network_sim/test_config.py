@@ -29,7 +29,7 @@ from packetmesh.settings_help import describe
         ("nodes.count=0", "nodes.count"),
         ("nodes.images=-1", "nodes.images"),
         ("nodes.image_bytes=0", "nodes.image_bytes"),
-        ("nodes.payload_bytes=117", "ieee802154 carries 116"),
+        ("nodes.payload_bytes=117", "ieee802154 carries 116; try nodes.payload_bytes=116"),
         ("nodes.header_bytes=116", "no room"),
         ("nodes.duty_cycle=0", "nodes.duty_cycle"),
         ("nodes.duty_cycle=1.1", "between 0.0 and 1"),

@@ -62,6 +62,7 @@ class SensorsTask:
     """One room with its two nodes, their sensors and their boards."""
 
     room: int
+    """Seed of ``box_room``."""
 
 
 @dataclass(frozen=True, slots=True)

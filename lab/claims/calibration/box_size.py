@@ -12,7 +12,9 @@ from packetmesh.errors import ReconstructionError
 from pipeline.types import FloatArray
 
 ON_PLANE_M = 0.005
+"""Points nearer to a plane than this belong to it."""
 DRAWS = 400
+"""Random triples of points through which planes are tried."""
 SOME = 4000
 """Number of points on which planes are tried."""
 ABOVE_M = 0.015
@@ -22,6 +24,7 @@ CELL_M = 0.025
 LEAST_FACE = 0.1
 """Least share of the box's points on a face."""
 ON_FACE_M = 0.008
+"""Points nearer to a face's plane than this belong to the face."""
 FLAT, UPRIGHT = 0.95, 0.3
 """Cosine of the angle between a face and the ground: least for a top face, most for an upright one."""
 WITHIN = (0.01, 0.99)

@@ -51,7 +51,7 @@ class BoxTask:
     seed: int
 
 
-def bought(rng: np.random.Generator) -> BoardCamera:
+def uncalibrated_camera(rng: np.random.Generator) -> BoardCamera:
     """Return a camera with its true parameters; its buyer knows only ``VGA``, from which they deviate."""
     focal_px = VGA.fx_px * (1.0 + FOCAL_SHARE * rng.choice([-1.0, 1.0])) * (1.0 + 0.002 * rng.normal(size=2))
     center_px = np.array([VGA.cx_px, VGA.cy_px]) + rng.uniform(-CENTER_PX, CENTER_PX, 2)
@@ -110,7 +110,7 @@ def measured_m(depth: DepthMap, lens: CameraIntrinsics) -> FloatArray:
 def box_trial(task: BoxTask) -> dict[str, list[list[list[float]]]]:
     """Return (sizes, positions, 3) errors of length, width and height in metres, for each of ``STATES``."""
     rng = np.random.default_rng((25, task.seed))
-    camera = bought(rng)
+    camera = uncalibrated_camera(rng)
     lens, correction = calibrated(camera, task.seed)
     errors: dict[str, list[list[list[float]]]] = {state: [] for state in STATES}
     for size_m in SIZES_M:

@@ -24,6 +24,7 @@ from pipeline.types import FloatArray
 PLACES = ("fx", "fy", "cx", "cy")
 WITHIN, WITHIN_POSE = 0.005, 0.05
 EXACT = 1e-3
+"""Largest error without noise that counts as none."""
 TABLE_4_2 = (
     (60.173, -10.193, 17.757, 30.0027, 19.9969, 18.0053),
     (60.237, -9.661, 18.329, 29.9965, 20.0053, 18.0072),
@@ -129,19 +130,19 @@ def _c03(study: CalibrationStudy) -> Outcome:
             if name in PLACES and abs(error) > 3.0 * max(spread.values()):
                 outside.append(f"{name} at {sigma:g} px")
     ours = {"largest_error_without_noise": exact, "entries_outside": float(len(outside))}
-    says = "all" if not outside else f"all but {', '.join(outside)} of the"
+    agreeing = "all" if not outside else f"all but {', '.join(outside)} of the"
     return Outcome(
         ours,
         {},
         exact < EXACT and not outside,
-        f"without noise the camera is found to {exact:.1e}; {says} printed focal lengths and centres of "
+        f"without noise the camera is found to {exact:.1e}; {agreeing} printed focal lengths and centres of "
         "Table 4.1 lie within three RMSE of ours with 4 or 8 views",
         (
             Table(
                 "Table 4.1 beside E1",
                 ("noise, px", "parameter", "printed", "its error", "RMSE, 4 views", "RMSE, 8 views"),
                 tuple(rows),
-                "One value is printed for each noise; of how many runs it is, the table does not say.",
+                "One value is printed for each noise; the table does not state of how many runs it is.",
             ),
         ),
     )

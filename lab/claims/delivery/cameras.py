@@ -131,11 +131,12 @@ def judge(found: Found) -> Outcome:
                 ("number of cameras, program", *found, "mean"),
                 tuple(rows),
                 "F-score at 5 cm of the fused surface, in per cent, against all that the rig's cameras could "
-                "see. Greedy takes the quality of SPEC 6.3, which gains by a second look; by sight, one look "
-                "is all. Programs choose by depth at an eighth of the resolution and the believed poses. "
-                "Random is the mean of all sets, best the best of them. Greedy by bytes may spend so many "
-                "mean layered images. In a network of one hop a joule of the radio buys the same bytes at "
-                "every node, so that a budget of joules chooses the same. Three cameras leave three choices: "
+                "see. Greedy maximises the view quality of SPEC 6.3, which rises with a second view of a "
+                "surface; greedy by sight counts a surface fully from its first view on. Programs choose by "
+                "depth at an eighth of the resolution and the believed poses. Random is the mean of all "
+                "sets, best the best of them. Greedy by bytes may spend the bytes of as many mean layered "
+                "images. In a network of one hop a joule of the radio buys the same bytes at every node, so "
+                "that a budget of joules chooses the same. Three cameras leave three choices: "
                 "this shows no more than that a choice is not worse than none.",
             ),
         ),

@@ -19,9 +19,12 @@ from pipeline.config import AlignmentMode
 
 OURS = "ours beyond the thesis"
 KEPT = 0.95
+"""Least share of the lossless F-score that the layered coding has to keep."""
 MOST_BYTES = 1.3
+"""Most bytes of that coding, over those of RVL depth with JPEG colour."""
 KEPT_EXACT, MOST_BYTES_EXACT = 0.99, 0.45
 SAME = 1e-9
+"""Largest difference of equal values."""
 ALIGNMENTS: tuple[AlignmentMode, ...] = ("local", UNCORRECTED)
 """Inferred depth with the local correction, and without."""
 
@@ -76,7 +79,7 @@ def _d11(study: Study) -> Outcome:
 
 
 def _aim(study: Study, aimed: str, others: Sequence[str], least: float, most: float) -> Outcome:
-    """Judge what a coding keeps of the lossless F-score at a tenth lost in bursts, and its bytes.
+    """Judge the share of the lossless F-score that a coding keeps at a tenth lost in bursts, and its bytes.
 
     Args:
         study: the trials.

@@ -48,9 +48,10 @@ def rate_table(study: Study) -> Table:
         "Points of F-score at 5 cm, of 100, for one per cent of all nodes' packets lost in bursts of "
         f"{BURST_PACKETS:.0f} in the mean: slope up to {RATE_SHARE:.0%}, mean over {len(study.rigs)} rigs, "
         "interval by resampling rigs and seeds. Below 0 losses helped, by chance. PNG, JPEG and RVL files do "
-        "not fall along a line: with the first lost packet a node's image is gone. Beside it what one per "
-        f"cent of the packets is worth on the air, {sent_rig} sent until everything has arrived: bytes of "
-        "the images, seconds, and joules of the nodes' radios and of the computers that carry them.",
+        "not fall along a line: with the first lost packet a node's image is gone. The other columns are "
+        f"the cost of sending one per cent of the packets, from a run in which {sent_rig} is sent until "
+        "everything has arrived: bytes of the images, seconds, and joules of the nodes' radios and of "
+        "their computers.",
     )
 
 
@@ -127,8 +128,8 @@ def losses_table(study: Study) -> Table:
         ),
         tuple(rows),
         "Means over rigs and seeds; shares and F-scores in per cent. A trial in which nothing can be rebuilt "
-        "has an F-score of 0 and no hit; holes and depth errors are of those with a surface. The lossless "
-        "raw coding stands for all that give the very images back.",
+        "has an F-score of 0 and no hit; holes and depth errors are of those with a surface. The raw coding "
+        "without losses stands for all lossless codings, which give the same images.",
     )
 
 

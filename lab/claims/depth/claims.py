@@ -31,6 +31,7 @@ TABLE_4_3 = ((6.328, 0.284, 0.206), (7.944, 0.339, 0.361), (5.647, 0.236, 0.161)
 PRINTED = {"rmse_mean_m": 6.640, "rmse_sd_m": 0.963, "abs_rel_mean": 0.243, "abs_rel_sd": 0.086}
 """Thesis 4.2, below the table."""
 HALF_DIGIT = 0.0005 + 1e-9
+"""Largest rounding error of a number that is printed with three decimals."""
 TARGET_ABS_REL = 0.25
 MEASURES = ("rmse_m", "rmse_log", "abs_rel", "delta_1", "delta_2", "delta_3")
 HEADINGS = ("RMSE (m)", "RMSE log", "AbsRel", "δ1", "δ2", "δ3")
@@ -182,8 +183,8 @@ def judge_against_sensor(measured: Sequence[SceneErrors]) -> Outcome:
         ("images", "sensor", *names),
         tuple((place, sensor[place], *(network[place, name] for name in names)) for place in sensor),
         "Against the truth, means over the images. The sensor is simulated: noise, steps and jitter at "
-        "edges of the first Kinect. The last column is what the chain makes of inferred depth, pulled onto "
-        "the sensor's at these very pixels.",
+        "edges of the first Kinect. The last column is inferred depth as the chain uses it, aligned to the "
+        "sensor's depth at these same pixels.",
     )
     return Outcome(
         ours,

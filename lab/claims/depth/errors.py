@@ -136,18 +136,18 @@ def frame_errors(
         aligned_m: by alignment, the (H, W) inferred depth.
         site: site of the image.
     """
-    beside = {}
+    at_sensor = {}
     if site.truth:
         seen_m = np.where(example.sensor.valid, judging_m, np.nan)
         chain_m = align_depth(inferred, example.sensor, "local").depth.z_m
-        beside = {
+        at_sensor = {
             name: depth_errors(z_m, seen_m, site.cap_m).abs_rel
             for name, z_m in ({SENSOR: example.sensor.z_m} | aligned_m | {CHAIN: chain_m}).items()
         }
     return FrameErrors(
         {name: depth_errors(z_m, judging_m, site.cap_m) for name, z_m in aligned_m.items()},
         {name: by_distance(z_m, judging_m) for name, z_m in aligned_m.items()},
-        beside,
+        at_sensor,
     )
 
 

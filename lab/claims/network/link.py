@@ -148,7 +148,7 @@ def _c27() -> Outcome:
         {},
         LINK_BPS == 250e3 and nodes == 3,
         f"the preset thesis-link has {nodes} nodes around one sink, and a byte on the air takes as long as "
-        f"{LINK_BPS / 1000.0:g} kbit/s say",
+        f"at {LINK_BPS / 1000.0:g} kbit/s",
         (Table("Image transfer", ("parameter", "thesis", "ours"), rows),),
     )
 
@@ -224,7 +224,7 @@ def _c29() -> Outcome:
         {},
         not wrong,
         f"the minutes of {len(wrong)} of {len(IMAGES)} rows (n = {', '.join(map(str, wrong))}) are not those "
-        "of the seconds beside them; we take the seconds",
+        "of the seconds in the same row; we take the seconds",
         (Table("Seconds and minutes of Table 4.6", header, rows),),
     )
 

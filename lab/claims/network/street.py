@@ -197,7 +197,8 @@ CLAIMS = (
         id="C30",
         claim="An image of 800 x 600 pixels, as JPEG, stays below 1000 bytes; its tag has 40",
         thesis="4.4: < 1000 B, 40 B, packets of 1000 B",
-        tolerance="the preset's sizes, and some JPEG file of 800 x 600 pixels is that small; 30 kB beside it",
+        tolerance="the preset's sizes, and some JPEG file of 800 x 600 pixels is that small; 30 kB is "
+        "simulated, too",
         experiment=_c30,
         prepare=large_images,
     ),

@@ -44,6 +44,7 @@ OTHERS = (
     *("icp plane", "icp-gated plane", "ficp plane", "ceicp-n plane", "fast-robust-icp plane"),
 )
 STRICT_P = 0.01
+"""Corrected p below which CEICP beats a rival."""
 MEASURES = ("ratio", "p")
 
 
@@ -279,7 +280,7 @@ CLAIMS = (
         thesis="Fig. 4.9: curves of CEICP, PICP and MRICP; “faster” in 5.2",
         tolerance=(
             "CEICP-N and CEICP-A need significantly fewer iterations than ICP, in all and to 90 % of the "
-            "error's drop (easy); the plane metric is reported beside it"
+            "error's drop (easy); the plane metric is reported, too"
         ),
         experiment=_c19,
         prepare=registration_results,

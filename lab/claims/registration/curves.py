@@ -33,7 +33,7 @@ def convergence_charts(results: Results, condition: str) -> tuple[Chart, ...]:
             "iterations",
             "cm",
             iterations,
-            lambda trial: held(trial["curve_error_cm"], len(iterations)),
+            lambda trial: extended(trial["curve_error_cm"], len(iterations)),
         ),
         (
             "average Hausdorff distance",
@@ -61,7 +61,7 @@ def convergence_charts(results: Results, condition: str) -> tuple[Chart, ...]:
     )
 
 
-def held(values: Sequence[float], length: int) -> FloatArray:
+def extended(values: Sequence[float], length: int) -> FloatArray:
     """Return the first ``length`` values; if there are fewer, the last one is repeated."""
     return np.array(values)[np.minimum(np.arange(length), len(values) - 1)]
 

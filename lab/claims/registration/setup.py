@@ -113,24 +113,24 @@ def ablations(metric: Metric) -> tuple[Entrant, ...]:
     """Return CEICP variants with one part removed or changed; the thesis's formula is point to point only."""
     name = "ceicp-a" if metric == "point" else "ceicp-a plane"
     shared = tuple(
-        Entrant(f"ceicp-a-{part}", metric, f"{name}, {label}", _like(name))
+        Entrant(f"ceicp-a-{part}", metric, f"{name}, {label}", _tuned_settings(name))
         for part, label in (("gaussian", "w = p"), ("hard-gate", "hard gate"), ("fixed-sigma", "fixed sigma"))
     )
     if metric == "plane":
-        both = (*_like(name), ("direction", "both"))
+        both = (*_tuned_settings(name), ("direction", "both"))
         return (*shared, Entrant("ceicp-a", metric, f"{name}, both directions", both))
     return (
         *shared,
-        Entrant("ceicp-n-gaussian", label="ceicp-n, w = p", settings=_like("ceicp-n")),
+        Entrant("ceicp-n-gaussian", label="ceicp-n, w = p", settings=_tuned_settings("ceicp-n")),
         Entrant("ceicp-literal", label="ceicp-literal, metres", settings=(("unit", "m"),)),
         Entrant(
             "ceicp-literal-centroids",
             label="ceicp-literal, weighted centroids",
-            settings=_like("ceicp-literal"),
+            settings=_tuned_settings("ceicp-literal"),
         ),
     )
 
 
-def _like(name: str) -> tuple[tuple[str, float | str], ...]:
+def _tuned_settings(name: str) -> tuple[tuple[str, float | str], ...]:
     """Return the tuned setting of the entrant ``name``; empty if it was not tuned."""
     return ((TUNED[name][0], TUNED[name][1]),) if name in TUNED else ()

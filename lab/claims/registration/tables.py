@@ -172,7 +172,7 @@ def tuning_table() -> Table:
         "Equal tuning",
         ("method", "parameter", "chosen", "value: score"),
         tuple(rows),
-        "One parameter and four values for each, on four rooms that nothing else sees, under easy, holes x3, "
+        "One parameter and four values for each, on four rooms that nothing else uses, under easy, holes x3, "
         "large start and two nodes; the score is the geometric mean of the point error in centimetres.",
     )
 

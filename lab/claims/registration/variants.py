@@ -107,10 +107,10 @@ class FicpWithExponent(Ficp):
         return evenly(closest_rows(matching.distances_m, fraction))
 
 
-def _gaussian(kept: PairWeights, matching: Matching, more: FloatArray | float = 0.0) -> PairWeights:
-    """Return the same pairs with normalised weights exp(-d^2 / 2 sigma^2 - more); ``more`` is (M,) or 0."""
+def _gaussian(kept: PairWeights, matching: Matching, penalty: FloatArray | float = 0.0) -> PairWeights:
+    """Return the pairs with normalised weights exp(-d^2 / 2 sigma^2 - penalty); ``penalty`` is (M,) or 0."""
     variance_m2 = max(kept.sigma_m**2, np.finfo(float).tiny)
-    kernel = np.exp(-0.5 * matching.distances_m[kept.rows] ** 2 / variance_m2 - more)
+    kernel = np.exp(-0.5 * matching.distances_m[kept.rows] ** 2 / variance_m2 - penalty)
     return PairWeights(kept.rows, kernel / kernel.sum() if len(kernel) else kernel, kept.sigma_m)
 
 

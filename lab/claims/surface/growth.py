@@ -112,18 +112,20 @@ def judge(growth: Growth) -> Outcome:
         "largest_peak_memory_bytes": float(largest.peak_memory_bytes),
     }
     ci95 = {"time_slope": time.ci95, "storage_slope": storage.ci95}
-    beside = ""
+    comparison = ""
     if len(growth.open3d) > 2:
         peer = fit_slope([run.points for run in growth.open3d], [run.elapsed_s for run in growth.open3d])
         ours["time_slope_open3d"], ci95["time_slope_open3d"] = peer.exponent, peer.ci95
-        beside = f"; Open3D's time grows with {peer.exponent:.2f} up to {growth.open3d[-1].points:,} points"
+        comparison = (
+            f"; Open3D's time grows with {peer.exponent:.2f} up to {growth.open3d[-1].points:,} points"
+        )
     return Outcome(
         ours,
         ci95,
         time.is_linear and storage.is_linear,
         f"from {counts[0]:,} to {counts[-1]:,} points of one density, time grows with the power "
         f"{time.exponent:.2f} and storage with {storage.exponent:.2f} of their number; the largest cloud "
-        f"takes {largest.elapsed_s:.1f} s and {most_bytes / largest.points:.0f} bytes a point{beside}",
+        f"takes {largest.elapsed_s:.1f} s and {most_bytes / largest.points:.0f} bytes a point{comparison}",
         (_chart(growth, time), _table(growth)),
     )
 
@@ -179,7 +181,7 @@ def _table(growth: Growth) -> Table:
         ),
         tuple(rows),
         "A wavy terrain with points 1 cm apart, whose area grows. Seconds are medians of the rounds, after "
-        "a first small surface; the arrays are the most that our ball holds at once beside the cloud, "
+        "a first small surface; the arrays are the most that our ball holds at once, without the cloud and "
         "without what its grid allocates (at most 28 bytes a point); the process holds its libraries too.",
     )
 

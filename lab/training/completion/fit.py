@@ -73,7 +73,7 @@ class Judged:
 def fit_confidence(rooms: int) -> Iterator[str]:
     """Yield lines of text: the error at each takeover, and the fitted coefficients with their calibration.
 
-    Every other room fits, the others judge.
+    The coefficients are fitted on every other room, and their calibration is measured on the others.
 
     Args:
         rooms: number of validation rooms, at least 2.
@@ -91,7 +91,7 @@ def fit_confidence(rooms: int) -> Iterator[str]:
     ):
         fitted = fit(Evidence.joined([of(room) for room in judged[::2]]))
         yield f"{name}_ODDS = " + ", ".join(f"{value:.2f}" for value in fitted)
-        yield "said | true | pixels"
+        yield "mean confidence | share that is right | pixels"
         yield from calibration(fitted, Evidence.joined([of(room) for room in judged[1::2]]))
 
 

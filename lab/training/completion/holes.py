@@ -17,10 +17,15 @@ NOISE = 0.012
 STEP = 0.03
 """Coarsest step of inverse depth, 1/m; a Kinect's is 0.003."""
 BIAS = 0.02
+"""Largest scale of the sensor's smooth bias, in log depth."""
 OBJECT_STEP = 0.02
+"""Largest step of log depth between neighbouring cells of one smooth piece."""
 LARGEST_OBJECT = 0.3
+"""Largest share of the image that a hidden piece may fill."""
 MOST_HIDDEN = 0.85
+"""Share of the surface from which the holes are too large, and a single ellipse is hidden instead."""
 FLYING_STEP = 0.05
+"""Step of log depth across a cell from which it may be a flying pixel."""
 MOST_FLYING = 0.15
 """Largest share of the pixels at edges that report a depth between front and back."""
 COLORLESS = 0.12
@@ -50,14 +55,14 @@ def lesson(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> Les
     y, x = rng.integers(step, size=2)
     z_m = np.ascontiguousarray(depth_m[y::step, x::step]) * np.exp(rng.normal(0.0, 0.3))
     colors = cv2.resize(rgb, z_m.shape[::-1], interpolation=cv2.INTER_AREA)
-    there = np.isfinite(z_m) & (z_m > NEAR_M) & (z_m < FAR_M)
-    true = np.log(np.where(there, z_m, 1.0)).astype(np.float32)
+    on_surface = np.isfinite(z_m) & (z_m > NEAR_M) & (z_m < FAR_M)
+    true = np.log(np.where(on_surface, z_m, 1.0)).astype(np.float32)
     if rng.random() < 0.5:  # the sensor's bias continues in its holes
         true += field(z_m.shape, rng.uniform(10.0, 40.0), rng) * np.float32(rng.uniform(0.0, BIAS))
-    known = there & ~hidden(true, there, colors, rng)
+    known = on_surface & ~hidden(true, on_surface, colors, rng)
     if known.sum() < 50:
-        known = there
-    noisy = ragged(true, there, rng) if rng.random() < 0.6 else true
+        known = on_surface
+    noisy = displaced_edges(true, on_surface, rng) if rng.random() < 0.6 else true
     noisy = noisy + rng.standard_normal(true.shape) * rng.uniform(0.0, NOISE)
     if rng.random() < 0.4:
         noisy = noisy + field(true.shape, rng.uniform(1.5, 4.0), rng) * rng.uniform(0.0, NOISE)
@@ -65,24 +70,24 @@ def lesson(rgb: ByteArray, depth_m: FloatArray, rng: np.random.Generator) -> Les
         coarse = rng.uniform(0.0, STEP) + 1e-6
         noisy = -np.log(np.maximum(np.rint(np.exp(-noisy) / coarse), 1.0) * coarse)
     seen = np.where(known, noisy, 0.0).astype(np.float32)
-    learned = np.where(known, seen, np.where(there, true, np.nan)).astype(np.float32)
-    return Lesson(Grid(seen, known, astray(colors, rng)), learned)
+    learned = np.where(known, seen, np.where(on_surface, true, np.nan)).astype(np.float32)
+    return Lesson(Grid(seen, known, misregistered(colors, rng)), learned)
 
 
-def ragged(log_z: FloatArray, there: BoolArray, rng: np.random.Generator) -> FloatArray:
+def displaced_edges(log_z: FloatArray, on_surface: BoolArray, rng: np.random.Generator) -> FloatArray:
     """Return log depth with edges displaced by up to a cell, and a few pixels between front and back."""
     window = np.ones((3, 3), np.uint8)
     front, back = cv2.erode(log_z, window), cv2.dilate(log_z, window)
     rows, columns = log_z.shape
     y, x = np.indices(log_z.shape) + rng.integers(-1, 2, (2, rows, columns))
     y, x = np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)
-    moved = np.where(there[y, x], log_z[y, x], log_z)
+    moved = np.where(on_surface[y, x], log_z[y, x], log_z)
     share = rng.random(log_z.shape)
     flying = (back - front > FLYING_STEP) & (rng.random(log_z.shape) < rng.uniform(0.0, MOST_FLYING))
-    return np.where(flying & there, front + share * (back - front), moved)
+    return np.where(flying & on_surface, front + share * (back - front), moved)
 
 
-def astray(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
+def misregistered(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
     """Return colours shifted and turned as by bad registration, or sometimes noise about a single colour."""
     if rng.random() < COLORLESS:
         level = rng.integers(0, 256, 3)
@@ -95,7 +100,7 @@ def astray(rgb: ByteArray, rng: np.random.Generator) -> ByteArray:
     return rgb
 
 
-def hidden(log_z: FloatArray, there: BoolArray, rgb: ByteArray, rng: np.random.Generator) -> BoolArray:
+def hidden(log_z: FloatArray, on_surface: BoolArray, rgb: ByteArray, rng: np.random.Generator) -> BoolArray:
     """Return (H, W) True at lost pixels: margins, edges, dark, bright, far, random shapes, objects."""
     rows, columns = log_z.shape
     lost = np.zeros(log_z.shape, bool)
@@ -110,14 +115,14 @@ def hidden(log_z: FloatArray, there: BoolArray, rgb: ByteArray, rng: np.random.G
         grey = cv2.GaussianBlur(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), (0, 0), 1.0)
         lost |= grey > np.quantile(grey, rng.uniform(0.85, 1.0))
     if rng.random() < 0.3:
-        lost |= log_z > np.quantile(log_z[there], rng.uniform(0.6, 1.0))
+        lost |= log_z > np.quantile(log_z[on_surface], rng.uniform(0.6, 1.0))
     if rng.random() < 0.4:
         lost |= field(log_z.shape, rng.uniform(1.0, 8.0), rng) > rng.uniform(1.0, 2.5)
     for _ in range(int(rng.choice([0, 1, 2, 4], p=[0.2, 0.3, 0.3, 0.2]))):
         lost |= ellipse(log_z.shape, rng)
     for _ in range(int(rng.choice([0, 1, 2], p=[0.5, 0.3, 0.2]))):
-        lost |= an_object(log_z, there, rng)
-    return lost if lost[there].mean() < MOST_HIDDEN else ellipse(log_z.shape, rng)
+        lost |= smooth_piece(log_z, on_surface, rng)
+    return lost if lost[on_surface].mean() < MOST_HIDDEN else ellipse(log_z.shape, rng)
 
 
 def around_edges(log_z: FloatArray, width_px: int, rng: np.random.Generator) -> BoolArray:
@@ -143,9 +148,9 @@ def ellipse(shape: tuple[int, int], rng: np.random.Generator) -> BoolArray:
     return (along / axes[0]) ** 2 + (across / axes[1]) ** 2 <= 1.0
 
 
-def an_object(log_z: FloatArray, there: BoolArray, rng: np.random.Generator) -> BoolArray:
+def smooth_piece(log_z: FloatArray, on_surface: BoolArray, rng: np.random.Generator) -> BoolArray:
     """Return (H, W) True in the smooth piece of surface around a random pixel; empty if it is too large."""
-    seeds = np.argwhere(there)
+    seeds = np.argwhere(on_surface)
     y, x = seeds[rng.integers(len(seeds))]
     mask = np.zeros((log_z.shape[0] + 2, log_z.shape[1] + 2), np.uint8)
     flags = 4 | cv2.FLOODFILL_MASK_ONLY | 255 << 8

@@ -87,7 +87,7 @@ class Greedy(Scheme):
         self.coverage = Coverage(validity_ns)
         self.k = k
 
-    def wanted(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
+    def chosen(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
         """Return the indices of the images to request, largest gain first."""
         return select(self.coverage, cells.tolist(), captured_ns.tolist(), self.k)
 

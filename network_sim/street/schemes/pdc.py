@@ -58,7 +58,7 @@ class Pdc(Scheme):
         self._period = 0
         self._by_received = config.name == "pdc-received"
 
-    def wanted(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
+    def chosen(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
         """Return the indices of the images to request, oldest first."""
         self._advance(now_ns)
         if not self._by_received:

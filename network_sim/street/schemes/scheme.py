@@ -10,10 +10,10 @@ from network_sim.street.pieces import Part
 class Scheme:
     """Decides which of the offered images the collector requests."""
 
-    asks = True
+    on_request = True
     """Vehicles upload images only on request."""
     by_pieces = False
-    """Requests name pieces of images."""
+    """Requests name pieces of images instead of whole images."""
 
     def parts(self, shown: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[Part]:
         """Return the parts of images to upload, in upload order, of those in a summary (T,).
@@ -23,11 +23,11 @@ class Scheme:
             captured_ns: (T,) capture times of the images.
             now_ns: present time.
         """
-        wanted = self.wanted(shown, captured_ns, now_ns)
-        cells = shown[wanted].tolist()
-        return [Part(index, (cell,)) for index, cell in zip(wanted, cells, strict=True)]
+        chosen = self.chosen(shown, captured_ns, now_ns)
+        cells = shown[chosen].tolist()
+        return [Part(index, (cell,)) for index, cell in zip(chosen, cells, strict=True)]
 
-    def wanted(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
+    def chosen(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
         """Return the indices of the images to upload, in upload order, of those in a summary (T,).
 
         Args:
@@ -38,17 +38,17 @@ class Scheme:
         raise NotImplementedError
 
     def received(self, cell: int, now_ns: int) -> None:
-        """Take note that an image of this cell arrived."""
+        """Record that an image of this cell arrived; most schemes ignore it."""
 
     def missed(self, cell: int, captured_ns: int) -> None:
-        """Take note that a requested image, captured at ``captured_ns``, did not arrive."""
+        """Record that a requested image of this cell, captured at ``captured_ns``, did not arrive."""
 
 
 class Baseline(Scheme):
     """Uploads every image without a request; summaries are sent too, to be comparable."""
 
-    asks = False
+    on_request = False
 
-    def wanted(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
+    def chosen(self, cells: np.ndarray, captured_ns: np.ndarray, now_ns: int) -> list[int]:
         """Return the indices of all offered images, oldest first."""
         return list(range(len(cells)))

@@ -27,7 +27,9 @@ class Offer(NamedTuple):
     per_byte: float
     """Gain in ns per byte of request and answer."""
     first: int
+    """First of the pieces."""
     stop: int
+    """The piece after the last one."""
 
 
 def best_run(gains_ns: list[int], least_ns: float, cuts: Cuts) -> Offer | None:

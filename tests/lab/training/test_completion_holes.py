@@ -1,7 +1,15 @@
 import numpy as np
 import pytest
 
-from lab.training.completion.holes import an_object, around_edges, astray, ellipse, hidden, lesson, ragged
+from lab.training.completion.holes import (
+    around_edges,
+    displaced_edges,
+    ellipse,
+    hidden,
+    lesson,
+    misregistered,
+    smooth_piece,
+)
 from lab.training.furniture import Catalogue, Entry
 from lab.worlds.pieces.stock import VARIANTS, from_stock
 from packetmesh.errors import InputError
@@ -65,7 +73,7 @@ def test_edges_are_lost_around_steps_and_whole_objects_go():
     for seed in range(10):
         assert not (around_edges(log_z, 3, np.random.default_rng(seed)) & ~near_edge).any()
     there = np.ones(log_z.shape, bool)
-    pieces = [an_object(log_z, there, np.random.default_rng(seed)) for seed in range(60)]
+    pieces = [smooth_piece(log_z, there, np.random.default_rng(seed)) for seed in range(60)]
     boxes = [piece for piece in pieces if piece.any()]
     assert boxes  # the background is too large to be lost as an object
     for piece in boxes:
@@ -87,7 +95,7 @@ def test_ragged_edges_stay_between_front_and_back():
     log_z = np.zeros((120, 160), np.float32)
     log_z[:, 80:] = 0.5
     there = np.ones(log_z.shape, bool)
-    changed = ragged(log_z, there, np.random.default_rng(0))
+    changed = displaced_edges(log_z, there, np.random.default_rng(0))
     assert ((changed >= 0.0) & (changed <= 0.5)).all()
     moved = changed != log_z
     assert moved.any()
@@ -100,7 +108,7 @@ def test_some_lessons_have_no_picture():
     rgb[:, 80:] = 255
     steps = []
     for seed in range(100):
-        seen = astray(rgb, np.random.default_rng(seed)).astype(float)
+        seen = misregistered(rgb, np.random.default_rng(seed)).astype(float)
         steps.append(abs(seen[:, 100:].mean() - seen[:, :60].mean()))
     blind = np.mean(np.array(steps) < 10.0)
     assert 0.04 < blind < 0.25

@@ -93,16 +93,16 @@ def test_greedy_takes_two_of_the_five_images_of_a_cell() -> None:
 def test_greedy_asks_again_for_what_did_not_come() -> None:
     greedy = Greedy(VALIDITY_S, None)
     cells, taken = np.array([3]), np.array([100])
-    assert greedy.wanted(cells, taken, 0) == [0]
-    assert greedy.wanted(cells, taken, 0) == []
+    assert greedy.chosen(cells, taken, 0) == [0]
+    assert greedy.chosen(cells, taken, 0) == []
     greedy.missed(3, 100)
-    assert greedy.wanted(cells, taken, 0) == [0]
+    assert greedy.chosen(cells, taken, 0) == [0]
 
 
 def test_baseline_wants_all() -> None:
     baseline = make_scheme(SchemeConfig(), 4, np.random.default_rng(0))
-    assert not baseline.asks
-    assert baseline.wanted(np.array([2, 2, 2]), np.array([1, 2, 3]), 9) == [0, 1, 2]
+    assert not baseline.on_request
+    assert baseline.chosen(np.array([2, 2, 2]), np.array([1, 2, 3]), 9) == [0, 1, 2]
 
 
 def test_pdc_falls_from_one_to_a_single_cover() -> None:
@@ -128,11 +128,11 @@ def test_pdc_counts_offers_over_the_observation_period() -> None:
     seen = np.zeros(12, dtype=np.int64)
     for minute in range(12):
         assert pdc.probabilities[0] == (1.0 if minute < 2 else 0.5), "set at the first offer of a new period"
-        pdc.wanted(seen, seen, minute * minute_ns)
+        pdc.chosen(seen, seen, minute * minute_ns)
     assert pdc.probabilities.tolist() == [0.5, 1.0], "12 a minute, and a cell never seen"
-    pdc.wanted(seen[:0], seen[:0], 17 * minute_ns)
+    pdc.chosen(seen[:0], seen[:0], 17 * minute_ns)
     assert pdc.probabilities[0] == pytest.approx(probabilities(np.array([12 * 5 / 10]), SchemeConfig())[0])
-    pdc.wanted(seen[:0], seen[:0], 40 * minute_ns)
+    pdc.chosen(seen[:0], seen[:0], 40 * minute_ns)
     assert pdc.probabilities[0] == 1.0, "forgotten"
 
 
@@ -140,7 +140,7 @@ def test_pdc_asks_with_its_probability() -> None:
     pdc = Pdc(SchemeConfig(name="pdc"), 3, np.random.default_rng(0))
     pdc.probabilities[:] = [0.25, 1.0, 0.0]
     cells = np.repeat(np.arange(3), 4000)
-    asked = np.bincount(cells[pdc.wanted(cells, cells, 0)], minlength=3)
+    asked = np.bincount(cells[pdc.chosen(cells, cells, 0)], minlength=3)
     assert asked[0] == pytest.approx(1000, abs=100)
     assert asked[1:].tolist() == [4000, 0]
 
@@ -154,8 +154,8 @@ def test_pdc_received_turns_down_fast_and_up_slowly() -> None:
 def test_pdc_received_counts_what_came() -> None:
     pdc = Pdc(SchemeConfig(name="pdc-received"), 2, np.random.default_rng(0))
     offered = np.zeros(50, dtype=np.int64)
-    pdc.wanted(offered, offered, 0)
+    pdc.chosen(offered, offered, 0)
     for _ in range(9):
         pdc.received(1, 0)
-    pdc.wanted(offered, offered, to_ns(60.0))
+    pdc.chosen(offered, offered, to_ns(60.0))
     assert pdc.probabilities == pytest.approx([1.0, 0.7])

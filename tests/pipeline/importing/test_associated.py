@@ -110,7 +110,7 @@ def test_the_same_line_twice_is_one_moment(tmp_path):
 def test_images_that_are_missing_are_named_and_then_found(tmp_path):
     write(tmp_path / "recording")
     (tmp_path / "recording" / "rgb").rename(tmp_path / "away")
-    with pytest.raises(InputError, match=r"rgb/0.png; try to unpack the images beside it"):
+    with pytest.raises(InputError, match=r"rgb/0.png; try to unpack the images next to it"):
         imported(tmp_path)
     (tmp_path / "away").rename(tmp_path / "recording" / "rgb")
     (tmp_path / "recording" / "rgb" / "1.png").unlink()

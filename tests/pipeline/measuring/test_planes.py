@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import InputError
-from pipeline.measuring.planes import fitted, plane_at, together
+from pipeline.measuring.planes import correlated_neighbours, fitted, plane_at
 from tests.pipeline.measuring.scenes import box_on_table, joined, measured, sheet
 from tests.pipeline.surface.shapes import sphere
 
@@ -57,8 +57,8 @@ def test_neighbours_that_err_together_count_as_fewer():
     rng = np.random.default_rng(3)
     alone = rng.normal(size=41 * 41)
     blocks = np.kron(rng.normal(size=(7, 7)), np.ones((6, 6)))[:41, :41].ravel()
-    assert together(vertices_m[:, :2], alone, 0.05) == pytest.approx(1.0, abs=0.3)
-    assert 20.0 < together(vertices_m[:, :2], blocks, 0.05) < 60.0
+    assert correlated_neighbours(vertices_m[:, :2], alone, 0.05) == pytest.approx(1.0, abs=0.3)
+    assert 20.0 < correlated_neighbours(vertices_m[:, :2], blocks, 0.05) < 60.0
 
 
 def test_a_plane_grows_to_its_edges_and_not_around_them():

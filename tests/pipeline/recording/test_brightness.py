@@ -37,30 +37,30 @@ def test_the_slide_of_the_depth_camera_is_found_and_the_keyframe_read_once():
     wall = Wall()
     brightness = Brightness(wall)
     for source in (1, 2):
-        T, information = brightness.held(source, 0, np.eye(4), ALONG)
+        T, information = brightness.corrected(source, 0, np.eye(4), ALONG)
         true = inverse(walls.DEPTH_IN_COLOR) @ wall.pose(source) @ walls.DEPTH_IN_COLOR
         assert np.linalg.norm((inverse(true) @ T)[:2, 3]) < 0.001
         assert information[3, 3] > 1e3
     assert sorted(wall.read) == [0, 1, 2]
-    brightness.held(2, 1, np.eye(4), ALONG)
+    brightness.corrected(2, 1, np.eye(4), ALONG)
     assert sorted(wall.read) == [0, 1, 1, 2, 2]
 
 
 def test_photographs_that_cannot_be_read_decide_nothing():
     brightness = Brightness(Wall(unreadable=(1,)))
-    assert brightness.held(1, 0, np.eye(4), ALONG) is None
-    assert brightness.held(2, 0, np.eye(4), ALONG) is not None
-    assert brightness.held(2, 1, np.eye(4), ALONG) is None
+    assert brightness.corrected(1, 0, np.eye(4), ALONG) is None
+    assert brightness.corrected(2, 0, np.eye(4), ALONG) is not None
+    assert brightness.corrected(2, 1, np.eye(4), ALONG) is None
 
 
 def test_photographs_of_another_size_decide_nothing(monkeypatch):
     wall = Wall()
     brightness = Brightness(wall)
-    assert brightness.held(1, 0, np.eye(4), ALONG) is not None
+    assert brightness.corrected(1, 0, np.eye(4), ALONG) is not None
     camera = scaled(walls.CAMERA, 0.5)
     monkeypatch.setattr(walls, "CAMERA", camera)
     assert wall.frame(1).rgb.shape == (60, 80, 3)
-    assert brightness.held(1, 0, np.eye(4), ALONG) is None
+    assert brightness.corrected(1, 0, np.eye(4), ALONG) is None
 
 
 def test_a_smaller_image_shows_the_same_points_in_the_same_colours():

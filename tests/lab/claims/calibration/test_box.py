@@ -6,7 +6,7 @@ import pytest
 from lab.claims.calibration import box_views
 from lab.claims.calibration.box_claim import STATES, BoxStudy, judge
 from lab.claims.calibration.box_size import box_size_m
-from lab.claims.calibration.box_views import SIZES_M, bought, box_depth, calibrated, measured_m
+from lab.claims.calibration.box_views import SIZES_M, box_depth, calibrated, measured_m, uncalibrated_camera
 from lab.claims.registry import CLAIMS
 from lab.worlds.primitives import box, merged, moved
 from packetmesh.errors import ReconstructionError
@@ -51,7 +51,7 @@ def test_without_a_box_it_says_so():
 
 def test_the_sensor_leaves_a_known_camera_a_centimetre():
     rng = np.random.default_rng(5)
-    camera = bought(rng)
+    camera = uncalibrated_camera(rng)
     assert 0.01 < abs(camera.intrinsics.fx_px / LENS.fx_px - 1.0) < 0.03
     raw, right = box_depth(SIZES_M[0], 45.0, camera, rng)
     assert np.abs(measured_m(right, camera.intrinsics) - SIZES_M[0]).max() < 0.012
@@ -82,7 +82,7 @@ def test_it_is_a_claim():
 
 def test_what_is_calibrated_is_calibrated_from_photographs(monkeypatch):
     monkeypatch.setattr(box_views, "MOMENTS", 6)
-    camera = bought(np.random.default_rng(8))
+    camera = uncalibrated_camera(np.random.default_rng(8))
     lens, correction = calibrated(camera, seed=8)
     assert lens.fx_px == pytest.approx(camera.intrinsics.fx_px, rel=0.003)
     flat = DepthMap(np.full((480, 640), 1.0, np.float32))
