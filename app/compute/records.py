@@ -69,12 +69,12 @@ class SceneNode:
 
 @dataclass(frozen=True, slots=True)
 class AveragedView:
-    """Depth of cameras that stand, averaged over the frames of their recordings."""
+    """Depth of cameras at rest, averaged over the frames of their recordings."""
 
     frames: int
-    """Number of frames that were averaged; of several cameras the most."""
+    """Number of frames that were averaged; for several cameras the largest."""
     available: int
-    """Number of frames that could be averaged; of several cameras the most."""
+    """Number of frames that could be averaged; for several cameras the largest."""
     unmeasured_share: float
     """Share of the pixels without depth."""
     moving_share: float
@@ -115,7 +115,7 @@ class SceneView:
     has_walk: bool = False
     """Whether its nodes are keyframes of a recording."""
     averaged: AveragedView | None = None
-    """Average of the frames, if its cameras stand; None for single images."""
+    """Average of the frames, if its cameras are at rest; None for single images."""
 
 
 @dataclass(frozen=True, slots=True)
