@@ -76,7 +76,7 @@ class Curves:
         """Show other curves.
 
         Args:
-            curves: (K,) ascending abscissae and (K,) values of each curve, NaN without a value.
+            curves: (K,) ascending abscissae and (K,) values of each curve, NaN where there is none.
             colors: colours of the curves.
             ends: ends of the horizontal axis.
             label: label of the horizontal axis.

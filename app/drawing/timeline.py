@@ -229,7 +229,7 @@ class Curve:
     t_ns: NDArray[np.int64]
     """(T,) ascending."""
     values: FloatArray
-    """(T,) values, NaN without a value."""
+    """(T,) values, NaN where there is none."""
     low: float = 0.0
     high: float = 1.0
     """Value at the lane's upper edge; ``low`` is at the lower one."""

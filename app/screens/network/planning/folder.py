@@ -309,7 +309,7 @@ class PlanFolder:
 
     def _entered(self, T_world_camera: FloatArray) -> None:
         """Move the chosen ghost and its handle to a pose that was entered as numbers."""
-        self._drawn.hold(T_world_camera)
+        self._drawn.move_handle(T_world_camera)
         self._moved(self._plan, self._row, T_world_camera, True)
 
     def _moved(self, plan: PlanView | None, row: int, T_world_camera: FloatArray, ended: bool) -> None:
@@ -317,7 +317,7 @@ class PlanFolder:
         if plan is None or plan is not self._plan:
             return
         self._poses[row] = _pose_of(T_world_camera)
-        self._drawn.stand(row, T_world_camera)
+        self._drawn.move_frustum(row, T_world_camera)
         self._stale, self._arrivals, self._placed = True, (), self._places
         self._caption.content = BEFORE
         if not self._judging:
