@@ -1,6 +1,6 @@
 """The top of the control panel: the stepper, the status line, the progress bar, and buttons for all steps.
 
-``actions.js`` disables the buttons that have nothing to do; ``Reset`` while no setting was used.
+``actions.js`` disables the buttons that have nothing to do, such as ``Reset`` before any setting was used.
 """
 
 from __future__ import annotations
