@@ -44,6 +44,7 @@ from pipeline.measuring.surface import MeasuredSurface
 from pipeline.types import FloatArray
 
 CUT_OFF = "Only what Look cuts away is under the pointer; click on the surface, or set Cut away to Nothing"
+NO_SURFACE = "There is nothing to measure; choose a scene with measured depth"
 NO_HOLE = "There is no hole at the click; click a red rim, or into a hole"
 EXTENT = (2.0, 98.0)
 """Percentiles of a plane's vertices between which it is drawn."""
@@ -120,7 +121,10 @@ def _hit(surveys: Sequence[Survey], pending: Clicked, step: Step, click: Click) 
     origin_m, direction = np.array(click.origin_m), np.array(click.direction)
     found: Callable[..., FloatArray] = _rim_on_ray if step.marks == "rim" else _point_on_ray
     parts = [pending.part] if pending.points_m else range(len(surveys))
-    hits, trouble = list[tuple[float, int, FloatArray]](), InputError("There is nothing to measure")
+    hits, trouble = (
+        list[tuple[float, int, FloatArray]](),
+        InputError(NO_SURFACE),
+    )
     for part in parts:
         try:
             point_m = found(surveys[part].surface, origin_m, direction, click.cut)
