@@ -24,8 +24,8 @@ picture**, or place discs with the sliders."""
 )
 BUTTON = "Hide and fill"
 WAITING = Markdown("Filling …")
-SILENT = Markdown("There is no result. Press the button again.")
-BESIDE = Markdown("There is no measured point. Click a point of the node that is chosen above.")
+NO_RESULT = Markdown("There is no result. Press the button again.")
+NO_POINT = Markdown("There is no measured point. Click a point of the node that is chosen above.")
 
 
 class HideFolder:
@@ -96,7 +96,7 @@ class HideFolder:
         size_share = self._size.value / 100.0
         disc = clicked_disc(self._cloud, self._T_world_camera, origin_m, direction, size_share)
         if disc is None:
-            self._status.content = BESIDE
+            self._status.content = NO_POINT
         else:
             self._paint((*self.discs, disc))
 
@@ -122,7 +122,7 @@ class HideFolder:
         """Show the result; None if the job was stopped or failed."""
         self.forget()
         if view is None:
-            self._status.content = SILENT
+            self._status.content = NO_RESULT
             return
         self._status.content = Markdown("**{:,} measured pixels of {} hidden.**").format(
             view.hidden_px, view.node
