@@ -57,7 +57,7 @@ class Contest:
     T_aligned: FloatArray
     """T_target_source: the reference pose, or the nodes' believed one if it is unknown."""
     T_home: FloatArray | None
-    """The reference pose, of a mirrored source a reflection; None if it is unknown."""
+    """The reference pose; a reflection for a mirrored source. None if it is unknown."""
     reference: Reference
     center_m: FloatArray
     """(3,) centre of the aligned source before it was degraded, target frame."""

@@ -283,7 +283,7 @@ class WalkPart:
             return
         names = ["", *self._pairs()]
         if text not in names:
-            raise InputError(f"The address has loop={text}, but no loop joins these frames")
+            raise InputError(f"The address has loop={text}, which is no loop; choose one from the list")
         self._loop.value = self._loop.options[names.index(text)]
         self._picked_loop()
 
