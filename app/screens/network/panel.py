@@ -248,7 +248,7 @@ class NetworkPanel(Panel):
         self._frames = [Frames(view.run)]
         drawing = self._drawing = DeliveryDrawing(self.scene, self._next_name(), view)
         self._setup.what_if.load(view, drawing.place_m)
-        if self._setup.grant():
+        if self._setup.apply_pending():
             self.ui.post(self._run)
         self._legend.content = legend_html(legend(view))
         self._inspector.load(self._frames, view, drawing)

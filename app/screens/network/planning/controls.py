@@ -106,7 +106,7 @@ class PlanControls:
                 elif name in handles:
                     show(name, handles[name], text)
                 else:
-                    raise InputError(f"The address has {name[:40]}, but the folder Plan has no such control")
+                    raise InputError(f"The address has {name[:40]}, no control of Plan; leave it out")
             except InputError as error:
                 wrong.append(error)
         if wrong:

@@ -1,4 +1,4 @@
-"""The folder *Plan*: it asks for a plan, shows its ghosts, and follows the one that is dragged."""
+"""The folder *Plan*: it requests a plan, shows its ghosts, and judges the one that is dragged."""
 
 from __future__ import annotations
 
@@ -276,11 +276,12 @@ class PlanFolder:
 
     @property
     def _where(self) -> Poses:
+        """The present poses of the ghosts."""
         return tuple(self._poses)
 
     @property
     def _sent_now(self) -> Sent:
-        """How the images travel by the screen's settings now."""
+        """The way in which the images travel by the screen's present settings."""
         assert self._plan is not None
         return self._session.spec.sent or self._plan.request.sent
 
@@ -304,7 +305,7 @@ class PlanFolder:
         self._look()
 
     def _dragged(self, row: int, T_world_camera: FloatArray, ended: bool) -> None:
-        """Note a dragged ghost's pose, on the thread of the browser's messages."""
+        """Pass a dragged ghost's pose to the session's thread; called on that of the browser's messages."""
         self._ui.post(self._moved, self._plan, row, T_world_camera, ended)
 
     def _entered(self, T_world_camera: FloatArray) -> None:

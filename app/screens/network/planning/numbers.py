@@ -154,7 +154,7 @@ def _deadline(deadline_s: float | None, whole_s: float) -> Markup:
 
 
 def kept_sentence(taken: TakenView) -> Markdown:
-    """Return markdown: the promise of a camera that was added, beside what it really added."""
+    """Return markdown: the promise of a camera that was added, and its real gain."""
     low, high = taken.promise.ci95_share
     real, gain = taken.real_share, taken.promise.gain_share
     text = Markdown(

@@ -106,7 +106,7 @@ class PlanView:
     at_least_of_best: float
     candidates: int
     ruled_out: str
-    """By what other candidates were barred, if any were, as the end of a sentence on these."""
+    """End of a sentence: that the radio or the deadline ruled out other candidates; empty if none were."""
     image_bytes: int
     """Bytes that count for an image of a new camera."""
     least_overlap: float
