@@ -78,8 +78,8 @@ class Header:
         if running:
             self._status.content = Markdown("**Computing** · {}").format(running[0])
         elif failure is not None:
-            self._status.content = Markdown("**Stopped** · {} Change a setting or press Retry.").format(
-                failure
+            self._status.content = Markdown("**Stopped** · {}. Change a setting or press Retry.").format(
+                failure.rstrip(".")
             )
             self._bar.value = 0.0
         elif not busy:

@@ -173,9 +173,9 @@ class NetworkPanel(Panel):
         if step == self.step:
             with self.ui.atomic():
                 self._forget()
-                self._status.content = Markdown("**Not sent**: {} Change a setting or press *Retry*.").format(
-                    sentence
-                )
+                self._status.content = Markdown(
+                    "**Not sent**: {}. Change a setting or press *Retry*."
+                ).format(sentence.rstrip("."))
 
     def look(self) -> bool:
         """Turn the view to the room with its cameras, or to the streets, once per window shape."""

@@ -219,7 +219,9 @@ class PlanFolder:
                 self._show_as(answer, look)
             else:
                 self._status.content = (
-                    STOPPED if answer is None else Markdown("**No plan**: {}.").format(answer.sentence)
+                    STOPPED
+                    if answer is None
+                    else Markdown("**No plan**: {}.").format(answer.sentence.rstrip("."))
                 )
                 self._on_change()
 
