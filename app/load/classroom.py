@@ -99,7 +99,7 @@ class ClassPage(Connection):
             self.coarse_s[name] = self.whole_s[name] = time.monotonic()
 
     def _answer_drawn(self) -> None:
-        """Confirm once the contents of all messages so far are there, as a page that draws them does."""
+        """Confirm once the contents of all messages so far have arrived, as a page that draws them does."""
         awaited = tuple(self._under_way)
 
         def answer() -> None:
