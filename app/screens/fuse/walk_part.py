@@ -97,7 +97,7 @@ class WalkPart:
     # Requests and results.
 
     def begin(self) -> None:
-        """Request the walk of the loaded recording, unless it is requested or shown."""
+        """Request the walk of the loaded recording, or the pictures of one that is shown without them."""
         session = self._session
         key = session.spec.key("scene")
         if key != self._asked and session.results.fresh("scene", session.spec):

@@ -15,7 +15,7 @@ from pipeline.types import FloatArray
 
 JOB = "surface.closing_job:closing_job"
 LOOKING = Markdown("Judging up to 500 free places …")
-STALE = Markdown("The surface is being computed again; ask when it is there.")
+STALE = Markdown("The surface is being computed again; press the button once it is shown.")
 LEAST_NAMED = 0.005
 """Least share of a hole on dark surface that the sentence names."""
 NO_ANSWER = Markdown("There is no result: the computation was replaced or failed. Press the button again.")
