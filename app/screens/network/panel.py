@@ -313,7 +313,7 @@ class NetworkPanel(Panel):
             self._requested_ns = None
 
     def _take_look(self, look: NetworkLook) -> None:
-        """Run the network that a stop of a lesson sets; go to the stop's place when the frames are there."""
+        """Run the network that a stop of a lesson sets; go to the stop's place once it is simulated."""
         with self.ui.atomic():
             self._setup.take(look)
         self._look = look

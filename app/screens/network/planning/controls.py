@@ -54,7 +54,7 @@ class PlanControls:
             "budget": gui.add_text(
                 "Budget (J)",
                 "",
-                hint="Most energy of one image of each new camera together; empty: no limit.",
+                hint="Largest energy for one image of every new camera, all together; empty: no limit.",
             ),
             "deadline": gui.add_text(
                 "Deadline (s)",

@@ -200,7 +200,7 @@ class PlanFolder:
     # A plan.
 
     def _suggest(self, look: PlanLook) -> None:
-        """Request a plan of the controls' settings, to be shown as a stop or the button *Suggest* says."""
+        """Request a plan of the controls' settings; ``look.show`` sets how it is shown."""
         request = self._controls.request(self._sent())
         surface, newest = key(self._session.spec, "truth"), self._newest
         self.forget()
@@ -228,7 +228,7 @@ class PlanFolder:
         self._session.side_job("network.planning.plan_job:plan_job", request, on_end=came)
 
     def _show_as(self, plan: PlanView, look: PlanLook) -> None:
-        """Show a plan's ghosts, with the first beside a camera if the stop says so, or what is missed."""
+        """Show a plan's ghosts, the first next to a camera if the stop sets it; or the missed places only."""
         where = tuple(_pose_of(one.T_world_camera) for one in plan.ghosts.ghosts)
         if look.show == "missed":
             self._drawn.draw((), plan.fov_rad, plan.aspect, plan.targets_m, plan.dark)
@@ -316,7 +316,7 @@ class PlanFolder:
         self._moved(self._plan, self._row, T_world_camera, True)
 
     def _moved(self, plan: PlanView | None, row: int, T_world_camera: FloatArray, ended: bool) -> None:
-        """Move a ghost; judge it as soon as the last judgement is there, and at the end send its image."""
+        """Move a ghost and judge it, once the judgement before has ended; when released, send its image."""
         if plan is None or plan is not self._plan:
             return
         self._poses[row] = _pose_of(T_world_camera)
@@ -371,7 +371,7 @@ class PlanFolder:
     # Files.
 
     def _save(self, label: str, client: viser.ClientHandle | None) -> None:
-        """Send a file of the plan to the browser that asked for it."""
+        """Send a file of the plan to the browser in which its button was pressed."""
         offer = next((one for offers in self.offers() for one in offers.files if one.label == label), None)
         if offer is None or client is None:
             return

@@ -27,7 +27,7 @@ class Taking:
     """Adds the chosen ghost to a demo room."""
 
     def __init__(self, session: PanelSession, on_change: Callable[[], None]) -> None:
-        """Add button and sentence to the current container; ``on_change`` hears of an added camera."""
+        """Add button and sentence to the current container; ``on_change`` is called for an added camera."""
         self._session, self._on_change = session, on_change
         self.taken: TakenView | None = None
         """The camera to which the sentence belongs; None if there is none."""

@@ -18,7 +18,7 @@ Poses: TypeAlias = tuple[Pose, ...]
 
 @dataclass(frozen=True, slots=True)
 class PlanRequest:
-    """What is planned, and how the images travel."""
+    """The cameras to plan, and how their images travel."""
 
     sent: Sent
     cameras: int
