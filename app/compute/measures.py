@@ -118,6 +118,7 @@ class Face:
     corners_m: FloatArray
     """(4, 3) in order around the part of the surface to which it was fitted."""
     normal: FloatArray
+    """(3,) unit normal."""
     guessed: bool
 
 

@@ -92,7 +92,7 @@ class Stage:
     viewpoint_m: FloatArray
     """(3,), as all vectors here; world frame."""
     middle_m: FloatArray
-    """The look-at point."""
+    """Look-at point."""
     right: FloatArray
     """Horizontal unit vector to the right of the picture."""
     width_m: float
@@ -214,7 +214,14 @@ SENSOR_POINTS = 250_000
 def sample(
     points_m: FloatArray, colors: ByteArray | None, most: int, rng: np.random.Generator | None = None
 ) -> Sample:
-    """Return at most ``most`` points of a cloud, drawn uniformly without replacement."""
+    """Return at most ``most`` of a cloud's (N, 3) points, drawn uniformly without replacement.
+
+    Args:
+        points_m: the points, metres.
+        colors: (N, 3) RGB; None without colours.
+        most: largest number of points.
+        rng: random numbers; None draws the same points each time.
+    """
     total = len(points_m)
     if total > most:
         rows = drawn_rows(total, most, rng)
@@ -223,7 +230,7 @@ def sample(
 
 
 def drawn_rows(total: int, most: int, rng: np.random.Generator | None = None) -> IntArray:
-    """Return the rows of a cloud of ``total`` points that ``sample`` keeps, ascending."""
+    """Return the (N,) ascending rows that ``sample`` keeps of a cloud of ``total`` points."""
     if total <= most:
         return np.arange(total)
     return np.sort((rng or np.random.default_rng(0)).choice(total, most, replace=False))

@@ -46,7 +46,7 @@ _SHADE[LINEAR] = np.arange(256)
 
 
 def rounded(points_m: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Round coordinates to the grid that packs well; each moves by up to 0.12 mm."""
+    """Round coordinates, in an array of any shape, to the grid that packs well: by up to 0.12 mm each."""
     return _of_grid(np.rint(points_m.astype(np.float64) * (1 << GRID_BITS)))
 
 
