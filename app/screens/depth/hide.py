@@ -85,12 +85,12 @@ class HideFolder:
         )
 
     def show(self, cloud: SeenSample, T_world_camera: FloatArray) -> None:
-        """Let the brush paint on this node's points in the scene, and draw the discs on them."""
+        """Let the brush paint on a node's points, at its camera's (4, 4) pose, and draw the discs on them."""
         self._cloud, self._T_world_camera = cloud, T_world_camera
         self._drawing.draw(cloud, T_world_camera, self.discs)
 
     def clicked(self, origin_m: FloatArray, direction: FloatArray) -> None:
-        """Paint at the point that was clicked in the scene, if the brush is on."""
+        """Paint at the point that a click's ray, (3,) origin and direction, selects, if the brush is on."""
         if not self._brush.value or self._cloud is None:
             return
         size_share = self._size.value / 100.0

@@ -254,7 +254,7 @@ class WhatIf:
             self._on_change()
 
     def put(self, name: str, place_m: FloatArray) -> bool:
-        """Move a radio without recomputing. Returns whether the node exists."""
+        """Move a radio to a (2,) place without recomputing. Returns whether the node exists."""
         if name in self._places_m:
             self._moved_m[name] = place_m
         return name in self._places_m

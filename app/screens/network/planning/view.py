@@ -49,6 +49,7 @@ class Ghost:
     """A camera that is not there yet."""
 
     T_world_camera: FloatArray
+    """(4, 4) pose."""
     where: str
     """Kind of place, or ``pipeline.planning.plan.BY_HAND``."""
     height_m: float
