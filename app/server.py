@@ -112,7 +112,7 @@ class AppServer:
         return [self, *(owner for session in list(self.sessions.values()) for owner in session.owners)]
 
     def _at(self, of_all: Callable[[socket.AddressFamily], str]) -> str:
-        """Return the address of the server; ``of_all`` names one address if it listens on all of a family."""
+        """Return the server's URL; ``of_all`` gives the host if it listens on all addresses of a family."""
         host, port = self.viser_server.get_host(), self.viser_server.get_port()
         name = of_all(_family(host)) if is_unspecified(host) else host
         return f"http://{f'[{name}]' if ':' in name else name}:{port}"
@@ -186,7 +186,7 @@ def build_server(
         raise InputError(_taken_sentence(port))
     private.queue_from_any_thread(server)
     private.remember_hints()
-    _dress(server)
+    _set_up(server)
     store, uploads = Store(str(folder.path)), Uploads(folder.path)
     shared = SharedViews(store)
     if ahead:
@@ -215,7 +215,7 @@ def build_server(
 
 
 def _working_ahead(pool: ComputePool, store: Store, shared: SharedViews) -> WorkAhead:
-    """Return the work ahead, which is planned for each demo scene whose surface is known to the sessions."""
+    """Return the work ahead. Each time that a demo scene's surface is known, it plans that scene's jobs."""
     work = WorkAhead(pool, store)
 
     def plan(spec: Spec, view: Any) -> None:
@@ -297,12 +297,12 @@ def _let_in(app: AppServer, gate: Gate, begin: Callable[[Target, int], Session])
             )
         )
 
-    def tell_too_much(number: int, sentence: str) -> None:
+    def notify_too_much(number: int, sentence: str) -> None:
         session = app.sessions.get(number)
         if session is not None:
             session.post(session.notify, "That did not work", sentence)
 
-    gate.on_too_much = tell_too_much
+    gate.on_too_much = notify_too_much
     server.on_client_connect(come)
     server.on_client_disconnect(leave)
 
@@ -366,7 +366,7 @@ def _taken_sentence(port: int) -> str:
     return f"Port {port} is taken by another program; stop it or try --port {port + 1}."
 
 
-def _dress(server: viser.ViserServer) -> None:
+def _set_up(server: viser.ViserServer) -> None:
     """Set up the control panel, up direction and lights; disable sharing through an outside server."""
     server.gui.configure_theme(
         control_width="large", show_logo=False, show_share_button=False, brand_color=BRAND

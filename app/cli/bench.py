@@ -96,16 +96,16 @@ def _browsers(kind: Literal["load", "soak"], seconds: float) -> Benchmark:
     """Run the load test of thirty browsers; its time is the median from a click to its answer, NaN if none
     was answered.
     """
-    from app.load.classroom import Lesson, hold_lesson
+    from app.load.classroom import ClassTimes, time_class
     from app.load.load import put_load, soak
     from app.load.one_more import OneMore, work_for_one_more
     from lab.benchmarks.benchmark import Benchmark
 
     load = put_load(seconds) if kind == "load" else soak(seconds)
     record = load.record()
-    parts: list[Lesson | OneMore] = []
+    parts: list[ClassTimes | OneMore] = []
     if kind == "load":
-        parts = [hold_lesson(by_name=True), hold_lesson(by_name=False), work_for_one_more()]
+        parts = [time_class(by_name=True), time_class(by_name=False), work_for_one_more()]
     return Benchmark(
         record["answers_s"].get("median", math.nan),
         {},

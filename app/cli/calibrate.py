@@ -72,8 +72,8 @@ def calibrate(
             cameras in it.
         depth_scale: Depth units per metre in the depth images of the photographs; without it, whole numbers
             are millimetres and floating-point numbers metres.
-        rig: The images of one folder are of several cameras, which their names tell, such as left-0000.jpg
-            and right-0000.jpg.
+        rig: One folder holds the images of several cameras, which the file names tell apart, such as
+            left-0000.jpg and right-0000.jpg.
         one_camera: One camera took all images, even if their names or EXIF data tell several.
         json: Print everything as one JSON object.
     """
@@ -130,8 +130,8 @@ def _camera_lines(report: CameraReport) -> Iterator[str]:
     for name, (low, high) in found.intervals.items():
         yield f"{name:>4} {found.parameters[name]:12.5g}   95 %: {low:.5g} to {high:.5g}"
     unseen = report.held_out_rms_px
-    beside = "" if unseen is None else f"; {unseen:.3f} px in held-out images"
-    yield f"RMS {found.rms_px:.3f} px over {len(found.views)} images{beside}"
+    held_out = "" if unseen is None else f"; {unseen:.3f} px in held-out images"
+    yield f"RMS {found.rms_px:.3f} px over {len(found.views)} images{held_out}"
     nearest_m, farthest_m = report.distances_m
     yield (
         f"The board was {nearest_m:.2g} to {farthest_m:.2g} m away; if that is wrong, correct --spacing-mm"

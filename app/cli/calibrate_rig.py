@@ -23,7 +23,7 @@ def several_cameras(images: Sequence[str], rig: bool = False) -> tuple[NodeShots
 
     Args:
         images: folders, files and patterns.
-        rig: whether the images of one folder are of several cameras, which their names tell.
+        rig: whether one folder holds the images of several cameras, which the file names tell apart.
 
     Raises:
         InputError: folders without images, more cameras than a rig may have, only one camera below a folder,
@@ -44,7 +44,7 @@ def several_cameras(images: Sequence[str], rig: bool = False) -> tuple[NodeShots
         return ()
     nodes = node_shots(images)
     if len(nodes) == 1 and not any(shot.infrared for shot in nodes[0].shots):
-        raise InputError(f"{folders[0]} holds one camera only; give {nodes[0].folder} to calibrate it alone")
+        raise InputError(f"{folders[0]} holds one camera only; to calibrate it alone, give {nodes[0].folder}")
     return nodes
 
 
@@ -124,8 +124,8 @@ def _lines(report: RigReport, trust: Mapping[str, Trust]) -> Iterator[str]:
             yield f"Consider leaving out: {odd.reason} (--without {name}/{odd.name})"
         yield f"{name}: {worth.verdict.sentence}"
     unseen = report.rig.held_out
-    beside = "" if unseen is None else f"; {unseen.rms_px:.3f} px at held-out moments"
-    yield f"RMS {report.rig.rms_px:.3f} px over {len(report.rig.moments)} moments{beside}"
+    held_out = "" if unseen is None else f"; {unseen.rms_px:.3f} px at held-out moments"
+    yield f"RMS {report.rig.rms_px:.3f} px over {len(report.rig.moments)} moments{held_out}"
     for name, one in report.cameras.items():
         for image, detection in one.detections.items():
             if not detection.found:

@@ -124,7 +124,7 @@ def _shared(network: NetworkConfig) -> dict[str, Any]:
 
 
 def _cells(row: RadioReach) -> tuple[str, ...]:
-    """Return a line of the table."""
+    """Return the cells of a radio's line: its preset and radio, times, energies and sent bytes."""
     from pipeline.delivery.radios import RADIOS
 
     times = (_time(row.seconds_to_90_s), _time(row.seconds_to_99_s))

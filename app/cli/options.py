@@ -57,7 +57,7 @@ class SourceOptions:
         if self.calibration is None:
             return source
         if isinstance(source, Recorded):
-            wrong_use(f"the demo {source.title} is a recording, which takes no --calibration")
+            wrong_use(f"the demo {source.title} is a recording, which takes no --calibration: leave it out")
         return Calibrated(source, str(self.calibration))
 
     def nothing_but_scale(self, option: str) -> None:
@@ -69,7 +69,7 @@ class SourceOptions:
         """Return the recording; exit with 2 if other images are given."""
         alone = SourceOptions(intrinsics=self.intrinsics, depth_scale=self.depth_scale)
         if replace(self, recording=None) != alone:
-            wrong_use("--recording takes no other images: besides it only --intrinsics and --depth-scale")
+            wrong_use("--recording takes no other images: leave out all but --intrinsics and --depth-scale")
         from pipeline.sources import Recorded
 
         intrinsics = None if self.intrinsics is None else str(self.intrinsics)
@@ -95,9 +95,9 @@ class SourceOptions:
             wrong_use("a single pair needs all of --color, --depth and --intrinsics")
         if (self.depth_intrinsics is None) != (self.extrinsics is None):
             wrong_use("a depth image that is not registered needs both --depth-intrinsics and --extrinsics")
-        beside = (None if part is None else str(part) for part in (self.depth_intrinsics, self.extrinsics))
+        poses = (None if part is None else str(part) for part in (self.depth_intrinsics, self.extrinsics))
         images = str(self.color), str(self.depth), str(self.intrinsics)
-        return ImagePair(*images, self.depth_scale, *beside)
+        return ImagePair(*images, self.depth_scale, *poses)
 
 
 Images = Annotated[SourceOptions, tyro.conf.arg(name="")]

@@ -107,7 +107,7 @@ def iterate_run(
         drain(loading)
     writable_folder(out)
     result = yield from iterate_reconstruction(spec, cache)
-    beside = None if baseline is None else (yield from compute(spec, baseline, cache)).value
+    other = None if baseline is None else (yield from compute(spec, baseline, cache)).value
     metrics = metrics_of(result) | ({} if report is None else {"import": asdict(report)})
     clear_run_folder(out)
     if isinstance(rig, Recorded) and result.rig.walk is not None:
@@ -116,8 +116,8 @@ def iterate_run(
     yield Progress("writing the report", 1.0)
     texture = dressed(result.rig, result.placement, result.after)
     write_reconstruction_report(result, metrics, out / REPORT, texture)
-    if baseline is not None and beside is not None:
-        write_baseline(baseline, beside, result, out)
+    if baseline is not None and other is not None:
+        write_baseline(baseline, other, result, out)
     yield Progress("writing the surfaces", 1.0)
     write_run_folder(result, metrics, out, texture=texture)
     return result, metrics
@@ -211,7 +211,7 @@ def reconstruct_one(task: RigTask) -> RigOutcome:
     log = out.with_name(f"{out.name}.log")
     log.unlink(missing_ok=True)
     try:
-        record = _record(task)
+        record = _inputs_of(task)
         kept = _kept_outcome(task, record)
         if kept is not None:
             return kept
@@ -245,7 +245,7 @@ def _source_of(task: RigTask) -> FileSource:
     return RigFolder(task.path, task.depth_scale)
 
 
-def _record(task: RigTask) -> dict[str, Any]:
+def _inputs_of(task: RigTask) -> dict[str, Any]:
     """Return the inputs of a run. They are written as the run's last file, which marks it as complete."""
     return {
         "path": task.path,

@@ -22,8 +22,8 @@ HostNames = Annotated[
     tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(name="allow-host", metavar="NAME")
 ]
 Lessons = Annotated[tuple[Path, ...], tyro.conf.UseAppendAction, tyro.conf.arg(name="lesson", metavar="FILE")]
-HEED_S = 0.2
-"""Time between two checks for a signal to stop."""
+CHECK_S = 0.2
+"""Time between two checks for a signal to stop, seconds."""
 ALONE = ", from this machine only; --host 0.0.0.0 admits other machines"
 
 
@@ -95,6 +95,6 @@ def serve(
         if open:
             webbrowser.open(app.teacher_url if lecture else app.link)
         while not stops:  # an endless wait would miss a signal that another thread gets
-            time.sleep(HEED_S)
+            time.sleep(CHECK_S)
     finally:
         app.stop()

@@ -19,7 +19,7 @@ from app.compute.state import CHAIN, Spec, Step
 from app.compute.store import Store
 
 REST_S = 3.0
-"""Time without any job after which work ahead begins, seconds: a page needs it to draw a new surface."""
+"""Time without any job after which work ahead begins, seconds, so that pages draw a new surface first."""
 LOOK_S = 0.5
 """Time between two checks of whether work ahead may begin, seconds."""
 

@@ -14,14 +14,14 @@ Place: TypeAlias = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Top:
-    """Cut off what is above a height."""
+    """Cut off the part of the scene above a height."""
 
     height_m: float
 
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """Cut off what is behind a plane."""
+    """Cut off the part of the scene behind a plane."""
 
     point_m: Place
     normal: Place
@@ -30,7 +30,7 @@ class Plane:
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """Cut off what is outside a box, or inside."""
+    """Cut off the part of the scene outside a box, or the part inside."""
 
     centre_m: Place
     size_m: Place

@@ -34,13 +34,14 @@ class LatestWins:
     pool: ComputePool
     owner: object
     urgent: bool = False
-    """Whether the jobs of this lane start before waiting jobs of other lanes."""
+    """Whether the jobs of this lane start before waiting jobs of lanes that are not urgent."""
     _running: Ticket | None = None
     _waiting: _Waiting | None = None
     _lock: threading.RLock = field(default_factory=threading.RLock)
 
     @property
     def busy(self) -> bool:
+        """Whether a job runs."""
         return self._running is not None
 
     def submit(

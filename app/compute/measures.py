@@ -62,7 +62,7 @@ class Click:
     origin_m: Place
     direction: Place
     cut: Cut = None
-    """What is left out of the picture and cannot be clicked, in the same frame."""
+    """The cut, in the same frame; the part of the surface that it leaves out cannot be clicked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +118,7 @@ class Face:
     corners_m: FloatArray
     """(4, 3) in order around the part of the surface to which it was fitted."""
     normal: FloatArray
+    """(3,) unit normal."""
     guessed: bool
 
 

@@ -53,13 +53,13 @@ class Ticket:
     on_progress: Callable[[Any], None]
     on_end: Callable[[Outcome], None]
     key: Hashable = None
-    """Everything that the result depends on: jobs with equal keys are computed once, those with None each."""
+    """Everything that the result depends on: jobs with equal keys are computed once, those without each."""
     urgent: bool = False
     """Whether the job starts before waiting jobs that are not urgent."""
     ahead: bool = False
-    """Whether no session waits for the job yet: it starts only while all other jobs are ahead, too, and a
-    second process is free. It is asked to stop when a job that is not ahead and has another key is
-    submitted."""
+    """Whether no session waits for the job yet. Such a job starts only while no other kind of job runs or
+    waits and a second process is free. It is asked to stop when a job that is not ahead and has another key
+    is submitted."""
     stopping: bool = False
 
 
@@ -223,7 +223,11 @@ class ComputePool:
                     slot.next_may_start.set()
 
     def _free(self) -> list[Ticket]:
-        """Return the jobs that may start now; one that waits for an equal running job occupies its owner."""
+        """Return the jobs that may start now. The caller holds the lock.
+
+        A job does not start while another job of its owner runs, or waits for the result of a running job
+        with the same key.
+        """
         running = [slot.ticket for slot in self._slots if slot.ticket is not None]
         keys = {one.key for one in running} - {None}
         served = [one for one in self._waiting if one.key in keys]
@@ -246,7 +250,10 @@ class ComputePool:
                 _send(slot, ("stop", None))
 
     def _attend(self, slot: _Slot, before: _Slot | None) -> None:
-        """Keep one process alive and handle its messages until the pool closes; ``before`` starts first."""
+        """Keep one process alive and handle its messages until the pool closes.
+
+        It starts once the process of the slot ``before`` allows it (``next_may_start``).
+        """
         if before is not None:
             before.next_may_start.wait()
         while not self._closed:
@@ -265,7 +272,7 @@ class ComputePool:
                 slot.process.kill()
             if not slot.ready:
                 self._closing.wait(RESPAWN_PAUSE_S)
-            self._bury(slot)
+            self._on_death(slot)
 
     def _start(self, slot: _Slot) -> bool:
         """Start a process. Returns False if the pool is closed or the system has no process to give."""
@@ -327,7 +334,8 @@ class ComputePool:
         if not all(one.ahead for one in ended):
             self._last_used_s = time.monotonic()
 
-    def _bury(self, slot: _Slot) -> None:
+    def _on_death(self, slot: _Slot) -> None:
+        """End the job of a process that has died: as stopped if it was asked to stop, else with an error."""
         with self._lock:
             ticket, slot.ticket = slot.ticket, None
             slot.ready = False

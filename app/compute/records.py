@@ -69,12 +69,12 @@ class SceneNode:
 
 @dataclass(frozen=True, slots=True)
 class AveragedView:
-    """Depth of cameras that stand, averaged over the frames of their recordings."""
+    """Depth of cameras at rest, averaged over the frames of their recordings."""
 
     frames: int
-    """Number of frames that were averaged; of several cameras the most."""
+    """Number of frames that were averaged; for several cameras the largest."""
     available: int
-    """Number of frames that could be averaged; of several cameras the most."""
+    """Number of frames that could be averaged; for several cameras the largest."""
     unmeasured_share: float
     """Share of the pixels without depth."""
     moving_share: float
@@ -92,7 +92,7 @@ class Stage:
     viewpoint_m: FloatArray
     """(3,), as all vectors here; world frame."""
     middle_m: FloatArray
-    """The look-at point."""
+    """Look-at point."""
     right: FloatArray
     """Horizontal unit vector to the right of the picture."""
     width_m: float
@@ -115,7 +115,7 @@ class SceneView:
     has_walk: bool = False
     """Whether its nodes are keyframes of a recording."""
     averaged: AveragedView | None = None
-    """Average of the frames, if its cameras stand; None for single images."""
+    """Average of the frames, if its cameras are at rest; None for single images."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,7 +214,14 @@ SENSOR_POINTS = 250_000
 def sample(
     points_m: FloatArray, colors: ByteArray | None, most: int, rng: np.random.Generator | None = None
 ) -> Sample:
-    """Return at most ``most`` points of a cloud, drawn uniformly without replacement."""
+    """Return at most ``most`` of a cloud's (N, 3) points, drawn uniformly without replacement.
+
+    Args:
+        points_m: the points, metres.
+        colors: (N, 3) RGB; None without colours.
+        most: largest number of points.
+        rng: random numbers; None draws the same points each time.
+    """
     total = len(points_m)
     if total > most:
         rows = drawn_rows(total, most, rng)
@@ -223,7 +230,7 @@ def sample(
 
 
 def drawn_rows(total: int, most: int, rng: np.random.Generator | None = None) -> IntArray:
-    """Return the rows of a cloud of ``total`` points that ``sample`` keeps, ascending."""
+    """Return the (N,) ascending rows that ``sample`` keeps of a cloud of ``total`` points."""
     if total <= most:
         return np.arange(total)
     return np.sort((rng or np.random.default_rng(0)).choice(total, most, replace=False))

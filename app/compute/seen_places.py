@@ -15,7 +15,7 @@ from pipeline.spec import Spec, key
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A reconstruction, and what its cameras know of the place."""
+    """A reconstruction, and the surface and free space that its cameras have seen."""
 
     done: Reconstruction
     seen: SeenPlace

@@ -19,7 +19,7 @@ LIMIT_BYTES = 128 << 20
 
 
 class SharedViews:
-    """The views and quick looks of all sessions by what they depend on."""
+    """Views of steps and answers of quick jobs, each under its key: all that the answer depends on."""
 
     def __init__(self, store: Store, limit_bytes: int = LIMIT_BYTES) -> None:
         self.turns = Turns()

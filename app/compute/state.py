@@ -113,7 +113,7 @@ class Results:
     """Key of the result, complete or partial, that the panels show of each step."""
 
     def put(self, step: Step, key: Hashable, view: Any) -> None:
-        """Keep a result."""
+        """Keep a complete result as the one that the panels show, and forget an earlier failure."""
         self._views[step] = (key, view)
         self._shown[step] = key
         self._failures.pop(step, None)

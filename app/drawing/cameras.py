@@ -27,7 +27,7 @@ SLOPE_RAD, HALF_VIEW = np.radians(50.0), 0.9 * np.tan(0.5 * VIEW_FOV_RAD)
 def add_camera(
     scene: viser.SceneApi, name: str, node: SceneNode, T_world_camera: FloatArray, with_image: bool = True
 ) -> viser.CameraFrustumHandle:
-    """Draw a frustum with the node's image on it and its name below it, where it covers nothing."""
+    """Draw a frustum at a (4, 4) pose, with the node's image on it and its name below it."""
     frustum = scene.add_camera_frustum(
         name,
         fov=node.fov_rad,
@@ -108,7 +108,7 @@ def look(clients: Iterable[viser.ClientHandle], stage: Stage, wide: bool = False
 
 
 def turn(client: viser.ClientHandle, center_m: FloatArray, stand_m: FloatArray) -> None:
-    """Turn a browser's view: the camera at ``stand_m`` looks at ``center_m``."""
+    """Turn a browser's view: the camera at ``stand_m`` (3,) looks at ``center_m`` (3,)."""
     with client.atomic():
         client.camera.position = stand_m
         client.camera.look_at = center_m

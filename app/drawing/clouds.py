@@ -27,7 +27,7 @@ def add_cloud(
     size_m: float = POINT_SIZE_M,
     visible: bool = True,
 ) -> viser.PointCloudHandle:
-    """Draw a cloud in its own colours, or in one colour shaded by its own brightness.
+    """Draw a cloud at a (4, 4) pose in its own colours, or in one colour shaded by its own brightness.
 
     Coordinates are up to 0.12 mm off, as rounded ones take half the bytes.
     """

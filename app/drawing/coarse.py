@@ -1,4 +1,4 @@
-"""A coarse copy of a mesh, a sixth of a room's bytes: a page on a slow line shows it until all is there."""
+"""A coarse copy of a mesh, a sixth of its bytes; a page on a slow line shows it until the mesh is there."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ def coarse_glb(glb: Any) -> bytes:
     """Return a mesh that ``glb.py`` wrote with few vertices; they take the colours of its picture.
 
     Each cell's vertex is its first one, moved by at most half of a ``STEPS``-th of the cell in each
-    coordinate; triangles within fewer than three cells vanish (Rossignac and Borrel 1993).
+    coordinate; triangles within fewer than three cells vanish (Rossignac and Borrel 1993). A mesh of which
+    no triangle would be left is returned as it is.
     """
     parts = Parts.of(glb)
     attributes = parts.primitive["attributes"]

@@ -54,7 +54,7 @@ def ramp(values: FloatArray, most: float, stops: Sequence[tuple[int, int, int]])
 
 
 def linear(colors: ByteArray) -> ByteArray:
-    """Return RGB in linear light instead of sRGB, as viser takes the end colours of lines."""
+    """Return RGB (last axis 3) in linear light instead of sRGB, as viser takes the end colours of lines."""
     share = colors / 255.0
     light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return np.rint(255.0 * light).astype(np.uint8)

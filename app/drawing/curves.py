@@ -76,7 +76,7 @@ class Curves:
         """Show other curves.
 
         Args:
-            curves: (K,) ascending abscissae and (K,) values of each curve, NaN without a value.
+            curves: (K,) ascending abscissae and (K,) values of each curve, NaN where there is none.
             colors: colours of the curves.
             ends: ends of the horizontal axis.
             label: label of the horizontal axis.
@@ -119,7 +119,13 @@ def _series(colors: Sequence[str]) -> tuple[uplot.Series, ...]:
 
 
 def polyline(x: FloatArray, at: FloatArray, values: FloatArray) -> FloatArray:
-    """Return a curve's values at a chart's abscissae: linear over gaps, NaN beyond its ends."""
+    """Return (X,) values of a curve at a chart's (X,) abscissae: linear over gaps, NaN beyond its ends.
+
+    Args:
+        x: the chart's abscissae.
+        at: (K,) ascending abscissae of the curve.
+        values: (K,) values of the curve, NaN in its gaps.
+    """
     known = np.isfinite(values)
     if not known.any():
         return np.full(len(x), np.nan)

@@ -24,11 +24,11 @@ FRUSTUM = 0.7
 POINT_M = 0.016
 """Size of a point."""
 LEAST_CHANCE = 0.1
-"""Points that are less likely measured are not drawn."""
+"""Least chance of being measured with which a point is drawn."""
 PALE = 0.6
 """Share of the background in the points of ghosts that are not chosen."""
 AWAY_M = (0.0, 0.0, -1000.0)
-"""Place of points that are not drawn: the number of points of a cloud stays."""
+"""Place of points that are not drawn, because a cloud's number of points cannot change."""
 
 
 class Ghosts:
@@ -123,20 +123,23 @@ class Ghosts:
         if self._on_move is not None:
             self._on_move(row, pose, event.phase == "end")
 
-    def stand(self, row: int, T_world_camera: FloatArray) -> None:
-        """Move a ghost's frustum; its handle is where the hand has it."""
+    def move_frustum(self, row: int, T_world_camera: FloatArray) -> None:
+        """Move a ghost's frustum to a (4, 4) pose, but not its handle, which may be dragged just now."""
         if row < len(self._frusta):
             move(self._frusta[row], T_world_camera)
 
-    def hold(self, T_world_camera: FloatArray) -> None:
-        """Move the handle to where the chosen ghost was put without it."""
+    def move_handle(self, T_world_camera: FloatArray) -> None:
+        """Move the handle to a (4, 4) pose that the chosen ghost got in another way, such as by numbers."""
         if self._handle is not None:
             move(self._handle, T_world_camera)
 
     def show_newly(self, newly: Sequence[FloatArray]) -> None:
-        """Show for each ghost the (T,) chances that it newly measures each target, the chosen one's full.
+        """Show the targets that some ghost newly measures with a chance of ``LEAST_CHANCE`` or more.
 
-        A target belongs to the ghost that measures it most likely.
+        A target belongs to the ghost that measures it most likely; those of ghosts not chosen are pale.
+
+        Args:
+            newly: for each ghost, (T,) chances that it newly measures each target.
         """
         chances = np.stack([*newly])
         best = chances.argmax(axis=0)

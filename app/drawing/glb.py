@@ -118,7 +118,7 @@ class Places:
 
     @property
     def quantized(self) -> bool:
-        """Whether they are integers."""
+        """Whether the steps are integers, not 32-bit floats in metres."""
         return self.steps.dtype.kind == "u"
 
 

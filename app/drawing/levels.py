@@ -37,6 +37,7 @@ class Levels:
     item: NDArray[np.int32]
     """(F,) index of each frame in the input; this and the arrays below are sorted by row, then by start."""
     start_ns: NDArray[np.int64]
+    """(F,) start of each frame; ``end_ns`` is its end."""
     end_ns: NDArray[np.int64]
     cause: NDArray[np.int8]
     """(F,) cause of the loss; 0 if the frame was not lost."""

@@ -7,13 +7,13 @@ part. Unpacked, the parts follow each other without a gap. A part is one of
 - ``["rows", n, columns, bytes, stride]``: n rows of little-endian integers of 1, 2 or 4 bytes, a row every
   ``stride`` bytes (zeros fill it up), as differences to the row before;
 - ``["vertices", n, columns, bytes, stride, unit]``: the same for the vertices of the content's triangles, as
-  multiples of ``unit``. With K a vertex's number, its difference is to the mean, rounded down, of the corners
-  below K of the first triangle that has corner K; without such corners to the row before;
+  multiples of ``unit``. The difference of vertex K is to a mean, rounded down: that of the corners with an
+  index below K in the first triangle that has the corner K. Without such corners it is to the row before;
 - ``["grid", n, columns, bits]``: rows of 32-bit floats, each an integer over 2^bits, as differences of those;
-- ``["triangles", n, bytes]``: rows of three indices. With N one more than the greatest index above and the
-  row's first: the first as difference to the one above, the second as what it is less than the last above,
-  or than N if the first is another than above, the last as what it is less than N, or one more than the
-  second if that is greater. In the order of a walk (``ordering.py``) nearly all are 0 or 1;
+- ``["triangles", n, bytes]``: rows of three indices (a, b, c), each as three differences. With (a', b', c')
+  the row above, zeros above the first, and N one more than the greatest of a and all indices above, they are
+  a - a'; c' - b if a = a' and the row is not the first, else N - b; and max(N, b + 1) - c. In the order of a
+  walk (``ordering.py``) nearly all are 0 or 1;
 - ``["colors", n]``: rows of RGB bytes: green, red - green, blue - green, as differences to the row before;
 - ``["light", n]``: rows of linear RGB and opacity 1 of 16 bits, which are sRGB bytes packed as ``colors``.
 
@@ -46,7 +46,7 @@ _SHADE[LINEAR] = np.arange(256)
 
 
 def rounded(points_m: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Round coordinates to the grid that packs well; each moves by up to 0.12 mm."""
+    """Round coordinates, in an array of any shape, to the grid that packs well: by up to 0.12 mm each."""
     return _of_grid(np.rint(points_m.astype(np.float64) * (1 << GRID_BITS)))
 
 
@@ -121,7 +121,7 @@ def _packed_vertices(numbers: NDArray[np.unsignedinteger], stride: int, triangle
 
 
 def _expected(rows: NDArray[np.int64], triangles: IntArray) -> NDArray[np.int64]:
-    """Return what each vertex's row is expected to be, from those of the vertices before it."""
+    """Return the rows from which those of the vertices differ: see ``vertices`` in the module's text."""
     expected = np.vstack([np.zeros((1, rows.shape[1]), np.int64), rows[:-1]])
     flat = triangles.reshape(-1)
     named = np.flatnonzero(flat < len(rows))[::-1]

@@ -17,13 +17,13 @@ def wxyz_of(T: FloatArray) -> FloatArray:
 
 
 def move(handle: Any, T_parent_node: FloatArray) -> None:
-    """Change a scene node's pose without sending the node again."""
+    """Change a scene node's pose to a (4, 4) pose in its parent, without sending the node again."""
     handle.wxyz = wxyz_of(T_parent_node)
     handle.position = np.asarray(T_parent_node[:3, 3])
 
 
 def place(handle: Any, T_parent_node: FloatArray) -> None:
-    """Set a new scene node's pose, even if the browser remembers a removed node of the same name.
+    """Set a new scene node's (4, 4) pose, even if the browser remembers a removed node of the same name.
 
     A new handle assumes the pose of its parent's origin and sends nothing if that is its pose, while the
     browser keeps the pose of the removed node. So the pose is first changed to another one.

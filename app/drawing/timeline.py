@@ -229,7 +229,7 @@ class Curve:
     t_ns: NDArray[np.int64]
     """(T,) ascending."""
     values: FloatArray
-    """(T,) values, NaN without a value."""
+    """(T,) values, NaN where there is none."""
     low: float = 0.0
     high: float = 1.0
     """Value at the lane's upper edge; ``low`` is at the lower one."""
@@ -238,7 +238,7 @@ class Curve:
     dashed: bool = False
 
     def at(self, t_ns: NDArray[np.int64]) -> FloatArray:
-        """Return the value at each time; NaN before the first."""
+        """Return the value at each of ``t_ns``, in an array of its shape; NaN before the first time."""
         index = np.searchsorted(self.t_ns, t_ns, side="right")
         return np.concatenate([[np.nan], self.values])[index]
 

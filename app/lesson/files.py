@@ -8,7 +8,7 @@ opened; they, the controls and the numbers are framed, and the page scrolls to t
 else to the first folder. A text may have emphasis, lists and web links; tags and images in it are shown as
 plain text. ``{name}`` is replaced by a number that the screen has computed. ``{{, and was {3:name}}}`` gives
 the number at the third stop, and is left out for users who have not been there and where the number does not
-exist; ``{{yours is {own}||you have none}}`` says something else instead.
+exist; ``{{yours is {own}||you have none}}`` has a second wording for them.
 After its text a section may ask a question::
 
     ask: What does it cost?

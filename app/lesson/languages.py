@@ -67,12 +67,16 @@ class Phrases:
     """Texts in one language that the app adds to a lesson, as markdown."""
 
     begin: str
+    """Shown before a stop is chosen."""
     guess: str
+    """Shown below a question until there is a guess, like ``voting`` in a lecture."""
     first: str
-    """Shown if someone goes on without a guess."""
+    """Shown in place of ``guess`` if someone tried to go on without a guess."""
     voting: str
     computing: str
+    """Shown after a guess, while the right choice depends on numbers that are computed."""
     right: str
+    """Begins the answer to a right guess, and ``wrong`` that to a wrong one."""
     wrong: str
     place: str
     """For ``str.format`` with the number of the stop and the number of all stops."""

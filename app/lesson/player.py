@@ -307,10 +307,12 @@ class LessonFolder(Generic[Look]):
         self._guess.visible = self._waits()
 
     def _filled(self, text: str, index: int, fill: Callable[..., Text]) -> Text:
-        """Replace the text's fields by the numbers of this stop, or those stored at another stop in the same
-        scene; while this stop's numbers are computed, the scene may be another one, and all are to come.
-        A clause with a number that does not exist, or of a stop that the user has not visited, gives way to
-        its second wording or is left out. ``fill`` returns its text with each match of a pattern replaced.
+        """Replace the text's fields by numbers, and choose the wording of its clauses.
+
+        A field has the number of this stop, or the one stored at another stop in the same scene; while this
+        stop's numbers are computed, all are ``TO_COME``, as the scene may be another one. A clause with a
+        number that does not exist, or of a stop not visited, becomes its second wording or is left out.
+        ``fill`` returns its text with each match of a pattern replaced.
         """
         now = self._numbers()
         if now:

@@ -99,7 +99,7 @@ class ClassPage(Connection):
             self.coarse_s[name] = self.whole_s[name] = time.monotonic()
 
     def _answer_drawn(self) -> None:
-        """Confirm once the contents of all messages so far are there, as a page that draws them does."""
+        """Confirm once the contents of all messages so far have arrived, as a page that draws them does."""
         awaited = tuple(self._under_way)
 
         def answer() -> None:
@@ -126,22 +126,24 @@ class ClassPage(Connection):
 
 
 @dataclass(frozen=True, slots=True)
-class Lesson:
-    """What a class waited for; times in seconds from the moment at which all wanted it."""
+class ClassTimes:
+    """Waiting times and bytes of a class; seconds, from the moment at which all pages make a request."""
 
     by_name: bool
+    """Whether the pages fetched contents by their names, instead of getting them in messages."""
     lost: int
-    """Number of pages whose connection the server ended before the first surface was asked for."""
+    """Number of pages whose connection the server ended before the first surface was requested."""
     page_bytes: int
     """Bytes of the page itself, which browsers keep."""
     first_bytes: float
     """Bytes of a browser until its first surface was whole, without the page."""
     coarse_s: tuple[float, ...]
+    """Time of each page until the coarse copy of the first surface; ``whole_s``: until the whole of it."""
     whole_s: tuple[float, ...]
     drag_bytes: float
     """Bytes of a browser for one new radius, the last surface included."""
     drags_s: tuple[float, ...]
-    """Times until the surface at a new radius was there as it is shown while a hand drags."""
+    """Times until the quick surface at a new radius, which is shown while the slider is dragged."""
 
     def record(self) -> dict[str, Any]:
         """Return the figures."""
@@ -173,7 +175,7 @@ class Lesson:
         )
 
 
-def hold_lesson(by_name: bool) -> Lesson:
+def time_class(by_name: bool) -> ClassTimes:
     """Let a class look at a surface and drag its radius, all at the same moments."""
     with serving(SCENE) as server, line(server.url, BITS_PER_S) as shared, contextlib.ExitStack() as stack:
         pages = [
@@ -184,7 +186,7 @@ def hold_lesson(by_name: bool) -> Lesson:
         _quiet(shared)
         pages = [page for page in pages if not page.lost]
         if not pages:
-            return Lesson(by_name, BROWSERS, 0, nan, (nan,), (nan,), nan, (nan,))
+            return ClassTimes(by_name, BROWSERS, 0, nan, (nan,), (nan,), nan, (nan,))
         page_bytes, before = pages[0].page_bytes(), shared.bytes_down
         asked_s = time.monotonic()
         for page in pages:
@@ -199,7 +201,7 @@ def hold_lesson(by_name: bool) -> Lesson:
             drags_s += _drag(pages, radius_mm)
             _quiet(shared)
         drag_bytes = (shared.bytes_down - before) / len(pages) / len(RADII_MM)
-        return Lesson(
+        return ClassTimes(
             by_name,
             BROWSERS - len(pages),
             page_bytes,
@@ -212,7 +214,7 @@ def hold_lesson(by_name: bool) -> Lesson:
 
 
 def _drag(pages: list[ClassPage], radius_mm: float) -> list[float]:
-    """Let all set a radius. Returns the times until each has a new surface."""
+    """Let all pages set a radius. Returns the time until each has a new surface, seconds."""
     asked_s = time.monotonic()
     for page in pages:
         page.set("Radius (mm)", radius_mm)

@@ -113,7 +113,7 @@ class Load:
         return {number: times[-1] - times[0] for number, times in seen.items()}
 
     def _part(self, begin_s: float, end_s: float) -> dict[str, float]:
-        """Return the maximum of each quantity in a time span, and also the minimum of the server's memory,
+        """Return each quantity's largest value in a time span, and also the least of the server's memory,
         because the memory rises and falls with every browser; empty if the span has no state of the server.
         """
         looks = [_counts(look) for at_s, look in self.looks if begin_s <= at_s <= end_s]

@@ -49,7 +49,7 @@ def work_for_one_more() -> OneMore:
 
 
 def _visit(server: Serving, stack: contextlib.ExitStack, number: int) -> tuple[float, float, float]:
-    """Open a page that stays, and do what a pupil does. Returns the processor times of the three."""
+    """Open a page, which stays, go to the surface, and drag its radius. Returns each one's processor time."""
     times_s = [_rested_s(server)]
     page = stack.enter_context(contextlib.closing(ClassPage(server.url, number, by_name=True)))
     wait_for(lambda: bool(page.mark("Surface")), PATIENCE_S)

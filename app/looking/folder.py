@@ -108,7 +108,7 @@ class LookFolder:
             self._take(replace(self._look, cut=None))
 
     def show(self, there: bool) -> None:
-        """Show or hide the folder, and drop the look of what is no room."""
+        """Show the folder, or hide it and restore the default look, because no room is drawn."""
         self._folder.visible = there
         if not there:
             self._take(Look())

@@ -11,7 +11,7 @@ USUAL, WIRE, LIT = "As usual", "Wireframe", "Light by hand"
 DRAWN = (USUAL, WIRE, LIT)
 X, Y, LEVEL, VIEW, FLIP = "x", "y", "Level", "View", "Flip"
 TEXT = Markdown(
-    "This changes only the view and pictures of it: what is measured, and all other files, have everything."
+    "This changes only the view and pictures of it: measures and all other files have the whole scene."
 )
 HINTS = {
     "cut": "What is cut away from the picture. Drag the arrows and rings in the picture to move the cut.",

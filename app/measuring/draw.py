@@ -23,9 +23,9 @@ LETTER_PX, LABEL_PX, GAP_PX = 7.5, 26.0, 12.0
 """Width of a letter, height of a label, and its distance from what it names, pixels."""
 MARKS = (1.0, 2.0, 5.0)
 FEWEST_MARKS = 6
-"""A ruler's parts are 1, 2 or 5 times a power of ten long, and at least so many."""
+"""Least number of a ruler's parts, each of which is 1, 2 or 5 times a power of ten long."""
 LEVEL = 0.2
-"""Sine of the slope up to which a line has its label in the middle; there it would cover a steeper line."""
+"""Sine of the slope up to which a line has its label in the middle, which would cover a steeper line."""
 SQUARE = 1e-3
 """Two edges of a box whose cosine is smaller count as perpendicular."""
 

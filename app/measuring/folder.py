@@ -158,7 +158,7 @@ class MeasureFolder:
     # Questions and answers.
 
     def _ask(self) -> None:
-        """Request the results of the list, the clicks and the scale that are not known."""
+        """Request the results that are not known yet: of the list's measures, the clicks and the scale."""
         self._checked = None
         if self._arguments is not None:
             wanted = (taken.unnamed for taken in self._tape.taken)

@@ -44,6 +44,7 @@ from pipeline.measuring.surface import MeasuredSurface
 from pipeline.types import FloatArray
 
 CUT_OFF = "Only what Look cuts away is under the pointer; click on the surface, or set Cut away to Nothing"
+NO_SURFACE = "There is nothing to measure; choose a scene with measured depth"
 NO_HOLE = "There is no hole at the click; click a red rim, or into a hole"
 EXTENT = (2.0, 98.0)
 """Percentiles of a plane's vertices between which it is drawn."""
@@ -98,7 +99,7 @@ def _with_click(surveys: Sequence[Survey], pending: Clicked, click: Click) -> Cl
     """Return the pending points with one more.
 
     Raises:
-        InputError: nothing is there that can be marked.
+        InputError: the click meets nothing that can be marked.
     """
     step = steps_of(pending.kind, pending.snap)[len(pending.points_m)]
     part, place = _hit(surveys, pending, step, click)
@@ -120,7 +121,8 @@ def _hit(surveys: Sequence[Survey], pending: Clicked, step: Step, click: Click) 
     origin_m, direction = np.array(click.origin_m), np.array(click.direction)
     found: Callable[..., FloatArray] = _rim_on_ray if step.marks == "rim" else _point_on_ray
     parts = [pending.part] if pending.points_m else range(len(surveys))
-    hits, trouble = list[tuple[float, int, FloatArray]](), InputError("There is nothing to measure")
+    hits = list[tuple[float, int, FloatArray]]()
+    trouble = InputError(NO_SURFACE)
     for part in parts:
         try:
             point_m = found(surveys[part].surface, origin_m, direction, click.cut)
@@ -142,7 +144,7 @@ def _point_on_ray(
     Raises:
         InputError: there is none.
     """
-    mark_on_ray(surface, origin_m, direction)  # raises if nothing is there at all
+    mark_on_ray(surface, origin_m, direction)  # raises if the ray meets no surface at all
     for begin, end in kept_on_ray(cut, origin_m, direction):
         spot = lookup_of(surface).first_on(origin_m + begin * direction, direction)
         if spot is not None and (spot.point_m - origin_m) @ direction <= end * (direction @ direction):

@@ -56,10 +56,10 @@ def write_calibration_report(report: CameraReport, trust: Trust, path: Path) -> 
 def _made_of(report: CameraReport) -> str:
     found, unseen = report.calibration, report.held_out_rms_px
     width, height = found.size_px
-    beside = "" if unseen is None else f", {unseen:.3f} px in held-out images"
+    held_out = "" if unseen is None else f", {unseen:.3f} px in held-out images"
     return (
         f"{len(found.views)} images of {width} x {height} pixels; {report.board.title}; lens {found.lens}; "
-        f"RMS {found.rms_px:.3f} px{beside}."
+        f"RMS {found.rms_px:.3f} px{held_out}."
     )
 
 

@@ -79,7 +79,12 @@ def png(picture: Image.Image) -> bytes:
 
 
 def gif(frames: Sequence[Image.Image], stays_ms: Sequence[int]) -> bytes:
-    """Return an endless GIF in the colours of its last frame; all slide programs can play it."""
+    """Return a GIF that repeats without end, in the colours of its last frame.
+
+    Args:
+        frames: pictures of one size.
+        stays_ms: how long each is shown.
+    """
     palette = frames[-1].quantize(_COLORS)
     frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     file = io.BytesIO()

@@ -30,7 +30,7 @@ _ROOM_PX = (640, 480)
 
 
 def delivery_animation(hand_out: HandOut) -> bytes:
-    """Return an endless GIF of ``SIZE_PX``; all slide programs can play it."""
+    """Return a GIF of ``SIZE_PX`` that repeats without end."""
     camera = camera_of(viewpoint(hand_out), _ROOM_PX)
     frames = [_frame(hand_out, moment, camera) for moment in hand_out.moments]
     return gif(frames, [round(1000 * stay_s) for stay_s in _stays_s(hand_out)])
@@ -94,10 +94,10 @@ def _numbers(pen: ImageDraw.ImageDraw, hand_out: HandOut, moment: HandOutMoment,
         rows.append(("F-score at 5 cm", _percent(moment.f_score), "", TARGET))
     if any(each.no_hit_share is not None for each in hand_out.moments):
         rows.append(("rays without a surface", _percent(moment.no_hit_share), "", LOSS))
-    for label, value, beside, color in rows:
+    for label, value, small, color in rows:
         pen.text((left, top), label, SOFT, font(17))
         pen.text((left, top + 19), value, color, font(34))
-        pen.text((left + pen.textlength(value, font(34)) + 8, top + 33), beside, SOFT, font(17))
+        pen.text((left + pen.textlength(value, font(34)) + 8, top + 33), small, SOFT, font(17))
         top += 64
     return top
 

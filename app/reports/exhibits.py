@@ -169,13 +169,14 @@ def _labels(exhibit: Chart | HeatMap, x: float, below: float, middle: float) -> 
 
 
 def ticks(high: float, most: int = 6) -> list[float]:
-    """Return round values from zero to at most ``high``."""
+    """Return round values from zero to at most ``high`` (above 0), in at most ``most`` equal steps."""
     power = 10.0 ** np.floor(np.log10(high / most))
     step = next(power * factor for factor in (1, 2, 5, 10) if high / (power * factor) <= most)
     return [round(step * k, 10) for k in range(int(high / step + 1e-9) + 1)]
 
 
 def _dashes(curve: Curve) -> Markup:
+    """Return the attribute that dashes the curves of the plane metric; empty for other curves."""
     return Markup(' stroke-dasharray="6 3"') if curve.label.endswith("plane") else Markup("")
 
 

@@ -38,7 +38,7 @@ FLOOR, THINGS, WALL, GRID, INK = (238, 240, 242), (176, 184, 192), (60, 66, 72),
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class DrawnCamera:
     """A camera on the floor plan."""
 
     name: str
@@ -130,19 +130,19 @@ def _meanings(planned: RigPlan) -> list[tuple[str, Color]]:
     ]
 
 
-def _new(planned: RigPlan) -> Iterator[Standing]:
+def _new(planned: RigPlan) -> Iterator[DrawnCamera]:
     for number, camera in enumerate(planned.plan.cameras, 1):
         T = camera.T_world_camera
         view_m = wedge_m(T, planned.plan.sensor.intrinsics, WEDGE_M)
         place_m = _place_m(planned, T)
-        yield Standing(str(number), place_m, *aim_deg(T), view_m, DELIVERED, STANDS_ON[camera.where])
+        yield DrawnCamera(str(number), place_m, *aim_deg(T), view_m, DELIVERED, STANDS_ON[camera.where])
 
 
-def _present(planned: RigPlan) -> Iterator[Standing]:
+def _present(planned: RigPlan) -> Iterator[DrawnCamera]:
     for frame in planned.rig.frames:
         T = frame.T_world_camera
         view_m = wedge_m(T, frame.intrinsics, WEDGE_M)
-        yield Standing(frame.name, _place_m(planned, T), *aim_deg(T), view_m, TARGET, PRESENT)
+        yield DrawnCamera(frame.name, _place_m(planned, T), *aim_deg(T), view_m, TARGET, PRESENT)
 
 
 def _place_m(planned: RigPlan, T_world_camera: FloatArray) -> FloatArray:
@@ -158,7 +158,7 @@ def _fitted(points_m: FloatArray) -> tuple[str, tuple[float, float], Frame]:
         frame = Frame(*corners_mm, scale, 0.5 * (low_m + high_m))
         if np.all(frame.low_m <= low_m) and np.all(frame.high_m >= high_m):
             return name, size_mm, frame
-    raise AssertionError  # scales have no end
+    raise AssertionError  # _papers never ends, and at some scale every room fits
 
 
 def _papers() -> Iterator[tuple[str, tuple[float, float], int]]:
@@ -237,7 +237,7 @@ def _sink(sink_m: FloatArray, near: bool, frame: Frame, labels: Labels) -> Itera
     yield from labels.beside(x_mm, y_mm, 2.0, f"to the sink, {away_m:.1f} m beyond the frame", 3.0, LOSS)
 
 
-def _marks(cameras: Sequence[Standing], frame: Frame, labels: Labels) -> Iterator[Shape]:
+def _marks(cameras: Sequence[DrawnCamera], frame: Frame, labels: Labels) -> Iterator[Shape]:
     """Yield each camera's mark and label: a numbered disc for a new one, a triangle for a present one."""
     places_mm = [frame.on_paper(camera.place_m[:2]) for camera in cameras]
     for camera, (x_mm, y_mm) in zip(cameras, places_mm, strict=True):
@@ -261,7 +261,7 @@ def _marks(cameras: Sequence[Standing], frame: Frame, labels: Labels) -> Iterato
         yield from labels.beside(x_mm, y_mm, 3.4, text, 2.8, INK)
 
 
-def _row(camera: Standing) -> tuple[str, ...]:
+def _row(camera: DrawnCamera) -> tuple[str, ...]:
     x_m, y_m, height_m = camera.place_m
     places = (f"{value + 0.0:.2f}" for value in (x_m, y_m, height_m))
     return camera.name, *places, f"{camera.pan_deg:.0f}°", f"{camera.tilt_deg:.0f}°", camera.on

@@ -12,7 +12,7 @@ LETTER_SHARE = 0.54
 
 
 class Labels:
-    """Places labels inside a frame, each where it covers no earlier one."""
+    """Places labels inside a frame, each where it covers no earlier one as long as there is such a place."""
 
     def __init__(self, left_mm: float, top_mm: float, right_mm: float, bottom_mm: float) -> None:
         self._frame = left_mm, top_mm, right_mm, bottom_mm
@@ -26,7 +26,7 @@ class Labels:
         self, x_mm: float, y_mm: float, away_mm: float, text: str, size_mm: float, color: Color
     ) -> Iterator[Shape]:
         """Yield a label on a light ground: to the right of a mark, else to the left, above, below, or
-        farther away.
+        farther away. If no place near it is free, the label is to the right, over others and without ground.
         """
         width_mm = LETTER_SHARE * size_mm * len(text)
         lefts = x_mm + away_mm, x_mm - away_mm - width_mm, x_mm - 0.5 * width_mm

@@ -21,7 +21,7 @@ WIDTH_PX = 560
 TINT = 0.55
 """Weight of violet and red over the surface's own colour."""
 MOST_GREEN = 0.85
-"""Weight of green where a camera measures with certainty what is missing."""
+"""Weight of green where a camera measures missing surface with certainty."""
 
 
 def plan_pictures(seen: SeenPlace, plan: Plan, texture: Texture) -> Iterator[ByteArray]:

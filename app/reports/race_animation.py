@@ -22,7 +22,7 @@ _PALETTE = ramp(np.arange(256.0), 255.0, DISTANCE_STOPS)
 
 
 def race_animation(race: RaceShow) -> bytes:
-    """Return an endless GIF, ``WIDTH_PX`` wide."""
+    """Return a GIF, ``WIDTH_PX`` wide, that repeats without end."""
     camera = camera_of(race.view, (WIDTH_PX // len(race.runs), ROOM_PX))
     steps = np.unique(np.linspace(0, race.steps - 1, min(race.steps, MOST_PICTURES)).astype(int)).tolist()
     frames = [_frame(race, step, camera) for step in steps]

@@ -50,7 +50,7 @@ class Place:
         parts += [("set", change) for change in changed if key_of(change) not in FILES]
         return urlencode([*parts, *self.added, ("screen", self.screen.lower())])
 
-    def is_beside(self, other: Place) -> bool:
+    def is_apart(self, other: Place) -> bool:
         """Whether this place and ``other`` get separate entries in the browser's history."""
         places = [(one.screen, one.spec.source, one.stops) for one in (self, other)]
         return places[0] != places[1]
@@ -176,7 +176,7 @@ class Address:
         """Send the page its address, even one that the page requested: the state may have changed since."""
         place, text = self._place, self._place.text()
         before, wrong = self._read(self._text)
-        new = not wrong and place.is_beside(before)
+        new = not wrong and place.is_apart(before)
         self._text = text
         self._count += 1
         self._message.content = page_call("showAddress", text, new, mark=self._count)

@@ -90,13 +90,14 @@ class History:
         self._first: Settings | None = None
 
     def begin(self) -> None:
-        """Remember the present state as the one that *Reset* restores. Called once the screens are built."""
+        """Remember the present state: a step to it is named *Reset*. Called once the screens are built."""
         self._first = self._now = self._read()
 
     def accept(self) -> None:
-        """Take the present state without recording a step, because a link has opened it.
+        """Take the state that a link has just opened, without recording a step.
 
-        After a step of the user it was not opened: the browser's *Back* is a step like others.
+        If the user has already made a step, do nothing: then a new address, such as by the browser's *Back*,
+        is a step like others.
         """
         if not any(self.has_steps):
             self._now = self._read()

@@ -50,7 +50,7 @@ class _Seat:
     vote: int = 0
     """The vote, 1 to 3; 0 for none."""
     voter: str = ""
-    """Id of its browser, from the first vote of this connection, which has one vote."""
+    """Id under which this connection's votes count, that of its first one: only its last vote counts."""
     call: Callable[..., None] = lambda *_: None
     """Calls a function of the seat's page: its name, then its arguments."""
     show_size: Callable[[Markdown], None] = lambda _: None
@@ -98,7 +98,7 @@ class Lecture:
         self._server.on_client_disconnect(lambda client: post(self._leave, client.client_id))
 
     def followers(self) -> list[viser.ClientHandle]:
-        """Return the browsers whose view follows the teacher's."""
+        """Return the browsers whose view the session turns: the teachers', and students' that follow."""
         return [seat.client for seat in self._present() if seat.follows]
 
     def everybody(self) -> Iterable[viser.ClientHandle]:
@@ -123,11 +123,11 @@ class Lecture:
         seat = _Seat(client, self._teaches(client.client_id))
         self._seats[client.client_id] = seat
         if seat.teaches:
-            self._add_desk(seat)
+            self._add_teacher_folder(seat)
             seat.leave = self._add_address(self._own_ui(client))
             client.camera.on_update(lambda _: self._moved(seat))
         else:
-            self._add_chip(seat)
+            self._add_bar(seat)
         seat.forget = self._add_commands(self._own_ui(client), client, lambda: self._let_roam(seat))
         self._catch_up(seat)
         self._count()
@@ -176,7 +176,7 @@ class Lecture:
 
     # Controls and messages in each browser.
 
-    def _add_desk(self, seat: _Seat) -> None:
+    def _add_teacher_folder(self, seat: _Seat) -> None:
         """Add the teacher's own controls."""
         client = seat.client
         with client.gui.add_folder("Lecture", order=-1.0):
@@ -219,7 +219,7 @@ class Lecture:
         for seat in self._present():
             seat.show_size(sentence if size else Markdown("**Nobody is in the class yet.**"))
 
-    def _add_chip(self, seat: _Seat) -> None:
+    def _add_bar(self, seat: _Seat) -> None:
         """Add the student's bar to the page, and handle the page's messages: follow, roam or vote."""
         client, name = seat.client, uuid.uuid4().hex
         ui = self._own_ui(client)

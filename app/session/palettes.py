@@ -90,7 +90,7 @@ class Palettes:
         self._history.accept()
 
     def rest(self) -> None:
-        """Collect new entries after ``REST_S``, because everything is computed."""
+        """Collect new entries after ``REST_S``; called when everything is computed."""
         self._resting.restart()
 
     def _refresh(self) -> None:

@@ -167,19 +167,19 @@ class Session:
         It waits for the chain's running step and for a step that the current callback submits. On the
         session's thread, ``on_partial`` gets partial results, and ``on_end`` the result or None on failure.
         """
-        self.post(self._run_beside, self._side, job, arguments, on_end, on_partial)
+        self.post(self._run_in_lane, self._side, job, arguments, on_end, on_partial)
 
     def quick_job(
         self, job: str, *arguments: Any, on_end: Callable[[Any], None], key: Hashable = None
     ) -> None:
-        """Run a job parallel to the chain, of its module only the last. Answers with a key are shared."""
+        """Run a short job as ``PanelSession.quick_job`` defines it: in parallel with the chain."""
         view = None if key is None else self._shared.get(key)
         if view is None:
-            self._run_beside(self._quick[job.partition(":")[0]], job, arguments, on_end, lambda _: None, key)
+            self._run_in_lane(self._quick[job.partition(":")[0]], job, arguments, on_end, lambda _: None, key)
         else:
             self.post(on_end, view)
 
-    def _run_beside(
+    def _run_in_lane(
         self,
         lane: LatestWins,
         job: str,
@@ -216,7 +216,7 @@ class Session:
             self._show_status()
 
     def cancel_side_job(self) -> None:
-        """Stop the side job now."""
+        """Stop the side job; its ``on_end`` gets None."""
         self._side.cancel()
 
     def offers(self) -> tuple[Offers, ...]:
@@ -397,4 +397,4 @@ class Session:
             if self._closed:  # closed meanwhile: the pool and the folder may be gone
                 return
             logger.exception("a session callback failed")
-            self.notify("Something unexpected happened", f"{type(error).__name__}: {error}")
+            self.notify("Something unexpected happened", f"{type(error).__name__}: {error}; reload the page")

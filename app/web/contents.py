@@ -160,7 +160,7 @@ class Contents:
         digest = hashlib.blake2b(b"%s %d %s" % (_FORMAT, len(kind), kind), digest_size=16)
         digest.update(data if isinstance(data, bytes) else np.ascontiguousarray(data).data.cast("B"))
         name = digest.hexdigest()
-        if isinstance(data, bytes):  # nobody can change it
+        if isinstance(data, bytes):  # bytes cannot be changed
             self._names[id(data)] = data, name
             while len(self._names) > REMEMBERED:
                 self._names.popitem(last=False)

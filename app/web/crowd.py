@@ -42,7 +42,7 @@ class Visitor:
     shows_page: Callable[[], bool]
     """Whether its page has sent anything yet."""
     began_s: float = 0.0
-    """Start of its session on this process's monotonic clock, seconds."""
+    """Time at which its session started, on this process's monotonic clock, seconds."""
     shows_waiting: bool = False
     """Whether the browser shows that it waits."""
 
@@ -118,6 +118,7 @@ class Crowd:
         return None
 
     def _look(self) -> None:
+        """Disconnect the browsers that have shown no page within ``NO_PAGE_S``, until the crowd is closed."""
         while not self._closing.wait(LOOK_S):
             late_s = time.monotonic() - NO_PAGE_S
             with self._lock:

@@ -42,13 +42,13 @@ def strict_headers(hashes: Sequence[str] = (), allowed: Collection[str] = ()) ->
 
 def _with_headers(hashes: str, others: str, answer: Answer) -> Answer:
     async def later(awaited: Awaitable[Any], request: Any) -> Any:
-        return dressed(await awaited, request)
+        return with_policy(await awaited, request)
 
     def answered(connection: Any, request: Any) -> Any:
         response = answer(connection, request)
-        return later(response, request) if isinstance(response, Awaitable) else dressed(response, request)
+        return later(response, request) if isinstance(response, Awaitable) else with_policy(response, request)
 
-    def dressed(response: Any, request: Any) -> Any:
+    def with_policy(response: Any, request: Any) -> Any:
         if response is not None:
             host = request.headers.get("Host", "")
             plain = bool(host) and all(letter.isalnum() or letter in ".-:[]_" for letter in host)

@@ -1,4 +1,4 @@
-"""Host names, and those that the person who starts the server allows with --allow-host, such as a proxy's."""
+"""Checks of host names, such as a proxy's, that the person who starts the server allows by --allow-host."""
 
 from __future__ import annotations
 

@@ -48,11 +48,11 @@ NOT_PASSED_ON = (
 RECENT_S = 10.0
 """Time within which a waiting page tries to open its websocket at least once, seconds."""
 _MOST_ORIGINS = 1000
-_NOBODY: frozenset[str] = frozenset()
+_NONE: frozenset[str] = frozenset()
 _ADDRESS = re.compile(r"[A-Za-z0-9._:\[\]-]{1,260}")
 
 
-def is_own(headers: Mapping[str, str], allowed: frozenset[str] = _NOBODY) -> bool:
+def is_own(headers: Mapping[str, str], allowed: frozenset[str] = _NONE) -> bool:
     """Whether a request is to this server and comes from its own page, or from no page (no ``Origin``).
 
     Args:
@@ -77,7 +77,7 @@ def _page_name(origin: str | None) -> str | None:
     return host_name(address) if separator and protocol in ("http", "https") and "@" not in address else None
 
 
-def refusal(headers: Mapping[str, str], allowed: frozenset[str] = _NOBODY) -> str:
+def refusal(headers: Mapping[str, str], allowed: frozenset[str] = _NONE) -> str:
     """Return the sentence for a refused request: the address that it used, and the options that allow it.
 
     A proxy may also replace ``Host`` by a name that it knows the server by, such as a container's: then both
@@ -139,7 +139,7 @@ def _understood(answer: Answer) -> Answer:
     return answered
 
 
-def only_own_page(allowed: frozenset[str] = _NOBODY) -> AbstractContextManager[None]:
+def only_own_page(allowed: frozenset[str] = _NONE) -> AbstractContextManager[None]:
     """Return a context. A server started in it refuses requests from other sites' pages.
 
     Args:

@@ -57,7 +57,7 @@ class File:
 
     @cached_property
     def mark(self) -> str:
-        """The content's entity tag, weak as it is the same for the content packed and as it is."""
+        """The content's entity tag; a weak one, because the compressed content and the plain one share it."""
         return f'W/"{hashlib.sha256(self.content).hexdigest()[:24]}"'
 
     def response(self, request: Mapping[str, str]) -> Response:

@@ -243,7 +243,7 @@ def awaits_render(server: viser.ViserServer, number: int) -> bool:
 
 
 def send_value(server: viser.ViserServer, number: int, handle: Any) -> None:
-    """Send a browser the control's value on the server."""
+    """Send a browser the server's value of a control, in place of a value that was refused."""
     client = server._connected_clients.get(number)
     if client is not None and not handle._impl.is_button:
         back = messages.GuiUpdateMessage(handle._impl.uuid, {"value": handle._impl.value})

@@ -1,6 +1,6 @@
 """The top of the control panel: the stepper, the status line, the progress bar, and buttons for all steps.
 
-``actions.js`` disables the buttons that have nothing to do; ``Reset`` while no setting was used.
+``actions.js`` disables the buttons that have nothing to do, such as ``Reset`` before any setting was used.
 """
 
 from __future__ import annotations
@@ -78,8 +78,8 @@ class Header:
         if running:
             self._status.content = Markdown("**Computing** · {}").format(running[0])
         elif failure is not None:
-            self._status.content = Markdown("**Stopped** · {} Change a setting or press Retry.").format(
-                failure
+            self._status.content = Markdown("**Stopped** · {}. Change a setting or press Retry.").format(
+                failure.rstrip(".")
             )
             self._bar.value = 0.0
         elif not busy:

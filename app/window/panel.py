@@ -111,7 +111,7 @@ class PanelSession(Protocol):
         ...
 
     def cancel_side_job(self) -> None:
-        """Stop the side job now."""
+        """Stop the side job; its ``on_end`` gets None."""
         ...
 
     def offers(self) -> tuple[Offers, ...]:

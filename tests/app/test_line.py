@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from app.load import classroom, one_more
-from app.load.classroom import ClassPage, Lesson
+from app.load.classroom import ClassPage, ClassTimes
 from app.load.line import BURST_S, line
 from app.web.contents import FOLDER
 
@@ -133,7 +133,7 @@ def test_a_page_whose_data_are_in_the_messages_has_its_surface_with_them():
 
 
 def test_the_figures_of_a_lesson():
-    lesson = Lesson(True, 3, 700_000, 600_000.0, (1.0, 2.0), (5.0, 7.0), 500_000.0, (1.5, 1.7))
+    lesson = ClassTimes(True, 3, 700_000, 600_000.0, (1.0, 2.0), (5.0, 7.0), 500_000.0, (1.5, 1.7))
     assert lesson.record()["whole_s"] == {"median": 6.0, "p95": pytest.approx(6.9)}
     assert "coarse 1.5 s, 95 % 1.9, whole 6.0 s" in lesson.note()
     assert "0.60 MB each" in lesson.note()
@@ -145,7 +145,7 @@ def test_a_class_on_the_running_app(monkeypatch):
     monkeypatch.setattr(classroom, "BROWSERS", 2)
     monkeypatch.setattr(classroom, "SCENE", "box-on-table")
     monkeypatch.setattr(classroom, "BITS_PER_S", 400e6)
-    by_name, in_messages = (classroom.hold_lesson(by_name) for by_name in (True, False))
+    by_name, in_messages = (classroom.time_class(by_name) for by_name in (True, False))
     assert by_name.first_bytes < in_messages.first_bytes + 1_000_000  # what is hidden came before
     assert by_name.drag_bytes < 0.6 * in_messages.drag_bytes
     for lesson in (by_name, in_messages):

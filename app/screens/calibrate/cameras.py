@@ -106,8 +106,9 @@ def finished(
 
 
 def own_views(views: BoardViews, *cameras: str) -> BoardViews:
-    """Return the photographs without other cameras' dropped views: all that these cameras, each calibrated
-    alone, depend on.
+    """Return the photographs without the dropped views of all other cameras.
+
+    A result about these cameras, each calibrated alone, depends on nothing else.
     """
     return replace(views, dropped=tuple(one for one in views.dropped if one[0] in cameras))
 

@@ -67,7 +67,7 @@ class BoardsDrawing:
         view: CalibrationView,
         rig: RigView,
         scene: SceneView | None,
-        came: SceneView | None,
+        loaded: SceneView | None,
         chosen: str,
     ) -> None:
         """Draw the boards and the calibrated cameras at their poses, and in grey the cameras' loaded poses.
@@ -76,14 +76,14 @@ class BoardsDrawing:
             view: the cameras.
             rig: poses of the cameras and the boards.
             scene: the scene in the chain, whose sensor clouds are drawn.
-            came: the scene as it was loaded; the first camera stands at its pose there.
+            loaded: the scene as it was loaded; the first camera keeps its pose there.
             chosen: name of the view to highlight.
         """
         clear(self._scene, BELOW)
         self._handles, self._dropped = {}, frozenset()
         first = rig.cameras[0].name
         believed: dict[str, FloatArray] = (
-            {} if came is None else {node.name: node.T_world_camera for node in came.nodes}
+            {} if loaded is None else {node.name: node.T_world_camera for node in loaded.nodes}
         )
         T_world_first = believed.get(first, LEVEL_POSE)
         for node in () if scene is None else scene.nodes:

@@ -67,7 +67,7 @@ def noise_job(
     known = (yield from finished(cameras_of(store, spec.views))).view
     camera = known.camera(request.camera)
     if camera is None or camera.calibration is None:
-        raise InputError(f"There is no calibration of {request.camera} to repeat; add views first")
+        raise InputError(f"There is no calibration of {request.camera} to repeat; add photographs first")
     true = camera.calibration
     if request.other_lens and true.lens == "fisheye":
         raise InputError("A fisheye has no p1, p2 and k3 to add; choose 'this lens' under Seen through")

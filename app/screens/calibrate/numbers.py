@@ -139,9 +139,9 @@ class ParameterFolder:
         """Show another camera; None shows nothing."""
         self._table.content = Markup("") if camera is None else parameter_table(camera)
         if camera is None:
-            self.relate(None)
+            self.load_correlations(None)
 
-    def relate(self, together: Correlations | None) -> None:
+    def load_correlations(self, together: Correlations | None) -> None:
         """Show the correlations of the camera's parameters; None while they are not known."""
         self._together.content = Markup("") if together is None else correlation_html(together)
 

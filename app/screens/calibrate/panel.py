@@ -54,7 +54,7 @@ class CalibratePanel(Panel):
         self._answers = Answers(session, self._judged, self._show_view)
         self._framed: tuple[Hashable, ...] = ()
         self._look: CalibrateLook | None = None
-        self._came: SceneView | None = None
+        self._loaded: SceneView | None = None
         """The scene as it was loaded."""
         self._groups = list[Any]()
         """Controls that need photographs."""
@@ -67,14 +67,14 @@ class CalibratePanel(Panel):
         self._open = ui.buttons("Open", scenes, "Scene with photographs of a board.", visible=False)
         self._verdict = gui.add_html(Markup(""))
         self._use = UseRow(ui, session)
-        self._cameras = gui.add_dropdown(
+        self._loadedras = gui.add_dropdown(
             "Camera", ["node_00"], hint="Camera whose views are shown.", visible=False
         )
-        self._camera = Awaited(ui, self._cameras, self._picked_camera)
+        self._loadedra = Awaited(ui, self._loadedras, self._picked_camera)
         self._photographs = Photographs(
             ui, self._answers, self._pick, self._show_view, self._drop, self._keep_all
         )
-        self.in_address |= self._lessons.in_address | {"node": self._camera}
+        self.in_address |= self._lessons.in_address | {"node": self._loadedra}
         self.in_address |= {"photo": self._photographs, "pictures": self._photographs.area}
         self._around = gui.add_dropdown(
             "In space", list(AROUND), hint="Object that is fixed in the 3-D scene."
@@ -171,7 +171,7 @@ class CalibratePanel(Panel):
             self._judge.at_range([0.5 * (node.nearest_m + node.farthest_m) for node in view.nodes])
             self._request_answers()
             if not isinstance(self.session.spec.source, Calibrated):
-                self._came = view
+                self._loaded = view
             if self._view is None or AROUND[self._around.value] == "rig":
                 self._draw()
         if step == "surface" and self.session.results.fresh("surface", self.session.spec):
@@ -190,14 +190,14 @@ class CalibratePanel(Panel):
     def _take(self, view: CalibrationView, all_there: bool) -> None:
         self._view = view
         if view.cameras:
-            self._camera.offer(tuple(camera.name for camera in view.cameras), all_there)
+            self._loadedra.offer(tuple(camera.name for camera in view.cameras), all_there)
         self._whole |= {camera.name: camera for camera in view.cameras if not camera.dropped}
         self._show_camera()
 
     # The camera that is shown.
 
     def _shown(self) -> CameraView | None:
-        return None if self._view is None else self._view.camera(self._camera.value)
+        return None if self._view is None else self._view.camera(self._loadedra.value)
 
     def _picked_camera(self) -> None:
         """Show another camera and remove the replay of the last one."""
@@ -208,7 +208,7 @@ class CalibratePanel(Panel):
         camera = self._shown()
         with self.ui.atomic():
             self._around.visible = camera is not None
-            self._cameras.visible = self._view is not None and len(self._view.cameras) > 1
+            self._loadedras.visible = self._view is not None and len(self._view.cameras) > 1
             self._use.show(camera is not None and camera.calibration is not None)
             nothing = camera is None and self.session.spec.views is None
             self._open.visible = nothing
@@ -245,7 +245,7 @@ class CalibratePanel(Panel):
         camera = self._shown()
         trust = None if camera is None else self._answers.trust_in(camera)
         self._photographs.load(camera)
-        self._parameters.relate(None if trust is None else trust.together)
+        self._parameters.load_correlations(None if trust is None else trust.together)
         if trust is not None or camera is None or camera.calibration is None:
             self._show_verdict(trust)
         self._request_answers()
@@ -368,7 +368,7 @@ class CalibratePanel(Panel):
             if view is None or camera is None or camera.calibration is None:
                 self._drawing.draw_scene(scene)
             elif around == "rig" and isinstance(view.rig, RigView):
-                self._drawing.draw_rig(view, view.rig, scene, self._came, self._photographs.chosen)
+                self._drawing.draw_rig(view, view.rig, scene, self._loaded, self._photographs.chosen)
             else:
                 self._no_rig.visible = around == "rig"
                 self._drawing.draw_camera(camera, view.board, around, self._photographs.chosen)

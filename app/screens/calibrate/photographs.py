@@ -62,7 +62,7 @@ class Photographs:
         self.area = PictureArea(ui, on_pair)
 
     def load(self, camera: CameraView | None) -> None:
-        """Show the views of a camera, and the maps of the chosen one; None shows nothing."""
+        """Show the views of a camera, and the pictures of the chosen one; None shows nothing."""
         self._row.visible = camera is not None
         if camera is None:
             self.area.load({})

@@ -76,5 +76,5 @@ def _check(name: str, camera: CameraIntrinsics, rig: Rig) -> None:
         width, height = sizes_px[name]
         raise InputError(
             f"{name} of the scene has {width} x {height} pixels and the photographs {camera.width_px} x "
-            f"{camera.height_px}; a calibration is valid for one image size only"
+            f"{camera.height_px}; calibrate from photographs of the scene's size"
         )

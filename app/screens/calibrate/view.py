@@ -119,8 +119,8 @@ class PlacedCamera:
     """Standard error of the rotation; ``position_sd_m``: of the position. Both are 0 for the first."""
     position_sd_m: float = 0.0
     held_out_rotation_deg: float | None = None
-    """Largest change of its rotation when a part of the moments is left out, below of its position; None if
-    no part can be left out."""
+    """Largest change of its rotation when a part of the moments is left out; ``held_out_position_m``: of its
+    position. None if no part can be left out."""
     held_out_position_m: float | None = None
 
 

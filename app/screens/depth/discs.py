@@ -27,7 +27,7 @@ def disc_at(u: float, v: float, width_px: int, height_px: int, size_share: float
 def covered(
     discs: Sequence[Disc], u: IntArray | FloatArray, v: IntArray | FloatArray, width_px: int, height_px: int
 ) -> BoolArray:
-    """Return whether any disc covers each pixel; columns ``u`` and rows ``v`` broadcast."""
+    """Return whether any disc covers each pixel, in the shape to which columns and rows broadcast."""
     inside = np.zeros(np.broadcast_shapes(np.shape(u), np.shape(v)), dtype=bool)
     for disc in discs:
         x, y, radius = disc_px(disc, width_px, height_px)

@@ -24,8 +24,8 @@ picture**, or place discs with the sliders."""
 )
 BUTTON = "Hide and fill"
 WAITING = Markdown("Filling …")
-SILENT = Markdown("There is no result. Press the button again.")
-BESIDE = Markdown("There is no measured point. Click a point of the node that is chosen above.")
+NO_RESULT = Markdown("There is no result. Press the button again.")
+NO_POINT = Markdown("There is no measured point. Click a point of the node that is chosen above.")
 
 
 class HideFolder:
@@ -85,18 +85,18 @@ class HideFolder:
         )
 
     def show(self, cloud: SeenSample, T_world_camera: FloatArray) -> None:
-        """Let the brush paint on this node's points in the scene, and draw the discs on them."""
+        """Let the brush paint on a node's points, at its camera's (4, 4) pose, and draw the discs on them."""
         self._cloud, self._T_world_camera = cloud, T_world_camera
         self._drawing.draw(cloud, T_world_camera, self.discs)
 
     def clicked(self, origin_m: FloatArray, direction: FloatArray) -> None:
-        """Paint at the point that was clicked in the scene, if the brush is on."""
+        """Paint at the point that a click's ray, (3,) origin and direction, selects, if the brush is on."""
         if not self._brush.value or self._cloud is None:
             return
         size_share = self._size.value / 100.0
         disc = clicked_disc(self._cloud, self._T_world_camera, origin_m, direction, size_share)
         if disc is None:
-            self._status.content = BESIDE
+            self._status.content = NO_POINT
         else:
             self._paint((*self.discs, disc))
 
@@ -122,7 +122,7 @@ class HideFolder:
         """Show the result; None if the job was stopped or failed."""
         self.forget()
         if view is None:
-            self._status.content = SILENT
+            self._status.content = NO_RESULT
             return
         self._status.content = Markdown("**{:,} measured pixels of {} hidden.**").format(
             view.hidden_px, view.node

@@ -36,7 +36,7 @@ def model_job(store: Store, spec: Spec, choice: ModelChoice) -> Generator[Progre
         ReconstructionError: its output is no depth, or does not follow the given depth.
     """
     yield Progress("loading the network", 0.3)
-    choice = told_apart(choice)
+    choice = by_its_inputs(choice)
     config = choice.put_into(DepthConfig())
     network: DepthNetwork | OwnCompletion
     kind: ModelKind
@@ -60,7 +60,7 @@ def model_job(store: Store, spec: Spec, choice: ModelChoice) -> Generator[Progre
     )
 
 
-def told_apart(choice: ModelChoice) -> ModelChoice:
+def by_its_inputs(choice: ModelChoice) -> ModelChoice:
     """Return the choice; a network that takes image and depth is moved from ``model`` to ``completion``.
 
     Raises:

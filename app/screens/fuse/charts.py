@@ -105,7 +105,7 @@ class HistogramChart:
         self._caption = gui.add_html(Markup(""))
 
     def show(self, lane: RaceLane, row: int, edges_m: FloatArray) -> None:
-        """Draw the pairs of one step of a lane."""
+        """Draw the pairs of one step of a lane in the bins between (B + 1,) edges."""
         shown = lane.steps[row].histogram
         most = max(1, *(int(step.histogram.counts.max()) for step in lane.steps))
         edges_cm = 100.0 * edges_m

@@ -53,7 +53,7 @@ class RaceClock:
         return "time, ms" if self.in_ms else "iteration"
 
     def shown(self, t_ns: NDArray[np.int64]) -> FloatArray:
-        """Return times in the units of the axis."""
+        """Return times in the units of the axis, in an array of the same shape."""
         return t_ns / (NS_PER_MS if self.in_ms else COUNT_NS)
 
     def at(self, place: float | None) -> int:

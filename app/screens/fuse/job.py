@@ -54,7 +54,7 @@ def _registration_row(
 
 
 def true_pose(rig: Rig, source: int, target: int) -> FloatArray | None:
-    """Return the true T_target_source of two nodes; None without ground truth."""
+    """Return the true (4, 4) T_target_source of two nodes; None without ground truth."""
     if rig.truth is None:
         return None
     return geometry.inverse(rig.truth.T_world_camera[target]) @ rig.truth.T_world_camera[source]

@@ -48,7 +48,7 @@ COMPARISONS: dict[str, tuple[Rival, ...]] = {
     "All four": (("icp", "point"), ("ceicp-a", "point"), ("icp", "plane"), ("ceicp-a", "plane")),
 }
 """Comparisons of weights, of metrics, and of both."""
-NOBODY = "none"
+NO_METHOD = "none"
 DEGRADATIONS: dict[str, tuple[str, float, float, float, str]] = {
     "noise_m": ("Noise (cm)", 10.0, 0.5, 100.0, "Standard deviation of noise added along the view rays."),
     "outlier_share": (

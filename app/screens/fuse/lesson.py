@@ -54,7 +54,7 @@ def _methods(text: str) -> tuple[Rival, ...]:
     names = {name.lower().replace(",", ""): rival for name, rival in RIVALS.items()}
     rivals = tuple(choice(names)(part.strip().lower()) for part in text.split(","))
     if len(rivals) > MOST_LANES:
-        raise ValueError(f"at most {MOST_LANES} methods race")
+        raise ValueError(f"try at most {MOST_LANES} methods")
     return rivals
 
 

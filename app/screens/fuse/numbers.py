@@ -57,7 +57,7 @@ def winner(reference: Reference, lanes: tuple[RaceLane, ...]) -> Markdown:
 
 
 def off_text(step: RaceStep, digits: int = OFF_DIGITS, unit: str = "cm") -> str:
-    """Return a step's error in centimetres, with its unit; a gap out of reach as ``≥ 50 cm``."""
+    """Return a step's error in centimetres, followed by ``unit``; a gap out of reach as ``≥ 50 cm``."""
     if step.out_of_reach:
         return f"≥ {number(REACH_M, 0, unit, 100.0)}"
     return number(step.off_m, digits, unit, 100.0)

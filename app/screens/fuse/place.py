@@ -88,4 +88,4 @@ def _check(race: Race) -> None:
         and 0 <= race.seed <= MOST_SEED
         and all(len(vector) == 3 and max(map(abs, vector)) <= MOST_AWAY for vector in vectors)
     ):
-        raise InputError("The address has a race outside the ranges of the Fuse screen's sliders")
+        raise InputError("The address has a race outside the Fuse screen's sliders; set the race there")

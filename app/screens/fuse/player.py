@@ -63,7 +63,7 @@ class RacePlayer:
         return f"{float(self.clock.shown(np.array(rest_ns))):.6g}"
 
     def load(self, lanes: Sequence[RaceLane], reference: Reference) -> None:
-        """Load another race, at its start; without lanes, do nothing."""
+        """Load another race, at its start; without lanes, leave the dock as it is."""
         self._lanes, self._reference = lanes, reference
         if not lanes:
             return

@@ -55,26 +55,27 @@ class Contest:
     """The source cloud with the race's degradation."""
     target: PointCloud
     T_aligned: FloatArray
-    """T_target_source: the reference pose, or the nodes' believed one if it is unknown."""
+    """(4, 4) T_target_source: the reference pose, or the nodes' believed one if it is unknown."""
     T_home: FloatArray | None
-    """The reference pose, of a mirrored source a reflection; None if it is unknown."""
+    """(4, 4) reference pose; a reflection for a mirrored source. None if it is unknown."""
     reference: Reference
     center_m: FloatArray
     """(3,) centre of the aligned source before it was degraded, target frame."""
     error_points_m: FloatArray
     """(N, 3) points before degradation whose distance from their reference positions is the error."""
     T_world_target: FloatArray
+    """(4, 4) pose of the target."""
     from_cameras: tuple[bool, bool]
     """Whether source and target are a camera's own measurement, so that they show its free space."""
 
     def start_pose(self, start: Start) -> FloatArray:
-        """Return T_target_source of a start: the aligned pose with the start's error."""
+        """Return (4, 4) T_target_source of a start: the aligned pose with the start's error."""
         rotation = geometry.rotation_exp(np.radians(start.turn_deg))
         shift_m = self.center_m - rotation @ self.center_m + np.array(start.shift_cm) / 100.0
         return geometry.rigid(rotation, shift_m) @ self.T_aligned
 
     def error_m(self, T: FloatArray) -> float | None:
-        """Return the RMS distance, metres, of the points from their reference positions; None if unknown."""
+        """Return the RMS distance, m, of the points at a (4, 4) pose from the reference; None if unknown."""
         return None if self.T_home is None else point_error_m(T, self.T_home, self.error_points_m)
 
 
@@ -221,7 +222,7 @@ class Watch:
     lens: Lens | None
 
     def seen(self, T_target_source: FloatArray) -> dict[str, Any]:
-        """Return the fields ``gap_m``, ``shades`` and ``lens`` of a ``RaceStep`` at a pose, by name."""
+        """Return by name the fields ``gap_m``, ``shades`` and ``lens`` of a step at a (4, 4) pose."""
         distances_m, gap_m = self.distances.at(T_target_source)
         lens = np.empty((0, 3), np.uint8) if self.lens is None else self.lens.at(T_target_source)
         return {"gap_m": gap_m, "shades": shades_of(distances_m), "lens": lens}

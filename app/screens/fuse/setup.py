@@ -16,7 +16,7 @@ from app.screens.fuse.labels import (
     DIRECTIONS,
     MOST_LANES,
     MOST_SEED,
-    NOBODY,
+    NO_METHOD,
     RIVAL_NAMES,
     RIVALS,
     SLIGHTLY,
@@ -60,8 +60,8 @@ class RaceSetup:
             index, rivals = len(self._slots), self._race.rivals
             handle = self._ui.gui.add_dropdown(
                 label,
-                list(RIVALS) if index == 0 else [NOBODY, *RIVALS],
-                initial_value=RIVAL_NAMES[rivals[index]] if index < len(rivals) else NOBODY,
+                list(RIVALS) if index == 0 else [NO_METHOD, *RIVALS],
+                initial_value=RIVAL_NAMES[rivals[index]] if index < len(rivals) else NO_METHOD,
                 hint=METHOD_HINT,
             )
             self._slots.append(handle)
@@ -188,7 +188,7 @@ class RaceSetup:
         """Show another race, between the nodes that are chosen."""
         self._race = replace(race, source=self._race.source, target=self._race.target)
         rivals = [RIVAL_NAMES[rival] for rival in race.rivals]
-        rivals += [NOBODY] * (MOST_LANES - len(rivals))
+        rivals += [NO_METHOD] * (MOST_LANES - len(rivals))
         for slot, name in zip(self._slots, rivals, strict=True):
             slot.value = name
         self._direction.value = next(name for name, way in DIRECTIONS.items() if way == race.direction)
@@ -215,7 +215,7 @@ class RaceSetup:
         }
         return replace(
             self._between_chosen(race),
-            rivals=tuple(RIVALS[slot.value] for slot in self._slots if slot.value != NOBODY),
+            rivals=tuple(RIVALS[slot.value] for slot in self._slots if slot.value != NO_METHOD),
             direction=DIRECTIONS[self._direction.value],
             seed=int(self._seed.value),
             **worse,

@@ -131,7 +131,7 @@ class RaceStep:
     """One iteration as a player shows it."""
 
     T_target_source: FloatArray
-    """Pose at which the pairs were matched, before this iteration's update."""
+    """(4, 4) pose at which the pairs were matched, before this iteration's update."""
     source_points_m: FloatArray
     """(M, 3) float32, source frame."""
     target_points_m: FloatArray
@@ -220,6 +220,7 @@ class RaceView:
     target: Sample
     """Target camera frame."""
     T_world_target: FloatArray
+    """(4, 4) pose of the target."""
     center_m: FloatArray
     """(3,) centre of the aligned source in the target's frame; the start turns about it."""
     edges_m: FloatArray

@@ -54,7 +54,9 @@ def pictures_job(store: Store, spec: Spec, keyframes: tuple[int, ...]) -> Genera
 
 def _opened(spec: Spec) -> Generator[Progress, None, Recording]:
     if not isinstance(spec.source, Recorded):
-        raise InputError(f"{spec.source.title} is no recording, so there is no walk to show")
+        raise InputError(
+            f"{spec.source.title} is no recording and has no walk to show; choose a recording under Scene"
+        )
     return (yield from spec.source.iterate_open())
 
 

@@ -97,7 +97,7 @@ class WalkPart:
     # Requests and results.
 
     def begin(self) -> None:
-        """Request the walk of the loaded recording, unless it is requested or shown."""
+        """Request the walk of the loaded recording, or the pictures of one that is shown without them."""
         session = self._session
         key = session.spec.key("scene")
         if key != self._asked and session.results.fresh("scene", session.spec):
@@ -283,7 +283,7 @@ class WalkPart:
             return
         names = ["", *self._pairs()]
         if text not in names:
-            raise InputError(f"The address has loop={text}, but no loop joins these frames")
+            raise InputError(f"The address has loop={text}, which is no loop; choose one from the list")
         self._loop.value = self._loop.options[names.index(text)]
         self._picked_loop()
 

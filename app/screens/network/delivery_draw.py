@@ -9,6 +9,7 @@ from app.drawing.clouds import clear, shorten
 from app.drawing.colors import BACKGROUND, BRAND, DELIVERED, LOSS, NEUTRAL, SOURCE
 from app.drawing.packing import rounded
 from app.drawing.poses import place
+from app.drawing.timeline import Color
 from app.screens.network.delivery_view import DeliveryView, MomentView, PacketView
 from app.screens.network.draw import MOST_PACKETS, ON_THE_WAY, Flights
 from app.screens.network.labels import CAUSES
@@ -19,7 +20,7 @@ from pipeline.types import FloatArray
 
 FRUSTUM = 0.08
 """viser's ``scale`` of a frustum over D, the distance from the cameras' mean to the middle of their view."""
-BESIDE = 0.5
+SINK_AWAY = 0.5
 """Distance at which the sink is drawn to the left of the cameras, over D; the real one may be far away."""
 ELEVATION_RAD = np.radians(40.0)
 FILLED = 0.8
@@ -35,8 +36,6 @@ LONGEST = 8
 LIT = (255, 230, 0)
 BUSY, DOWN = BRAND, LOSS
 FULL, EMPTY = DELIVERED, SOURCE
-Number = tuple[int, int, int]
-"""An RGB colour."""
 
 
 class DeliveryDrawing:
@@ -58,7 +57,7 @@ class DeliveryDrawing:
         self._marks: dict[str, viser.LabelHandle] = {}
         """Labels of the sink, the cloud and the client."""
         self._lifts_m: list[FloatArray] = [np.zeros(3)] * len(view.nodes)
-        """(3,) extra distance of each node's name below its camera, so that names do not overlap."""
+        """(3,) offset of each node's name from its usual place below the camera, so that none overlap."""
         self._narrow = False
         self._batteries: list[viser.IcosphereHandle] = []
         self._clouds: list[viser.PointCloudHandle | None] = [None] * len(view.nodes)
@@ -110,7 +109,7 @@ class DeliveryDrawing:
         up = np.cross(right, forward)
         self._lifts_m = [np.zeros(3)] * len(self._names)
         for row in range(len(self._names)):
-            self._stand(row, self._pose(row, self._shown))
+            self._move_camera(row, self._pose(row, self._shown))
         labels = [*self._marks.values(), *self._names]
         from_m = np.array([label.position for label in labels]) - stand_m
         px_m = 2.0 * np.tan(0.5 * fov_rad) * (from_m @ forward) / max(height_px, 1.0)
@@ -124,7 +123,7 @@ class DeliveryDrawing:
             -lift_px * one_m * up for lift_px, one_m in zip(lifts_px, px_m[len(self._marks) :], strict=True)
         ]
         for row in range(len(self._names)):
-            self._stand(row, self._pose(row, self._shown))
+            self._move_camera(row, self._pose(row, self._shown))
 
     def place_m(self, name: str) -> FloatArray:
         """Return the (3,) drawn place of the sink or of a node's radio; of a failed node, its camera's."""
@@ -171,13 +170,13 @@ class DeliveryDrawing:
         for row, node in enumerate(self._view.nodes):
             now = None if moment is None else moment.nodes[row]
             share = 0.0 if now is None else now.delivered_bytes / max(node.total_bytes, 1)
-            self._stand(row, self._pose(row, moment))
+            self._move_camera(row, self._pose(row, moment))
             self._show_picture(row)
             self._frusta[row].color = _state_color(node.row < 0, share)
             self._show_cloud(row, None if now is None or not len(now.points_m) else now)
         self._show_mesh(b"" if moment is None else moment.glb)
 
-    def _stand(self, row: int, T_world_camera: FloatArray) -> None:
+    def _move_camera(self, row: int, T_world_camera: FloatArray) -> None:
         """Move a camera's frustum and name to a pose (registration may change it), and update the name."""
         place(self._frusta[row], T_world_camera)
         below_m = np.array((0.0, 0.0, NAME_BELOW * self._size_m))
@@ -285,7 +284,7 @@ class DeliveryDrawing:
         moved; the sink and the cloud next to them.
         """
         run, left = self._view.run, -self._view.stage.right
-        sink_m = cameras_m.mean(axis=0) + (np.ptp(cameras_m @ left) / 2.0 + BESIDE * self._size_m) * left
+        sink_m = cameras_m.mean(axis=0) + (np.ptp(cameras_m @ left) / 2.0 + SINK_AWAY * self._size_m) * left
         places_m = np.tile(sink_m, (len(run.names), 1))
         moved = self._view.sent.network.nodes.places_m
         for node, camera_m in zip(self._view.nodes, cameras_m, strict=True):
@@ -358,9 +357,7 @@ class DeliveryDrawing:
         if len(pairs):
             self._lines("routes", self._places_m[pairs])
 
-    def _mark(
-        self, name: str, place_m: FloatArray, color: Number, size: float = 1.0
-    ) -> viser.IcosphereHandle:
+    def _mark(self, name: str, place_m: FloatArray, color: Color, size: float = 1.0) -> viser.IcosphereHandle:
         radius_m = 0.028 * size * self._size_m
         return self._scene.add_icosphere(
             f"{self._below}/{name}", radius=radius_m, color=color, position=place_m
@@ -385,13 +382,13 @@ def _dark(aspect: float) -> np.ndarray:
     return np.full((12, max(1, round(12 * aspect)), 3), 48, np.uint8)
 
 
-def _state_color(down: bool, share: float) -> Number:
+def _state_color(down: bool, share: float) -> Color:
     if down:
         return DOWN
     return _between(BUSY, DELIVERED, share)
 
 
-def _between(first: Number, second: Number, share: float) -> Number:
+def _between(first: Color, second: Color, share: float) -> Color:
     """Return a colour between two others."""
     start, end = np.array(first, float), np.array(second, float)
     red, green, blue = np.rint(start + share * (end - start)).astype(int).tolist()

@@ -8,7 +8,8 @@ import numpy as np
 
 from app.dock.dock import time_text
 from app.drawing.colors import LOSS
-from app.screens.network.delivery_draw import BUSY, DOWN, EMPTY, FULL, Number
+from app.drawing.timeline import Color
+from app.screens.network.delivery_draw import BUSY, DOWN, EMPTY, FULL
 from app.screens.network.delivery_view import DeliveryView, MomentView
 from app.screens.network.labels import ANSWER, CAUSES, PACKET_COLORS, PACKET_NAMES
 from app.screens.network.view import What
@@ -249,7 +250,7 @@ def _count(count: int | None) -> str:
     return "–" if count is None else f"{count:,}"
 
 
-def legend(view: DeliveryView) -> Sequence[tuple[str, Number]]:
+def legend(view: DeliveryView) -> Sequence[tuple[str, Color]]:
     """Return the names and colours of the drawing's legend."""
     some = [("camera, nothing arrived", BUSY), ("camera, all arrived", FULL)]
     if any(node.row < 0 for node in view.nodes):

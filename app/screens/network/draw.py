@@ -326,8 +326,8 @@ class Flights:
         return places, self.colors[rows]
 
     def losses(self, now_ns: int, shown_ns: int, at: FloatArray) -> tuple[FloatArray, ByteArray]:
-        """Return places and colours of recent losses: at the receiver that did not get the frame, or at the
-        node that could not send it.
+        """Return (L, 3) places and (L, 3) colours of recent losses, for nodes at places ``at`` (N, 3): at the
+        receiver that did not get the frame, or at the node that could not send it.
         """
         failures = self.failures
         rows = _since(failures, now_ns - shown_ns, now_ns)

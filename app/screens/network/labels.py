@@ -83,8 +83,7 @@ NETWORKS: Mapping[str, Preset] = MappingProxyType(
         ),
         "lora": Preset(
             "LoRa: an image in half a day",
-            "LoRaWAN at 868 MHz: each camera may send one hundredth of the time, and listens to nobody "
-            "before.",
+            "LoRaWAN at 868 MHz: each camera may send one hundredth of the time, and does not listen before.",
         ),
         "street-grid": Preset(
             "Street grid: vehicles and access points",

@@ -167,14 +167,14 @@ class DeliveryNumbers:
         self._values: Numbers = {}
 
     def with_plan(self, scene: str, view: DeliveryView, frames: Frames, planned: Numbers) -> Numbers:
-        """Return ``numbers`` and those of the plan; empty until the delivery's last moment is there."""
+        """Return ``numbers`` and those of the plan; empty until the delivery's last moment is computed."""
         if self._of is None or self._of[0] != scene or self._of[1] is not view:
             self._of, self._values = (scene, view), numbers(scene, view, frames)
         return {**self._values, **planned} if self._values else {}
 
 
 def numbers(scene: str, view: DeliveryView, frames: Frames) -> Numbers:
-    """Return the fields' values for a delivery of a scene; empty until its last moment is there."""
+    """Return the fields' values for a delivery of a scene; empty until its last moment is computed."""
     end = view.moment_at(view.times_ns[-1])
     if end is None or end.t_ns != view.times_ns[-1]:
         return {}

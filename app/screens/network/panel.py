@@ -173,9 +173,9 @@ class NetworkPanel(Panel):
         if step == self.step:
             with self.ui.atomic():
                 self._forget()
-                self._status.content = Markdown("**Not sent**: {} Change a setting or press *Retry*.").format(
-                    sentence
-                )
+                self._status.content = Markdown(
+                    "**Not sent**: {}. Change a setting or press *Retry*."
+                ).format(sentence.rstrip("."))
 
     def look(self) -> bool:
         """Turn the view to the room with its cameras, or to the streets, once per window shape."""
@@ -248,7 +248,7 @@ class NetworkPanel(Panel):
         self._frames = [Frames(view.run)]
         drawing = self._drawing = DeliveryDrawing(self.scene, self._next_name(), view)
         self._setup.what_if.load(view, drawing.place_m)
-        if self._setup.grant():
+        if self._setup.apply_pending():
             self.ui.post(self._run)
         self._legend.content = legend_html(legend(view))
         self._inspector.load(self._frames, view, drawing)
@@ -313,7 +313,7 @@ class NetworkPanel(Panel):
             self._requested_ns = None
 
     def _take_look(self, look: NetworkLook) -> None:
-        """Run the network that a stop of a lesson sets; go to the stop's place when the frames are there."""
+        """Run the network that a stop of a lesson sets; go to the stop's place once it is simulated."""
         with self.ui.atomic():
             self._setup.take(look)
         self._look = look

@@ -45,8 +45,8 @@ def show(name: str, handle: Any, text: str) -> None:
             value = None
     if value is None:
         raise InputError(
-            f"The address has {name}={text[:40]} for the Network screen, whose control does "
-            "not accept this value"
+            f"The address has {name}={text[:40]}, which the control of the Network screen does not accept; "
+            "set the control there"
         )
     if handle.value != value:
         handle.value = value

@@ -191,7 +191,7 @@ class NetworkSetup:
         for name, text in values.items():
             try:
                 if name not in handles:
-                    raise InputError(f"The address has {name[:40]}, but this network has no such control")
+                    raise InputError(f"The address has {name[:40]}, no control of this network; leave it out")
                 show(name, handles[name], text)
             except InputError as error:
                 wrong.append(error)
@@ -199,11 +199,11 @@ class NetworkSetup:
             self._read_text()
         except InputError as error:
             wrong.append(error)
-        self.grant()
+        self.apply_pending()
         if wrong:
             raise wrong[0]
 
-    def grant(self) -> bool:
+    def apply_pending(self) -> bool:
         """Apply node settings that were requested before the nodes existed. Returns whether any were."""
         pending, what_if = self._pending, self.what_if
         if not pending or not what_if.in_room:
@@ -258,7 +258,7 @@ class NetworkSetup:
         self._moments.value = FEWEST if look.plan.show else MOMENTS
         self.what_if.forget()
         self._pending = {"off": look.off} if look.off else {}
-        self.grant()
+        self.apply_pending()
         self._extra = look.settings
         self._text.value = " ".join(look.settings)
 

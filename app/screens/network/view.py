@@ -81,7 +81,7 @@ class Series:
     t_s: FloatArray
     """(T,) middles of the intervals, or their ends for cumulative quantities."""
     values: FloatArray
-    """(T,) values, NaN without a value."""
+    """(T,) values, NaN where there is none."""
 
 
 @dataclass(frozen=True, slots=True)

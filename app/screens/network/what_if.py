@@ -17,7 +17,7 @@ from network_sim.radio.propagation import IEEE80211B
 from pipeline.kernels.geometry import rigid, rotation_exp
 from pipeline.types import FloatArray
 
-NOBODY = "none"
+NO_NODE = "none"
 SINK = "sink"
 RETRIES: dict[str, tuple[str, ...]] = {
     "standard": (),
@@ -57,10 +57,10 @@ class WhatIf:
         """(2,) place of every node and of the sink before anything was moved."""
         self._moved_m: dict[str, FloatArray] = {}
         self._drawn: list[Any] = []
-        self._off = gui.add_dropdown("Switch off", [NOBODY], hint="Node that has failed and sends nothing.")
+        self._off = gui.add_dropdown("Switch off", [NO_NODE], hint="Node that has failed and sends nothing.")
         self._walled = gui.add_dropdown(
             "Wall at",
-            [NOBODY],
+            [NO_NODE],
             hint="Puts a wall between this node and the sink, which also blocks nodes straight behind; it "
             "has no effect on serial lines, recorded links and cellular modules.",
         )
@@ -85,7 +85,7 @@ class WhatIf:
             "radios have one rate each, set by Medium access.",
         )
         self._mover = gui.add_dropdown(
-            "Move radio of", [NOBODY], hint="Node whose radio the arrows move; its camera stays in place."
+            "Move radio of", [NO_NODE], hint="Node whose radio the arrows move; its camera stays in place."
         )
         self._text = gui.add_markdown(Markdown(""))
         self._visible = True
@@ -98,7 +98,7 @@ class WhatIf:
     @property
     def off(self) -> tuple[str, ...]:
         """The failed node, if any."""
-        return () if self._off.value == NOBODY else (self._off.value,)
+        return () if self._off.value == NO_NODE else (self._off.value,)
 
     @property
     def count(self) -> int:
@@ -137,7 +137,7 @@ class WhatIf:
     def forget(self) -> None:
         """Remove all faults."""
         for handle in (self._off, self._walled):
-            handle.value = NOBODY
+            handle.value = NO_NODE
         self._wall_db.value = WALL_DB
         self._retries.value = next(iter(RETRIES))
         self._rate.value = next(iter(RATES))
@@ -145,7 +145,7 @@ class WhatIf:
 
     def put_back(self) -> None:
         """Put all radios back to their cameras; remove the drawn arrows and wall, not the wall's setting."""
-        self._mover.value = NOBODY
+        self._mover.value = NO_NODE
         self._moved_m.clear()
         self._text.content = Markdown("")
         self.clear()
@@ -188,17 +188,17 @@ class WhatIf:
         """
         for handle in (self._off, self._walled, self._mover):
             able = apart if handle is self._mover else handle is self._walled or len(names) > 1
-            options = (NOBODY, *names) if able else (NOBODY,)
+            options = (NO_NODE, *names) if able else (NO_NODE,)
             if tuple(handle.options) != options:
                 chosen = handle.value
                 handle.options = options
-                handle.value = chosen if chosen in options else NOBODY
+                handle.value = chosen if chosen in options else NO_NODE
 
     def _put_back_or_show(self) -> None:
         """Show arrows at the chosen node; without one, all radios go back to their cameras."""
-        self._text.content = Markdown("") if self._mover.value == NOBODY else MOVED_TEXT
+        self._text.content = Markdown("") if self._mover.value == NO_NODE else MOVED_TEXT
         self._draw()
-        if self._mover.value == NOBODY and self._moved_m:
+        if self._mover.value == NO_NODE and self._moved_m:
             self._moved_m.clear()
             self._on_change()
 
@@ -254,7 +254,7 @@ class WhatIf:
             self._on_change()
 
     def put(self, name: str, place_m: FloatArray) -> bool:
-        """Move a radio without recomputing. Returns whether the node exists."""
+        """Move a radio to a (2,) place without recomputing. Returns whether the node exists."""
         if name in self._places_m:
             self._moved_m[name] = place_m
         return name in self._places_m

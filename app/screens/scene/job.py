@@ -36,7 +36,7 @@ def scene_job(store: Store, spec: Spec) -> Generator[Progress, None, SceneView]:
 
 
 def averaged_view(rig: Rig) -> AveragedView | None:
-    """Return numbers on the averaged depth of cameras that stand; None if no depth is averaged.
+    """Return numbers on the averaged depth of cameras at rest; None if no depth is averaged.
 
     Over several cameras, counts are the largest, shares the mean, and the standard deviation the median.
     """

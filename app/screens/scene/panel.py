@@ -174,7 +174,7 @@ class ScenePanel(Panel):
 
     def _use_recording(self, read: ReadRecording | None) -> None:
         if read is None:
-            self._own.show_notes(("Nothing could be used.",))
+            self._own.show_notes(("Nothing could be used. Add another file.",))
             return
         self._own.show_notes(read.notes)
         self.session.want(dataclasses.replace(self.session.spec, source=read.source))

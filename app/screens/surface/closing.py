@@ -15,10 +15,10 @@ from pipeline.types import FloatArray
 
 JOB = "surface.closing_job:closing_job"
 LOOKING = Markdown("Judging up to 500 free places …")
-STALE = Markdown("The surface is being computed again; ask when it is there.")
+STALE = Markdown("The surface is being computed again; press the button once it is shown.")
 LEAST_NAMED = 0.005
 """Least share of a hole on dark surface that the sentence names."""
-SILENT = Markdown("There is no result: the computation was replaced or failed. Press the button again.")
+NO_ANSWER = Markdown("There is no result: the computation was replaced or failed. Press the button again.")
 
 
 class HoleClosing:
@@ -70,7 +70,7 @@ class HoleClosing:
     def _came(self, answer: ClosingView | None) -> None:
         """Show the camera, unless another hole has been chosen meanwhile."""
         if answer is None:
-            self._text.content = SILENT if self._hole is not None else Markdown("")
+            self._text.content = NO_ANSWER if self._hole is not None else Markdown("")
             return
         if (answer.which, answer.index) != self._hole:
             return

@@ -79,7 +79,7 @@ class SurfaceDrawing:
             shorten(handles, 0)
 
     def show(self, visible: bool, rims: bool, offset_m: FloatArray, top_m: FloatArray | None) -> None:
-        """Show or hide the surface at an offset, with its name at ``top_m``; None shows no name."""
+        """Show or hide the surface at a (3,) offset, with its name at ``top_m`` (3,); None shows no name."""
         self._frame.visible = visible
         self._frame.position = offset_m
         self._rims_shown = rims

@@ -22,7 +22,7 @@ class HoleDrawing:
         self._handles: list[viser.SceneNodeHandle] = []
 
     def draw(self, hole: HoleView, name: str, offset_m: FloatArray) -> None:
-        """Draw this hole in place of the last; ``offset_m`` is the offset of its surface."""
+        """Draw this hole in place of the last; ``offset_m`` is the (3,) offset of its surface."""
         self.clear()
         points, colors = tape(hole.loop_m)
         loop = self._scene.add_line_segments(

@@ -1,4 +1,4 @@
-"""Slider for the number of frames that are averaged, for a recording whose camera stands."""
+"""Slider for the number of frames that are averaged, for a recording whose camera is at rest."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ shorter than 1 m, with surface all around it; at an *outer rim* the surface ends
 list has the {} largest holes and the {} longest outer rims, also those that no camera sees."""
 ).format(LISTED_HOLES, LISTED_RIMS)
 LOOKING = Markdown("Looking for the cause …")
-SILENT = Markdown("There is no result: the computation was replaced or failed. Click the hole again.")
+NO_CAUSE = Markdown("There is no result: the computation was replaced or failed. Click the hole again.")
 FILL_MOST_CM = 100.0
 FILL_OFF = Markdown(
     "Filling is off. Drag the slider to close small holes with an invented surface, and compare its error."
@@ -90,10 +90,14 @@ class HolesFolder:
         self._filled = ui.gui.add_markdown(FILL_OFF)
 
     def load(self, holes: Mapping[Which, tuple[HoleView, ...]], shown: Which | None) -> None:
-        """Take the holes of the surfaces, and list those of the surface that is shown alone (``shown``).
+        """Take the holes of the surfaces, and list those of one surface.
 
         A hole stays chosen if its surface and ``shown`` are unchanged. A new surface after fusion is not
         filled, so the slider returns to off.
+
+        Args:
+            holes: holes of each surface.
+            shown: the surface that is shown alone, whose holes are listed; None if two are shown, or none.
         """
         same = {which: _alike(holes.get(which, NOTHING), self._holes.get(which, NOTHING)) for which in WHICH}
         self._holes = dict(holes)
@@ -147,7 +151,7 @@ class HolesFolder:
         if self._index is None:
             return
         if answer is None:
-            self._why.content = SILENT
+            self._why.content = NO_CAUSE
         elif (answer.which, answer.index) == (self._which, self._index):
             self._why.content = reason_text(answer.found)
             self._shares.content = shares_table(answer.found)

@@ -121,13 +121,13 @@ def _rule(view: SurfaceView) -> Markup:
 
 
 def _price(view: SurfaceView) -> Markup:
-    """Return a sentence if the surface after fusion has a lower F-score than before; else empty."""
+    """Return a sentence if the F-score, to 0.1 %, is lower after fusion than before; else empty."""
     if view.before is None or view.before.truth is None or view.after.truth is None:
         return Markup("")
-    before, after = (mesh.truth["f_score_5cm"] for mesh in (view.before, view.after) if mesh.truth)
+    before, after = (round(mesh.truth["f_score_5cm"], 3) for mesh in (view.before, view.after) if mesh.truth)
     if after >= before:
         return Markup("")
     return Markup(
-        "<div style='padding: 0.4em 0.8em; font-size: 13px'>Fewer holes have a price here: inferred "
-        "surface fills them, and the F-score falls from {:.1%} to {:.1%}.</div>"
+        "<div style='padding: 0.4em 0.8em; font-size: 13px'>Filling holes with inferred surface has a price "
+        "here: the F-score falls from {:.1%} to {:.1%}.</div>"
     ).format(before, after)

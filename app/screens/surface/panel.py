@@ -210,7 +210,7 @@ class SurfacePanel(Panel):
             self._show_look()
             self._lessons.refresh()
             if labels.BASELINES.get(self._shown.value) not in (None, *self._baselines.views):
-                self._picked_shown()  # the address asked for a baseline before there was a surface
+                self._picked_shown()  # the address requested a baseline before there was a surface
             self._walks.folder.resume()
 
     def _show_numbers(self) -> None:

@@ -190,7 +190,10 @@ class RollingFolder:
 
 
 def front_lane(view: WalkView) -> CurvesLane:
-    """Return a lane with the triangles and open edges after each step, on separate scales."""
+    """Return a lane with the numbers of triangles, front edges and rim edges, each on a scale of its own.
+
+    The edges are counted after at most ``SAMPLES`` evenly spaced steps.
+    """
     steps = np.unique(np.linspace(0, view.steps, min(view.steps, SAMPLES) + 1).astype(int))
     open_edges = [view.open_edges(int(done)) for done in steps]
     counts = {

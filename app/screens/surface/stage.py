@@ -65,7 +65,12 @@ class SurfaceStage:
         return self._offset_m if which == "after" else -self._offset_m
 
     def aimed_at(self, origin_m: FloatArray, direction: FloatArray) -> Which:
-        """Return the shown surface whose middle a ray, world frame, passes at the smallest angle."""
+        """Return the shown surface whose middle a ray passes at the smallest angle.
+
+        Args:
+            origin_m: (3,) origin of the ray, world frame.
+            direction: (3,) direction of the ray, world frame.
+        """
 
         def along(which: Which) -> float:
             there_m = self._middle_m + self.offset_m(which) - origin_m

@@ -128,6 +128,7 @@ class ClosingCamera:
     """The camera that would measure most of a hole."""
 
     T_world_camera: FloatArray
+    """(4, 4) pose."""
     where: str
     """Kind of place, as in ``pipeline.planning.places``."""
     height_m: float

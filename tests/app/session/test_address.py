@@ -62,11 +62,11 @@ def test_back_goes_from_place_to_place_and_not_from_moment_to_moment():
         replace(START, added=(("stop", "1"),)),
         replace(START, spec=replace(START.spec, source=Demo("living-room"))),
     ]
-    assert [[one.is_beside(other) for other in there] for one in there] == [
+    assert [[one.is_apart(other) for other in there] for one in there] == [
         [one is not other for other in there] for one in there
     ]
-    assert not replace(START, added=(("t", "5"),)).is_beside(START)
-    assert not replace(START, spec=START.spec.with_preset("thesis")).is_beside(START)
+    assert not replace(START, added=(("t", "5"),)).is_apart(START)
+    assert not replace(START, spec=START.spec.with_preset("thesis")).is_apart(START)
 
 
 @pytest.mark.parametrize(

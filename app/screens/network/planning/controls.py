@@ -54,7 +54,7 @@ class PlanControls:
             "budget": gui.add_text(
                 "Budget (J)",
                 "",
-                hint="Most energy of one image of each new camera together; empty: no limit.",
+                hint="Largest energy for one image of every new camera, all together; empty: no limit.",
             ),
             "deadline": gui.add_text(
                 "Deadline (s)",
@@ -106,7 +106,7 @@ class PlanControls:
                 elif name in handles:
                     show(name, handles[name], text)
                 else:
-                    raise InputError(f"The address has {name[:40]}, but the folder Plan has no such control")
+                    raise InputError(f"The address has {name[:40]}, no control of Plan; leave it out")
             except InputError as error:
                 wrong.append(error)
         if wrong:

@@ -1,4 +1,4 @@
-"""The folder *Plan*: it asks for a plan, shows its ghosts, and follows the one that is dragged."""
+"""The folder *Plan*: it requests a plan, shows its ghosts, and judges the one that is dragged."""
 
 from __future__ import annotations
 
@@ -200,7 +200,7 @@ class PlanFolder:
     # A plan.
 
     def _suggest(self, look: PlanLook) -> None:
-        """Request a plan of the controls' settings, to be shown as a stop or the button *Suggest* says."""
+        """Request a plan of the controls' settings; ``look.show`` sets how it is shown."""
         request = self._controls.request(self._sent())
         surface, newest = key(self._session.spec, "truth"), self._newest
         self.forget()
@@ -219,14 +219,16 @@ class PlanFolder:
                 self._show_as(answer, look)
             else:
                 self._status.content = (
-                    STOPPED if answer is None else Markdown("**No plan**: {}.").format(answer.sentence)
+                    STOPPED
+                    if answer is None
+                    else Markdown("**No plan**: {}.").format(answer.sentence.rstrip("."))
                 )
                 self._on_change()
 
         self._session.side_job("network.planning.plan_job:plan_job", request, on_end=came)
 
     def _show_as(self, plan: PlanView, look: PlanLook) -> None:
-        """Show a plan's ghosts, with the first beside a camera if the stop says so, or what is missed."""
+        """Show a plan's ghosts, the first next to a camera if the stop sets it; or the missed places only."""
         where = tuple(_pose_of(one.T_world_camera) for one in plan.ghosts.ghosts)
         if look.show == "missed":
             self._drawn.draw((), plan.fov_rad, plan.aspect, plan.targets_m, plan.dark)
@@ -276,11 +278,12 @@ class PlanFolder:
 
     @property
     def _where(self) -> Poses:
+        """The present poses of the ghosts."""
         return tuple(self._poses)
 
     @property
     def _sent_now(self) -> Sent:
-        """How the images travel by the screen's settings now."""
+        """The way in which the images travel by the screen's present settings."""
         assert self._plan is not None
         return self._session.spec.sent or self._plan.request.sent
 
@@ -304,20 +307,20 @@ class PlanFolder:
         self._look()
 
     def _dragged(self, row: int, T_world_camera: FloatArray, ended: bool) -> None:
-        """Note a dragged ghost's pose, on the thread of the browser's messages."""
+        """Pass a dragged ghost's pose to the session's thread; called on that of the browser's messages."""
         self._ui.post(self._moved, self._plan, row, T_world_camera, ended)
 
     def _entered(self, T_world_camera: FloatArray) -> None:
         """Move the chosen ghost and its handle to a pose that was entered as numbers."""
-        self._drawn.hold(T_world_camera)
+        self._drawn.move_handle(T_world_camera)
         self._moved(self._plan, self._row, T_world_camera, True)
 
     def _moved(self, plan: PlanView | None, row: int, T_world_camera: FloatArray, ended: bool) -> None:
-        """Move a ghost; judge it as soon as the last judgement is there, and at the end send its image."""
+        """Move a ghost and judge it, once the judgement before has ended; when released, send its image."""
         if plan is None or plan is not self._plan:
             return
         self._poses[row] = _pose_of(T_world_camera)
-        self._drawn.stand(row, T_world_camera)
+        self._drawn.move_frustum(row, T_world_camera)
         self._stale, self._arrivals, self._placed = True, (), self._places
         self._caption.content = BEFORE
         if not self._judging:
@@ -368,7 +371,7 @@ class PlanFolder:
     # Files.
 
     def _save(self, label: str, client: viser.ClientHandle | None) -> None:
-        """Send a file of the plan to the browser that asked for it."""
+        """Send a file of the plan to the browser in which its button was pressed."""
         offer = next((one for offers in self.offers() for one in offers.files if one.label == label), None)
         if offer is None or client is None:
             return

@@ -39,7 +39,7 @@ JUDGED: Mapping[str, str] = MappingProxyType(
 """How promises were judged: test rooms, cameras taken there, rank correlation of promised and real gain, its
 goal, and real gains inside the 95 % interval (SPEC 12, docs/results/planning.json)."""
 NUMBERS = (*PLANNED, "own", "own_overlap", "promised", "real", *JUDGED)
-"""Fields of a plan, of the ghost that the pupil placed, of the camera that was added, and of test rooms."""
+"""Fields of a plan, of the ghost that the user placed, of the camera that was added, and of test rooms."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,9 +47,9 @@ class PlanLook:
     """State of the folder *Plan* at a stop."""
 
     show: Literal["", "none", "missed", "beside", "suggest"] = ""
-    """Nothing is changed; no plan; the unmeasured places alone; a ghost beside a camera; the suggestion."""
+    """Nothing is changed; no plan; the unmeasured places alone; a ghost next to a camera; the suggestion."""
     beside: str = ""
-    """Name of the present camera beside which the ghost stands."""
+    """Name of the present camera next to which the ghost is."""
     away_m: float = 0.0
     """Distance of the ghost to the camera's right."""
     cameras: int = 1
@@ -121,12 +121,12 @@ def beside(plan: PlanView, look: PlanLook) -> FloatArray:
 
 @dataclass(frozen=True, slots=True)
 class PlanState:
-    """What a plan's numbers are of."""
+    """The plan and the results that the numbers of a lesson describe."""
 
     plan: PlanView | None
     """The plan of the surface that is shown, whether or not its ghosts are; None if there is none."""
     pending: bool
-    """Whether a plan, or where its ghosts are moved their promise, is being computed."""
+    """Whether a plan, or the promise of its ghosts where they were moved to, is being computed."""
     ghosts: GhostsView | None
     """None while there are no ghosts, or they are being judged."""
     row: int
@@ -134,7 +134,7 @@ class PlanState:
     arrivals: tuple[Arrival, ...]
     """Empty while they are computed."""
     own: tuple[PromiseView, float] | None
-    """Promise and overlap of the ghost that the pupil placed last; None if none was moved."""
+    """Promise and overlap of the ghost that the user placed last; None if none was moved."""
     taken: TakenView | None
     """The camera that was added last."""
 

@@ -128,7 +128,7 @@ def seconds_text(seconds: float) -> str:
 
 
 def delivery_bars(arrivals: Sequence[Arrival], deadline_s: float | None) -> Markup:
-    """Return HTML of a bar for each ghost's image: from the start until 90 %, and on until 99 % are there."""
+    """Return HTML of a bar for each ghost's image: until 90 % of it have arrived, then until 99 % have."""
     ends_s = [one.seconds_to_99_s for one in arrivals if math.isfinite(one.seconds_to_99_s)]
     whole_s = 1.05 * max([*ends_s, deadline_s or 0.0], default=1.0)
     lines, line = [], _deadline(deadline_s, whole_s)
@@ -154,7 +154,7 @@ def _deadline(deadline_s: float | None, whole_s: float) -> Markup:
 
 
 def kept_sentence(taken: TakenView) -> Markdown:
-    """Return markdown: the promise of a camera that was added, beside what it really added."""
+    """Return markdown: the promise of a camera that was added, and its real gain."""
     low, high = taken.promise.ci95_share
     real, gain = taken.real_share, taken.promise.gain_share
     text = Markdown(

@@ -68,7 +68,7 @@ def _pose(T_world_camera: FloatArray | None) -> Pose:
 
 
 def _ignored(request: PlanRequest) -> list[str]:
-    """Return sentences on what a plan leaves out, and on settings of the screen that it takes otherwise."""
+    """Return sentences on what a plan leaves out, and on settings of the screen that have no effect on it."""
     notes = []
     if not request.dark_surface:
         notes.append("Surface that looks dark to a present sensor is left out of this plan")

@@ -66,7 +66,10 @@ def _without_dark(place: Place) -> Place:
 def _planned(
     store: Store, spec: Spec, whole: Place, place: Place, request: PlanRequest
 ) -> Generator[Progress, None, tuple[Plan, PlanDelivery]]:
-    """Plan on a place, with candidates of the whole one: this or the same without dark surface."""
+    """Return a plan for ``place``, which is ``whole`` or the same without dark surface.
+
+    The candidates are judged on ``whole``, once for both.
+    """
     config, done = config_of(request), place.done
     rig, radio = sending_of(place, request)
     sensor = sensor_named(request.sensor, done.rig)

@@ -66,7 +66,7 @@ def take_job(
 
 
 def with_camera(rig: Rig, demo: str, lens: CameraIntrinsics, T_world_camera: FloatArray) -> Rig:
-    """Return the rig of a demo room with one more camera, rendered as the room's own cameras are.
+    """Return the rig of a demo room with one more camera at a (4, 4) pose, rendered as the room's own are.
 
     Raises:
         InputError: the rig has no truth.

@@ -27,13 +27,13 @@ class Taking:
     """Adds the chosen ghost to a demo room."""
 
     def __init__(self, session: PanelSession, on_change: Callable[[], None]) -> None:
-        """Add button and sentence to the current container; ``on_change`` hears of an added camera."""
+        """Add button and sentence to the current container; ``on_change`` is called for an added camera."""
         self._session, self._on_change = session, on_change
         self.taken: TakenView | None = None
         """The camera to which the sentence belongs; None if there is none."""
         self._rooms: dict[Source, tuple[str, int]] = {}
         """By the rigs that were made here: their demo room, and how many cameras were added to it."""
-        self._told = key(session.spec, "truth")
+        self._surface = key(session.spec, "truth")
         """The surface to which the sentence belongs."""
         self._awaited = False
         """Whether a camera is being added."""
@@ -51,8 +51,8 @@ class Taking:
 
     def on_spec(self, spec: Spec) -> None:
         """Remove the sentence on a camera when the surface is another one."""
-        if key(spec, "truth") != self._told:
-            self._told, self._text.content, self.taken = key(spec, "truth"), Markdown(""), None
+        if key(spec, "truth") != self._surface:
+            self._surface, self._text.content, self.taken = key(spec, "truth"), Markdown(""), None
 
     def offer(self, pose: Pose | None, sensor: str) -> None:
         """Offer a ghost with this sensor, if it can be rendered; None offers none."""
@@ -90,7 +90,7 @@ class Taking:
                 return
             self._rooms[taken.source] = demo, added + 1
             larger = replace(session.spec, source=taken.source)
-            self._told, self.taken = key(larger, "truth"), taken
+            self._surface, self.taken = key(larger, "truth"), taken
             session.want(larger)
             self._text.content = kept_sentence(taken)
             self._on_change()

@@ -18,7 +18,7 @@ Poses: TypeAlias = tuple[Pose, ...]
 
 @dataclass(frozen=True, slots=True)
 class PlanRequest:
-    """What is planned, and how the images travel."""
+    """The cameras to plan, and how their images travel."""
 
     sent: Sent
     cameras: int
@@ -49,6 +49,7 @@ class Ghost:
     """A camera that is not there yet."""
 
     T_world_camera: FloatArray
+    """(4, 4) pose."""
     where: str
     """Kind of place, or ``pipeline.planning.plan.BY_HAND``."""
     height_m: float
@@ -106,7 +107,7 @@ class PlanView:
     at_least_of_best: float
     candidates: int
     ruled_out: str
-    """By what other candidates were barred, if any were, as the end of a sentence on these."""
+    """End of a sentence: that the radio or the deadline ruled out other candidates; empty if none were."""
     image_bytes: int
     """Bytes that count for an image of a new camera."""
     least_overlap: float

@@ -8,7 +8,7 @@ import pytest
 
 from app.compute.records import Picture
 from app.compute.state import Spec
-from app.screens.depth.hide import BESIDE, BUTTON, SILENT, WAITING, HideFolder, fills_table, painted_line
+from app.screens.depth.hide import BUTTON, NO_POINT, NO_RESULT, WAITING, HideFolder, fills_table, painted_line
 from app.screens.depth.labels import AS_IN_FILE, FILLS
 from app.screens.depth.model import LIMIT_BYTES, SHIPPED, ModelFolder
 from app.screens.depth.numbers import LINES, fitted_line
@@ -102,7 +102,7 @@ def test_a_click_beside_the_cloud_says_so_and_paints_nothing(hide):
     hide.gui.set("Brush", True)
     hide.folder.clicked(np.array([0.0, 1.0, 0.0]), FORWARD)
     assert hide.folder.discs == ()
-    assert BESIDE in hide.gui.text()
+    assert NO_POINT in hide.gui.text()
     assert hide.painted is None
 
 
@@ -124,7 +124,7 @@ def test_the_answer_is_shown_and_forgotten_with_other_settings(hide):
     assert not hide.gui.all("image")
     assert "1,234" not in hide.gui.text()
     hide.folder.load(None)
-    assert SILENT in hide.gui.text()
+    assert NO_RESULT in hide.gui.text()
 
 
 def test_the_table_has_every_way_with_its_errors():
