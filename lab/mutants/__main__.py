@@ -12,7 +12,7 @@ from itertools import repeat
 from pathlib import Path
 
 from lab.mutants.mutations import GROUPS, Mutation, draw
-from lab.mutants.page import page, scored
+from lab.mutants.page import page, reasons, scored
 from lab.mutants.testing import copied, digest, sees, time_limit_s
 from lab.trials import ROOT
 from packetmesh.errors import InputError
@@ -53,7 +53,7 @@ def answered(copies: list[Path], drawn: list[Mutation], answers: Path) -> list[b
     """Return whether the tests see each mutant; test those whose answer is not in the file, and add it.
 
     An answer counts as long as the module is unchanged, and the test that failed or, if none did, all tests
-    that run for it.
+    that run for it. Those that ``page.WHYS`` calls equivalent are not tested: no test can see them.
 
     Args:
         copies: copies of the repository; as many mutants are tested at once.
@@ -63,7 +63,8 @@ def answered(copies: list[Path], drawn: list[Mutation], answers: Path) -> list[b
     Raises:
         InputError: a test fails without a fault, or tests were killed.
     """
-    seen = _read(answers, copies[0], drawn)
+    seen = dict.fromkeys((one.name for one in drawn if one.place in reasons().equivalent), False)
+    seen |= _read(answers, copies[0], drawn)
     waiting = [one for one in drawn if one.name not in seen]
 
     def work(mutation: Mutation, limit_s: float) -> None:

@@ -15,15 +15,26 @@ result, and the sentence says why; of the others it says why no test sees them."
 
 
 @dataclass(frozen=True, slots=True)
+class Reasons:
+    """Sentences of ``WHYS`` by ``Mutation.place``."""
+
+    equivalent: dict[str, str]
+    other: dict[str, str]
+
+
+def reasons() -> Reasons:
+    """Read ``WHYS``."""
+    return Reasons(**json.loads(WHYS.read_text(encoding="utf-8")))
+
+
+@dataclass(frozen=True, slots=True)
 class Score:
     """Which of the drawn mutants were seen."""
 
     drawn: Sequence[Mutation]
     seen: Sequence[bool]
     """In the order of ``drawn``."""
-    equivalent: dict[str, str]
-    """Reasons of ``WHYS``."""
-    other: dict[str, str]
+    reasons: Reasons
 
     @property
     def survivors(self) -> list[Mutation]:
@@ -33,7 +44,7 @@ class Score:
     @property
     def equivalents(self) -> list[Mutation]:
         """The survivors that change no result (equivalent mutants)."""
-        return [one for one in self.survivors if one.place in self.equivalent]
+        return [one for one in self.survivors if one.place in self.reasons.equivalent]
 
     @property
     def share(self) -> float:
@@ -43,8 +54,7 @@ class Score:
 
 def scored(drawn: Sequence[Mutation], seen: Sequence[bool]) -> Score:
     """Return the score of drawn mutants, with the reasons of ``WHYS``."""
-    whys = json.loads(WHYS.read_text(encoding="utf-8"))
-    return Score(drawn, seen, whys["equivalent"], whys["other"])
+    return Score(drawn, seen, reasons())
 
 
 def page(score: Score, seed: int) -> str:
@@ -78,6 +88,6 @@ def page(score: Score, seed: int) -> str:
 
 def _row(one: Mutation, score: Score) -> str:
     source = one.source.replace("|", r"\|")
-    why = score.equivalent.get(one.place) or score.other.get(one.place, "")
-    kind = "yes" if one.place in score.equivalent else "no"
-    return f"| line {one.line}, `{source}`: `{one.name}` | {kind} | {why} |"
+    whys = score.reasons.equivalent | score.reasons.other
+    kind = "yes" if one.place in score.reasons.equivalent else "no"
+    return f"| line {one.line}, `{source}`: `{one.name}` | {kind} | {whys.get(one.place, '')} |"

@@ -12,7 +12,7 @@ pytest.importorskip("cosmic_ray", reason="cosmic-ray is installed for make mutan
 from lab.mutants import mutations, testing
 from lab.mutants.__main__ import answered
 from lab.mutants.mutations import Mutation, draw
-from lab.mutants.page import WHYS, Score, page
+from lab.mutants.page import WHYS, Reasons, Score, page
 from packetmesh.errors import InputError
 
 FAILED = "FAILED tests/shop/half/test_half.py::test_half - assert 4 == 1\n1 failed in 0.1s\n"
@@ -146,12 +146,21 @@ def test_what_was_compiled_is_kept_but_for_the_module_and_all_that_import_it(tmp
     assert [path.relative_to(tmp_path / testing.FAULTY).as_posix() for path in kept] == names[2:]
 
 
+def test_a_mutant_that_is_known_to_change_no_result_is_not_tested(copy, monkeypatch, tmp_path):
+    one = _doubles(copy)
+    monkeypatch.setattr("lab.mutants.__main__.reasons", lambda: Reasons({one.place: "The same."}, {}))
+    assert not _exits(monkeypatch)
+    assert answered([copy], [one], tmp_path / "answers.jsonl") == [False]
+
+
 def test_reasons_belong_to_a_source_line_and_equivalent_mutants_are_counted_apart():
     same = Mutation("mac", "shop/half.py", "core/NumberReplacer", 0, 1, "LIMIT = 3 | 4")
     others = [replace(same, occurrence=k, line=k) for k in range(2, 6)]
     moved = replace(same, source="LIMIT = 5", line=9)
     seen = [False, True, True, True, False, False]
-    score = Score([same, *others, moved], seen, {same.place: "The same."}, {others[-1].place: "Rare."})
+    score = Score(
+        [same, *others, moved], seen, Reasons({same.place: "The same."}, {others[-1].place: "Rare."})
+    )
     assert score.share == 3 / 5
     text = page(score, 7)
     assert '`make mutants ARGS="--count 6 --seed 7"` plants 6 faults' in text
