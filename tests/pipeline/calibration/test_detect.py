@@ -9,6 +9,7 @@ import pytest
 from packetmesh.errors import InputError
 from pipeline.calibration import chessboard
 from pipeline.calibration.board import Board
+from pipeline.calibration.circles import _grid_name
 from pipeline.calibration.detect import detect
 from tests.pipeline.calibration.views import photograph, poses, seen
 
@@ -180,6 +181,12 @@ def test_an_even_number_of_shifted_rows_without_its_mark_may_be_upside_down_and_
     assert not found.oriented
     truth = seen(board, T)
     assert min(np.abs(found.points_px - one).max() for one in (truth, truth[::-1])) < 0.5
+
+
+def test_the_rows_of_a_grid_are_named():
+    """As in: 4 x 11 circles in shifted rows are seen, not ..."""
+    assert _grid_name(Board("circles-asymmetric", 4, 11, 0.02)) == "4 x 11 circles in shifted rows"
+    assert _grid_name(Board("circles", 4, 11, 0.02)) == "4 x 11 circles in straight rows"
 
 
 def test_more_circles_than_the_board_has_are_not_called_some_of_them():

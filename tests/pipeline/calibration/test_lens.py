@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from packetmesh.errors import ReconstructionError
+from pipeline.calibration import fisheye
 from pipeline.calibration.board import Board
 from pipeline.calibration.estimate import View, calibrate, held_out, place, rms_px
 from pipeline.calibration.lens import FREE, Optics
@@ -88,6 +89,21 @@ def test_a_fisheye_is_found_and_is_as_sure_as_it_says():
         found = calibrate(fisheye_views(0.2, seed), (640, 480), "fisheye")
         scores += [(found.parameters[name] - truth[name]) / sd for name, sd in found.standard_errors.items()]
     assert 0.75 < np.std(scores) < 1.25
+
+
+def test_a_fisheye_is_found_from_a_start_whose_first_steps_lead_astray():
+    """From a third of the focal length: steps that make it worse are taken back and shortened."""
+    truth = fisheye._optics(np.array([300.0, 300.0, 319.5, 239.5, -0.02, 0.005, 0.0, 0.0]))
+    rng, board = np.random.default_rng(0), Board("chessboard", 6, 5, 0.05)
+    poses = [
+        rigid(rotation_exp(rng.uniform(-0.5, 0.5, 3)), [*rng.uniform(-0.2, 0.1, 2), rng.uniform(0.25, 0.5)])
+        for _ in range(8)
+    ]
+    given = [(board.points_m, truth.project(board.points_m, T)) for T in poses]
+    start = fisheye._optics(np.array([100.0, 100.0, 300.0, 250.0, 0.0, 0.0, 0.0, 0.0]))
+    cost, found, _ = fisheye.adjust(given, start, poses)
+    assert cost < 1e-15
+    np.testing.assert_allclose(found.matrix, truth.matrix, atol=1e-6)
 
 
 def test_fisheye_views_that_were_held_out_are_predicted():

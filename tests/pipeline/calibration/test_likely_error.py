@@ -8,7 +8,7 @@ import pytest
 from packetmesh.errors import InputError
 from pipeline.calibration.estimate import View, calibrate, settle
 from pipeline.calibration.lens import Optics
-from pipeline.calibration.likely_error import LikelyError, likely_error
+from pipeline.calibration.likely_error import LikelyError, _bends_m, likely_error
 from pipeline.calibration.trust import sight
 from pipeline.kernels.geometry import apply
 from tests.pipeline.calibration.test_trust import BOARD, SIZE, board_poses, views
@@ -116,6 +116,15 @@ def test_equal_views_give_equal_draws():
 
 def test_views_without_any_noise_give_a_camera_that_is_surely_right():
     assert likely_error(calibrate(views(0.0, 0), SIZE), RANGE_M).within(1e-4, 0.95) == 1.0
+
+
+def test_a_bend_of_one_lifts_the_middle_of_the_longer_edge_by_half_its_length():
+    """Of a board of 0.4 m by 0.2 m: x^2 and y^2 in units of its larger half side, and x y."""
+    board_m = np.array([[x, y, 0.0] for x in (1.0, 1.2, 1.4) for y in (2.0, 2.2)])
+    bends_m = _bends_m(board_m)
+    np.testing.assert_allclose(bends_m[:, 0], 0.2 * np.repeat([1.0, 0.0, 1.0], 2), atol=1e-12)
+    np.testing.assert_allclose(bends_m[:, 1], 0.2 * 0.25, atol=1e-12)
+    np.testing.assert_allclose(bends_m[:, 2], 0.2 * np.array([0.5, -0.5, 0.0, 0.0, -0.5, 0.5]), atol=1e-12)
 
 
 def test_shares_and_probabilities_on_paper():
