@@ -167,7 +167,7 @@ class _Subset:
     ) -> tuple[IntArray, IntArray]:
         """Return (M,) rows of ``queries``, now at (n, 3) ``places_m``, and of their nearest points here."""
         count = min(neighbours, len(self.points_m))
-        if count > 1 or len(self.points_m) == 1 or self.features is not None:
+        if count > 1 or self.features is not None:
             queries_m = _stacked(places_m, queries.features)
             found = np.asarray(self._any_tree.query(queries_m, k=count, workers=-1)[1]).reshape(-1)
             return np.repeat(np.arange(len(places_m)), count), found
@@ -200,10 +200,10 @@ class _Partners:
     """
 
     def __init__(self, tree: KdTree, count: int) -> None:
-        """Prepare for ``count`` points that are matched to the points of a tree, at least two."""
+        """Prepare for ``count`` points that are matched to the points of a tree."""
         self._tree = tree
         self._two = np.full((count, 2), -1, dtype=np.intp)
-        """Nearest and second nearest point, in the tree's order; -1 if it is beyond the search radius."""
+        """Nearest and second nearest point, in the tree's order; -1 if it is beyond the search radius or there is none."""
         self._places_m = np.zeros((count, 3))
         """Position of each point at its last search."""
         self._clear_m = np.full((count, 2), -np.inf)

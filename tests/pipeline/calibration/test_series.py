@@ -62,6 +62,19 @@ def test_names_of_one_camera_are_left_alone(patterns):
     check_one_camera(files)
 
 
+@pytest.mark.parametrize(
+    ("patterns", "alone"),
+    [
+        (("left-{:04d}.jpg", "right-{:04d}.jpg"), "left*.jpg"),
+        (("{:04d}_left.png", "{:04d}_right.png"), "*_left.png"),
+        (("1{:03d}_camA.png", "1{:03d}_camB.png"), "*_camA.png"),
+    ],
+)
+def test_the_pattern_of_one_camera_keeps_what_its_names_end_with(patterns, alone):
+    with pytest.raises(InputError, match=re.escape(f'alone by "{alone}"')):
+        check_one_camera(named(*patterns))
+
+
 def test_each_remedy_of_the_refusal_works(tmp_path):
     for path in named("left-{:04d}.jpg", "right-{:04d}.jpg"):
         Image.new("L", (8, 6)).save(tmp_path / path)

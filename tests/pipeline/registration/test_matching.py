@@ -44,6 +44,19 @@ def _searched(source: PointCloud, target: PointCloud, T: np.ndarray, direction: 
     return pairs
 
 
+@pytest.mark.parametrize("direction", ["q2p", "p2q", "both"])
+@pytest.mark.parametrize("counts", [(1, 50), (50, 1), (1, 1)])
+def test_a_cloud_may_be_one_point(counts, direction):
+    rng = np.random.default_rng(0)
+    source, target = (PointCloud(rng.uniform(-1.0, 1.0, (count, 3))) for count in counts)
+    matcher = Matcher(source, target, direction)
+    for T, gate_m in zip(_walk(rng, 4, 0.1), (0.3, 1.0, 0.1, 2.0, np.inf), strict=True):
+        found = matcher.match(T, gate_m=gate_m)
+        near = found.distances_m <= gate_m
+        pairs = np.stack([found.source_rows, found.target_rows], axis=1)[near]
+        assert set(map(tuple, pairs.tolist())) == _searched(source, target, T, direction, gate_m)
+
+
 @given(
     seed=st.integers(0, 2**32 - 1),
     direction=st.sampled_from(["q2p", "p2q", "both"]),
