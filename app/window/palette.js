@@ -86,12 +86,14 @@
     if (ROOT.classList.contains("packetmesh-alone")) return comeBack();
     ROOT.classList.add("packetmesh-alone");
     document.body.append(back);
+    window.dispatchEvent(new Event("packetmesh-alone"));
     ROOT.requestFullscreen?.().catch(() => {}); // then it fills the window
   }
 
   function comeBack() {
     ROOT.classList.remove("packetmesh-alone");
     back.remove();
+    window.dispatchEvent(new Event("packetmesh-alone"));
     if (document.fullscreenElement) document.exitFullscreen();
   }
   document.addEventListener("fullscreenchange", () => document.fullscreenElement || comeBack());
