@@ -1,4 +1,4 @@
-"""axe-core finds nothing serious on the landing, in a lesson, on any screen with all its folders open and in a
+"""axe-core finds nothing serious on the landing, in a lesson, on any screen with its folders open and in a
 lecture; and the picture in words.
 """
 
@@ -18,8 +18,8 @@ GRAVE = {"serious", "critical"}
 NAMED_MS, LOOKS = 1000, 6
 """Until the page has named what viser leaves unnamed; a page that still loads is looked at again."""
 OPEN_ALL = """() => {
-  const shut = [...document.querySelectorAll("svg.tabler-icon-chevron-down")].map(arrow => arrow.parentElement);
-  const seen = shut.filter(head => head.offsetParent !== null);
+  const arrows = [...document.querySelectorAll("svg.tabler-icon-chevron-down")];
+  const seen = arrows.map(arrow => arrow.parentElement).filter(head => head.offsetParent !== null);
   for (const head of seen) head.click();
   return seen.length;
 }"""
