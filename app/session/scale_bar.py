@@ -48,6 +48,8 @@ def bar_of(text: str) -> ScaleBar | None:
         return None
     named = (axis.split(",") for axis in found[4].split(";"))
     axes = tuple((name, float(right), float(up)) for name, right, up in named)
+    if any(max(abs(right), abs(up)) > 1.0 for _, right, up in axes):
+        return None
     return ScaleBar(float(found[1]), found[2], found[3], axes)
 
 
@@ -70,8 +72,9 @@ def draw_bar(rgb: ByteArray, bar: ScaleBar, times: int) -> None:
     middle = np.array([left + 2.0 + 0.5 * AXES, bottom - 6.0 - 0.5 * AXES])
     for name, across, up in bar.axes:
         direction = np.array([across, -up])
-        line = (_pixels(*end, times) for end in (middle, middle + AXIS * direction))
-        cv2.line(rgb, *line, COLORS[name], round(2.2 * times), cv2.LINE_AA)
+        tip = middle + AXIS * direction
+        begin, end = _pixels(middle[0], middle[1], times), _pixels(tip[0], tip[1], times)
+        cv2.line(rgb, begin, end, COLORS[name], round(2.2 * times), cv2.LINE_AA)
         at = middle + NAME * direction
         _write(rgb, name, (at[0] - 0.5 * _width(name, 13.0, times), at[1] + 4.0), 13.0, COLORS[name], times)
     level = bottom - 44.0

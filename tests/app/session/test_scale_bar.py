@@ -15,7 +15,8 @@ def test_the_bar_of_the_page_is_read_and_nonsense_is_none():
     assert (bar.width, bar.length, bar.away_m) == (120.0, "50 cm", "2.4")
     assert bar.axes == (("z", 0.1, -0.05), ("x", 0.99, 0.0), ("y", -0.3, 0.9))
     wrong = ("", "720", TEXT.replace("cm", "km"), TEXT.replace("z,", "q,"), TEXT.replace("120.0", "5000"))
-    assert [bar_of(text) for text in (*wrong, TEXT.replace("120.0", "0"), f"{TEXT};x,1,1")] == [None] * 7
+    wrong += (TEXT.replace("120.0", "0"), f"{TEXT};x,1,1", TEXT.replace("0.99", "999999999"))
+    assert [bar_of(text) for text in wrong] == [None] * 8
 
 
 @pytest.mark.parametrize(("width", "times"), [(120.0, 2), (60.0, 2), (120.0, 1)])
