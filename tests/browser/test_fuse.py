@@ -154,7 +154,7 @@ CUT_CAPTIONS = """() => [...document.querySelectorAll(".packetmesh-board .captio
 """Captions of magnified corners that are wider or higher than their room."""
 
 
-@pytest.mark.parametrize("width_px", [900, 700])
+@pytest.mark.parametrize("width_px", [900, 390])
 def test_the_caption_of_a_narrow_corner_is_whole(fuse, width_px):
     size = fuse.viewport_size
     try:
