@@ -107,18 +107,20 @@ def iterate_run(
         drain(loading)
     writable_folder(out)
     result = yield from iterate_reconstruction(spec, cache)
-    other = None if baseline is None else (yield from compute(spec, baseline, cache)).value
+    other = None
+    if baseline is not None:
+        other = (yield from part(compute(spec, baseline, cache), f"baseline {baseline}", 0.9, 0.92)).value
     metrics = metrics_of(result) | ({} if report is None else {"import": asdict(report)})
     clear_run_folder(out)
     if isinstance(rig, Recorded) and result.rig.walk is not None:
-        recording = yield from part(rig.iterate_open(), "files", 0.9, 0.95, detail=True)
-        yield from part(iterate_keyframes(recording, result.rig.walk, out), "keyframes", 0.95, 1.0)
-    yield Progress("writing the report", 1.0)
+        recording = yield from part(rig.iterate_open(), "files", 0.92, 0.94, detail=True)
+        yield from part(iterate_keyframes(recording, result.rig.walk, out), "keyframes", 0.94, 0.97)
+    yield Progress("writing the report", 0.97)
     texture = dressed(result.rig, result.placement, result.after)
     write_reconstruction_report(result, metrics, out / REPORT, texture)
     if baseline is not None and other is not None:
         write_baseline(baseline, other, result, out)
-    yield Progress("writing the surfaces", 1.0)
+    yield Progress("writing the surfaces", 0.99)
     write_run_folder(result, metrics, out, texture=texture)
     return result, metrics
 
