@@ -203,7 +203,7 @@ class _Partners:
         """Prepare for ``count`` points that are matched to the points of a tree."""
         self._tree = tree
         self._two = np.full((count, 2), -1, dtype=np.intp)
-        """Nearest and second nearest point, in the tree's order; -1 if it is beyond the search radius or there is none."""
+        """Nearest and second nearest point, in the tree's order; -1 if none is within the search radius."""
         self._places_m = np.zeros((count, 3))
         """Position of each point at its last search."""
         self._clear_m = np.full((count, 2), -np.inf)
