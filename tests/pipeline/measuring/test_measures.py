@@ -257,7 +257,7 @@ def test_three_faces_of_a_box_and_the_box_as_a_part():
         assert np.ptp(found.ends_m, axis=0) == pytest.approx(BOX_M, abs=0.015)
     with pytest.raises(InputError, match="degrees apart, and faces of a box are square"):
         measures.box_of_planes(surface, (faces[0], faces[0], faces[1]))
-    with pytest.raises(InputError, match="No level plane is below"):
+    with pytest.raises(InputError, match="No level plane continues around"):
         measures.box_of_part(surface, np.array([-0.2, -0.2, 0.0]))
 
 
