@@ -209,7 +209,7 @@ def test_a_true_length_checks_and_sets_the_scale_and_it_is_undone(session):
     assert "+10.0 %" in session.gui.text()
     session.gui.press("Scale", SET)
     assert "scaled by +10.00 %" in session.gui.text()
-    assert session.texts()[0].startswith("Top: 66.0")
+    assert session.texts()[0] == "Top: 66 cm"
     assert session.folder.place() == f"{PLACE}~t6600"
     assert session.tapes[-1].scale == Scale(session.tapes[-1].taken[0].unnamed, 0.66)
     session.gui.set("Its name", "Side")
@@ -242,7 +242,7 @@ def test_the_scale_of_an_address_is_not_checked_against_itself(session, true):
 
 def test_the_scale_goes_with_the_measure_that_set_it(session):
     session.folder.take(f"{PLACE}~t6600~~{PLACE.replace('100_100', '100_200')}")
-    assert session.texts()[0].startswith("Top: 66.0")
+    assert session.texts()[0] == "Top: 66 cm"
     session.gui.set("Chosen measure", "1: Top")
     assert session.gui.find("True length (cm)").value == 66.0
     session.gui.press("List", DELETE)
