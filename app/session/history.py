@@ -19,8 +19,8 @@ from packetmesh.settings import differences, key_of
 from pipeline.config import PipelineConfig
 from pipeline.sources import Source
 
-NO_SETTINGS = {"t", "node", "photo", "pictures", "ball", "measure"}
-"""Keys of the address that are not undone: places in a result, and measures, which have their own list."""
+NO_SETTINGS = {"t", "node", "photo", "pictures", "ball"}
+"""Keys of the address that are not undone: places in a result. Nor is what is always in the address."""
 SAME_S = 1.5
 """Changes of one setting within this time, seconds, are one step, as when a slider is dragged."""
 MOST_STEPS = 100
