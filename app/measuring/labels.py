@@ -19,6 +19,8 @@ inferred, and the interval includes the usual error of such guesses."""
 ).format(HELD_IN_SHORT)
 OFF = Markdown("Clicks do not measure now.")
 NOTHING_YET = Markdown("There is nothing to measure yet.")
+MEASURING = "measuring …"
+NOT_YET = "There is no surface to measure yet; click again when it has been computed"
 LOST = "No answer came, because another computation took its place; click again"
 HIDDEN = "The surface that is measured is not shown now"
 FULL = "The address has no room for another measure; delete one first"

@@ -47,6 +47,9 @@ class Session:
         """Click at a point of the surface, which may be drawn elsewhere."""
         return self.folder.clicked(EYE + self.frame.position, np.array(point_m) - EYE, cut)
 
+    def says(self, one):
+        return hasattr(one, "text") and one.name.startswith(f"{self.node}/measures/")
+
     def texts(self):
         found = self.ui.scene._handle_from_node_name
         below = f"{self.node}/measures/"
@@ -117,10 +120,40 @@ def test_clicks_that_come_faster_than_answers_all_count(session):
     session.click(*ON_TOP)
     session.click(*ALSO_ON_TOP)
     session.click(0.1, 0.7, 0.5)
-    for request, on_end in session.asked[1:]:  # the older answers are not waited for
+    assert len(session.asked) == 2  # a running request is not stopped by a further click
+    for row in (1, 2):
+        request, on_end = session.asked[row]
         on_end(answer([session.surface], request))
+    assert len(session.asked) == 3
     assert len(tape_of(session.folder.place()).taken) == 1
     assert "second end" in session.gui.text()
+
+
+def test_a_click_is_marked_at_once_where_it_was_made(session):
+    session.gui.set("Clicks measure", True)
+    session.late = True
+    session.click(*ON_TOP)
+    assert session.texts() == [labels.MEASURING]
+    (label,) = (one for one in session.ui.scene._handle_from_node_name.values() if session.says(one))
+    along = (np.array(label.position) - EYE) / np.linalg.norm(np.array(label.position) - EYE)
+    towards = np.array(ON_TOP) - EYE
+    assert along == pytest.approx(towards / np.linalg.norm(towards))
+    request, on_end = session.asked[-1]
+    on_end(answer([session.surface], request))
+    assert session.texts() == ["Click the second end"]
+
+
+def test_a_miss_and_a_surface_that_is_not_there_yet_are_told_at_the_click(session):
+    session.gui.set("Clicks measure", True)
+    session.click(*np.add(EYE, (0.0, 0.0, 5.0)))
+    assert session.texts() == [session.folder._missed]
+    assert session.folder._missed
+    session.folder.unload()
+    assert session.texts() == []
+    session.click(*ON_TOP)
+    assert session.texts() == [labels.NOT_YET]
+    session.folder.load()
+    assert session.texts() == []
 
 
 def test_a_lost_answer_is_reported_and_another_click_works(session):
