@@ -36,8 +36,10 @@ def measure(
 ) -> None:
     """Measure on the surface that `reconstruct` wrote; every number with an interval computed for 95 %.
 
-    In 20 rendered rooms 94 to 97 % of the intervals of lengths and angles held the true value. Places are
-    in metres, in the world of the run, as a viewer shows them for surface_after.ply.
+    In 20 rendered rooms 94 to 97 % of the intervals of lengths and angles held the true value; boxes and
+    holes are hardly judged (5 of 6 sides and 11 of 11 holes held), and lengths with a guessed end erred 1.7
+    times as much as those of single measured pixels. Places are in metres, in the world of the run, as a
+    viewer shows them for surface_after.ply.
 
     Args:
         run: Folder of the reconstruction.

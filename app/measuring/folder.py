@@ -24,7 +24,7 @@ from app.compute.measures import (
 from app.measuring import labels
 from app.measuring.address import fits, name_of, tape_of, text_of
 from app.measuring.draw import MeasureDrawing
-from app.measuring.kinds import KIND_NAMES, KINDS, SNAPPED, SNAPS, steps_of
+from app.measuring.kinds import FEW, KIND_NAMES, KINDS, SNAPPED, SNAPS, steps_of
 from app.web.markup import Markdown, Markup
 from app.window.panel import PanelSession
 from packetmesh.errors import InputError
@@ -342,7 +342,9 @@ class MeasureFolder:
         if self._arguments is None:
             return labels.NOTHING_YET
         steps = steps_of(self._pending.kind, self._pending.snap)
-        hint = "" if self._pending.snap == "plane" else SNAPPED.get(self._pending.kind, "")
+        kind = self._pending.kind
+        hints = [FEW.get(kind, ""), "" if self._pending.snap == "plane" else SNAPPED.get(kind, "")]
+        hint = " ".join(filter(None, hints))
         return labels.prompt(steps[len(self._pending.points_m)], hint, self._missed)
 
     # The address.
