@@ -110,12 +110,17 @@ def notes_text(
 def _scaled_text(name: str, scale: Scale, scaled: ScaleView) -> Markdown:
     if scaled.trouble:
         return Markdown("**The scale is not set** by {}: {}.").format(name, scaled.trouble.rstrip("."))
-    return Markdown("**{} is {} cm, as typed; all other lengths are scaled by {} %.**{}").format(
+    return Markdown("**{} is {}, as typed; all other lengths are scaled by {} %.**{}").format(
         name,
-        f"{100.0 * scale.true_m:g}",
+        _length_text(scale.true_m),
         f"{100.0 * (scaled.factor - 1.0):+.2f}",
         _sentence(scaled.advice),
     )
+
+
+def _length_text(length_m: float) -> str:
+    """Return a typed length in the unit in which the list has it."""
+    return quantity_text(Quantity("length", length_m, "m", length_m, length_m, guessed=False))
 
 
 def _sentence(advice: str) -> str:
@@ -129,7 +134,7 @@ def check_text(check: Scale | None, checked: ScaleView | None, made: Made | None
         return Markdown("")
     if checked.trouble or made is None or not made.quantities:
         return Markdown("{}.").format(checked.trouble.rstrip("."))
-    true, measured = f"{100.0 * check.true_m:g} cm", quantity_text(made.quantities[0])
+    true, measured = _length_text(check.true_m), quantity_text(made.quantities[0])
     if checked.agrees:
         return Markdown("**{} agrees** with the measured {}.{}").format(
             true, measured, _sentence(checked.advice)

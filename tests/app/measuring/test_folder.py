@@ -167,6 +167,15 @@ def test_a_lost_answer_is_reported_and_another_click_works(session):
     assert "second end" in session.gui.text()
 
 
+def test_a_kind_that_is_hardly_judged_says_so_where_it_is_chosen(session):
+    session.gui.set("Clicks measure", True)
+    assert "hardly judged" not in session.folder._prompt.content
+    for kind in ("Box", "Hole"):
+        session.gui.set("What", kind)
+        assert "hardly judged" in session.folder._prompt.content
+    assert "only 6 sides (5 held)" in session.gui.text()
+
+
 def test_another_kind_begins_anew(session):
     session.gui.set("Clicks measure", True)
     session.click(*ON_TOP)
@@ -250,6 +259,17 @@ def test_a_true_length_checks_and_sets_the_scale_and_it_is_undone(session):
     session.gui.press("Scale", UNDO)
     assert session.texts()[0].startswith("Side: 60.0")
     assert "scaled" not in session.gui.text()
+
+
+@pytest.mark.parametrize(("true_cm", "text"), [(30.0, "30 cm"), (61.25, "61.25 cm"), (150.0, "1.5 m")])
+def test_a_typed_length_has_one_unit_everywhere(session, true_cm, text):
+    session.folder.take(PLACE)
+    session.gui.set("True length (cm)", true_cm)
+    assert f"**{text} " in session.gui.text()
+    session.gui.press("Scale", SET)
+    assert session.texts()[0] == f"Top: {text}"
+    assert f"**Top is {text}, as typed" in session.gui.text()
+    assert {"30 cm": "0.3 m", "61.25 cm": "0.6125 m", "1.5 m": "150 cm"}[text] not in session.gui.text()
 
 
 def test_a_new_name_leaves_the_typed_true_length_and_its_check(session):
