@@ -36,8 +36,10 @@ def measure(
 ) -> None:
     """Measure on the surface that `reconstruct` wrote; every number with an interval computed for 95 %.
 
-    In 20 rendered rooms 94 to 97 % of the intervals of lengths and angles held the true value. Places are
-    in metres, in the world of the run, as a viewer shows them for surface_after.ply.
+    In 20 rendered rooms 94 to 97 % of the intervals of lengths and angles held the true value; boxes and
+    holes are hardly judged (5 of 6 sides and 11 of 11 holes held), and lengths with a guessed end erred 1.7
+    times as much as those of single measured pixels. Places are in metres, in the world of the run, as a
+    viewer shows them for surface_after.ply.
 
     Args:
         run: Folder of the reconstruction.
@@ -49,11 +51,11 @@ def measure(
         hole: A point in a hole or on its rim, for its area.
         snap: Move --points to the corner of flat faces (else the nearest vertex), to the edge
             where two planes meet, or onto their plane.
-        scale_by: True length, in metres, of the first length that is measured: the surface is scaled by it,
-            and everything is measured again.
+        scale_by: True length, in metres, of the first length that is measured: the surface is scaled by what
+            it tells, weighed against the scale before, and everything else is measured again.
         json: Print the values, and the points that were measured, as JSON.
     """
-    from pipeline.measuring.measures import with_scale
+    from pipeline.measuring.measures import declared, with_scale
     from pipeline.measuring.surface import read_measured
     from pipeline.measuring.values import HELD
 
@@ -66,13 +68,17 @@ def measure(
     factor, marks = 1.0, _marks(surface, places, snap, 1.0)
     found = _measured(surface, marks, places, singles, factor)
     if scale_by is not None:
-        length = next((one for one in found if len(one.values) == 1 and one.values[0].unit == "m"), None)
-        if length is None:
+        lengths = (row for row, one in enumerate(found) if len(one.values) == 1 and one.values[0].unit == "m")
+        row = next(lengths, None)
+        if row is None:
             wrong_use("--scale-by needs a length that is measured: give two --points")
-        surface, check = with_scale(surface, scale_by, length)
+        surface, check = with_scale(surface, scale_by, found[row])
         factor, marks = check.factor, _marks(surface, places, snap, check.factor)
         found = _measured(surface, marks, places, singles, factor)
+        found[row] = declared(found[row], scale_by)
         say(check.sentence)
+        if check.advice:
+            say(check.advice)
     if json:
         print_json([record | {"ends_m": one.ends_m.tolist()} for one in found for record in one.records()])
         return

@@ -144,11 +144,15 @@ class ScaleView:
     """A true length compared with its measure."""
 
     factor: float = 1.0
+    """Scale by it over that before."""
+    ratio: float = 1.0
     """True over measured length."""
     agrees: bool = False
     """Whether the true length is inside the measure's interval."""
     trouble: str = ""
     """Why the measure sets no scale; else empty."""
+    advice: str = ""
+    """What to measure instead of a length that is known less well than the scale; else empty."""
 
 
 @dataclass(frozen=True, slots=True)

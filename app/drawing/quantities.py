@@ -23,8 +23,13 @@ EVEN = 0.15
 
 
 def quantity_text(one: Quantity) -> str:
-    """Return a number with its interval, such as ``20.3 ± 0.3 cm`` or ``20.3 cm (19.1 to 24.0)``."""
+    """Return a number with its interval, such as ``20.3 ± 0.3 cm`` or ``20.3 cm (19.1 to 24.0)``.
+
+    A length that was typed in has no interval: ``30 cm``.
+    """
     value, low, high, unit, decimals = _shown(one)
+    if high == low:
+        return f"{value:g} {unit}"
     half = 0.5 * (high - low)
     if abs(0.5 * (low + high) - value) <= EVEN * half:
         gap = "" if unit == "°" else " "

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from pipeline.measuring.measures import Kind
 
 LONGEST_NAME = 40
-MOST_LETTERS = 3000
-"""Most letters of the list in an address; a page's whole address has at most 4,096."""
+MOST_LETTERS = 2000
+"""Most letters of a list in an address, which has the lists of three screens; a page's whole address has at
+most 7,168, and servers take 8,192."""
 EXAMPLE = "distance~surface~100_200_300~400_500_600"
 _POINT = re.compile(r"(-?\d{1,7})_(-?\d{1,7})_(-?\d{1,7})")
 _KINDS: Mapping[str, Kind] = {kind: kind for kind in KINDS.values()}
@@ -74,7 +75,7 @@ def _text(taken: Taken, scale: Scale | None) -> str:
 
 def _taken(text: str) -> tuple[Taken, float | None]:
     """Return one measure, and its true length if all lengths are scaled by it."""
-    wrong = InputError(f"The address has measure={text[:60]}; try measures such as {EXAMPLE}")
+    wrong = InputError(f"The address has the measures {text[:60]}; try measures such as {EXAMPLE}")
     first, second, *words = [*text.split("~"), ""]
     kind, snap = _KINDS.get(first), _SNAPS.get(second)
     if kind is None or snap is None:

@@ -46,6 +46,7 @@ class MeasureDrawing:
         measures: Sequence[tuple[Taken, str, Made]],
         pending: Sequence[End] = (),
         camera: viser.CameraHandle | None = None,
+        note: tuple[str, FloatArray] | None = None,
     ) -> None:
         """Draw these measures with their names, and these points; remove all others.
 
@@ -53,6 +54,7 @@ class MeasureDrawing:
             measures: marks, name and result of each; those without quantities are not drawn.
             pending: points of a measure that is not complete.
             camera: view for which labels are moved apart; None without a browser.
+            note: a line over the picture and its (3,) place.
         """
         wanted = {(id(made), name): (taken, made) for taken, name, made in measures if made.quantities}
         for key in self._drawn.keys() - wanted.keys():
@@ -62,6 +64,9 @@ class MeasureDrawing:
                 self._drawn[key] = made, self._add(key[1], taken, made)
         self._remove(self._pending)
         self._pending = [self._dot(end) for end in pending]
+        if note is not None:
+            text, place_m = note
+            self._pending.append(self._scene.add_label(self._next(), text, position=place_m))
         if camera is not None and self._labels:
             self._spread(camera)
 

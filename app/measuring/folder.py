@@ -24,7 +24,7 @@ from app.compute.measures import (
 from app.measuring import labels
 from app.measuring.address import fits, name_of, tape_of, text_of
 from app.measuring.draw import MeasureDrawing
-from app.measuring.kinds import KIND_NAMES, KINDS, SNAPPED, SNAPS, steps_of
+from app.measuring.kinds import FEW, KIND_NAMES, KINDS, SNAPPED, SNAPS, steps_of
 from app.web.markup import Markdown, Markup
 from app.window.panel import PanelSession
 from packetmesh.errors import InputError
@@ -34,6 +34,8 @@ NONE = "none"
 DELETE, DELETE_ALL = "Delete", "Delete all"
 SET, UNDO = "Set the scale by it", "Undo"
 MOST_CM = 10_000.0
+NOTE_M = 0.5
+"""Distance from the camera at which a line over the picture is drawn, on the click's ray."""
 
 
 class MeasureFolder:
@@ -65,6 +67,8 @@ class MeasureFolder:
         self._pending, self._ends, self._missed = Clicked("distance", "surface"), tuple[End, ...](), ""
         self._clicks: tuple[Click, ...] = ()
         """Clicks whose points are not known yet."""
+        self._clicked_m: FloatArray | None = None
+        """(3,) a place on the ray of the last click, until the click gave a point; below ``_node``."""
         self._asked: MeasureRequest | None = None
         self._answer: MeasureAnswer | None = None
         self._checked: ScaleView | None = None
@@ -139,17 +143,26 @@ class MeasureFolder:
         if not ui.shows(self._node):
             self._missed = labels.HIDDEN
             self._show()
-        elif self._arguments is not None:
-            offset_m = np.asarray(ui.scene.get_handle_by_name(self._node).position)
-            ray = [tuple(one.tolist()) for one in (np.asarray(origin_m) - offset_m, np.asarray(direction))]
-            self._clicks = (*self._clicks, Click(ray[0], ray[1], cut))
+            return True
+        offset_m = np.asarray(ui.scene.get_handle_by_name(self._node).position)
+        origin_m, direction = np.asarray(origin_m) - offset_m, np.asarray(direction)
+        self._clicked_m = origin_m + NOTE_M * direction / np.linalg.norm(direction)
+        if self._arguments is None:
+            self._missed = labels.NOT_YET
+            self._show()
+            return True
+        ray = [tuple(one.tolist()) for one in (origin_m, direction)]
+        self._clicks, self._missed = (*self._clicks, Click(ray[0], ray[1], cut)), ""
+        if self._asked is None:
             self._ask()
+        else:  # another request would stop the running one, which then would have to begin again
+            self._show()
         return True
 
     def _restart(self) -> None:
         """Begin a measure of the chosen kind."""
         self._pending = Clicked(KINDS[self._what.value], SNAPS[self._snap.value])
-        self._ends, self._missed, self._clicks = (), "", ()
+        self._ends, self._missed, self._clicks, self._clicked_m = (), "", (), None
 
     def _begin(self) -> None:
         self._restart()
@@ -177,9 +190,10 @@ class MeasureFolder:
         """Show the answer to the newest request; None if it was stopped."""
         if asked is not self._asked:
             return
-        self._asked, self._clicks = None, ()
+        self._asked, self._clicks = None, self._clicks[len(asked.clicks) :]
         if answer is None:
-            self._missed = labels.LOST if asked.clicks else ""
+            self._missed = labels.LOST if asked.clicks or self._clicks else ""
+            self._clicks = ()
             self._show()
             return
         self._made |= dict(answer.made)
@@ -187,11 +201,14 @@ class MeasureFolder:
         self._pending, self._ends, self._missed = answer.pending, answer.ends, answer.missed
         tape = replace(self._tape, taken=(*self._tape.taken, *answer.completed))
         if not fits(tape):
+            self._clicks = ()
             self._show()
             raise InputError(labels.FULL)
         if answer.completed:
             self._take_tape(tape)
             self._choose_row(len(tape.taken) - 1)
+        if self._clicks:
+            self._ask()
         self._show()
 
     # Changes of the list.
@@ -306,7 +323,18 @@ class MeasureFolder:
                 handle.visible = bool(rows)
             drawn = [(taken, name, made) for name, taken, made in rows if made is not None]
             viewer = next(iter(self._session.clients()), None)
-            self._drawing.draw(drawn, self._ends, None if viewer is None else viewer.camera)
+            self._drawing.draw(drawn, self._ends, None if viewer is None else viewer.camera, self._note_at())
+
+    def _note_at(self) -> tuple[str, FloatArray] | None:
+        """Return the line over the picture and its (3,) place: at the last click until it has a point, then
+        at that point what to click next.
+        """
+        if self._clicked_m is not None and (self._clicks or self._missed):
+            return (self._missed or labels.MEASURING), self._clicked_m
+        if not self._ends:
+            return None
+        steps = steps_of(self._pending.kind, self._pending.snap)
+        return steps[len(self._pending.points_m)].prompt.rstrip("."), self._ends[-1].point_m
 
     def _prompt_text(self) -> Markdown:
         if not self._on.value:
@@ -314,7 +342,9 @@ class MeasureFolder:
         if self._arguments is None:
             return labels.NOTHING_YET
         steps = steps_of(self._pending.kind, self._pending.snap)
-        hint = "" if self._pending.snap == "plane" else SNAPPED.get(self._pending.kind, "")
+        kind = self._pending.kind
+        hints = [FEW.get(kind, ""), "" if self._pending.snap == "plane" else SNAPPED.get(kind, "")]
+        hint = " ".join(filter(None, hints))
         return labels.prompt(steps[len(self._pending.points_m)], hint, self._missed)
 
     # The address.

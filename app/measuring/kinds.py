@@ -48,6 +48,11 @@ _STEPS: Mapping[Kind, tuple[Step, ...]] = {
 }
 _OF_PLANES: Mapping[Kind, tuple[Step, ...]] = {"angle": _PLANES[:2], "box": _PLANES}
 """Clicks of the kinds that *Snap to: Plane* turns into measures between planes."""
+FEW: Mapping[Kind, str] = {
+    "box": "Intervals of boxes are hardly judged.",
+    "hole": "Intervals of holes are hardly judged.",
+}
+"""Sentences on kinds of which few were compared with the truth (``pipeline.measuring.values.HELD``)."""
 SNAPPED: Mapping[Kind, str] = {
     "angle": "With Snap to: Plane, two planes give their angle.",
     "box": "With Snap to: Plane, three faces of the object give its size.",

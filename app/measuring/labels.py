@@ -19,6 +19,8 @@ inferred, and the interval includes the usual error of such guesses."""
 ).format(HELD_IN_SHORT)
 OFF = Markdown("Clicks do not measure now.")
 NOTHING_YET = Markdown("There is nothing to measure yet.")
+MEASURING = "measuring …"
+NOT_YET = "There is no surface to measure yet; click again when it has been computed"
 LOST = "No answer came, because another computation took its place; click again"
 HIDDEN = "The surface that is measured is not shown now"
 FULL = "The address has no room for another measure; delete one first"
@@ -30,8 +32,8 @@ HINTS = {
     "chosen": "Measure that the controls below change.",
     "name": "Name of the chosen measure, in the list, the picture, the address and exports.",
     "true": "Length of the chosen measure as you know it, for example by a tape; it checks the scale.",
-    "scale": "Set: multiply all lengths so that the chosen measure has its true length. Undo: measure at the "
-    "reconstruction's own scale again.",
+    "scale": "Set: the chosen measure has its true length, and all others are scaled by what this tells, "
+    "weighed against the scale before. Undo: measure at the reconstruction's own scale again.",
 }
 INTERVAL = (
     "95 % interval",
@@ -108,9 +110,22 @@ def notes_text(
 def _scaled_text(name: str, scale: Scale, scaled: ScaleView) -> Markdown:
     if scaled.trouble:
         return Markdown("**The scale is not set** by {}: {}.").format(name, scaled.trouble.rstrip("."))
-    return Markdown("**All lengths are scaled by {} %**, so that {} is {} cm.").format(
-        f"{100.0 * (scaled.factor - 1.0):+.2f}", name, f"{100.0 * scale.true_m:g}"
+    return Markdown("**{} is {}, as typed; all other lengths are scaled by {} %.**{}").format(
+        name,
+        _length_text(scale.true_m),
+        f"{100.0 * (scaled.factor - 1.0):+.2f}",
+        _sentence(scaled.advice),
     )
+
+
+def _length_text(length_m: float) -> str:
+    """Return a typed length in the unit in which the list has it."""
+    return quantity_text(Quantity("length", length_m, "m", length_m, length_m, guessed=False))
+
+
+def _sentence(advice: str) -> str:
+    """Return advice as a further sentence; empty without."""
+    return f" {advice}." if advice else ""
 
 
 def check_text(check: Scale | None, checked: ScaleView | None, made: Made | None) -> Markdown:
@@ -119,9 +134,11 @@ def check_text(check: Scale | None, checked: ScaleView | None, made: Made | None
         return Markdown("")
     if checked.trouble or made is None or not made.quantities:
         return Markdown("{}.").format(checked.trouble.rstrip("."))
-    true, measured = f"{100.0 * check.true_m:g} cm", quantity_text(made.quantities[0])
+    true, measured = _length_text(check.true_m), quantity_text(made.quantities[0])
     if checked.agrees:
-        return Markdown("**{} agrees** with the measured {}.").format(true, measured)
-    return Markdown("**{} does not agree** with the measured {}: it differs by {} %.").format(
-        true, measured, f"{100.0 * (checked.factor - 1.0):+.1f}"
+        return Markdown("**{} agrees** with the measured {}.{}").format(
+            true, measured, _sentence(checked.advice)
+        )
+    return Markdown("**{} does not agree** with the measured {}: it differs by {} %.{}").format(
+        true, measured, f"{100.0 * (checked.ratio - 1.0):+.1f}", _sentence(checked.advice)
     )

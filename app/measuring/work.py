@@ -34,6 +34,7 @@ from pipeline.measuring.measures import (
     angle_of_planes,
     box_of_part,
     box_of_planes,
+    declared,
     distance,
     hole_area,
     plane_to_plane,
@@ -82,9 +83,11 @@ def answer(surfaces: Sequence[MeasuredSurface], request: MeasureRequest) -> Meas
     scaled, scale = (surveys, None) if request.scale is None else _scaled(surveys, request.scale)
     checked = None if request.check is None else _scaled(scaled, request.check)[1]
     wanted = dict.fromkeys((*request.wanted, *completed))
+    set_by = request.scale if scale is not None and not scale.trouble else None
+    true_m = {} if set_by is None else {set_by.by: set_by.true_m}
     return MeasureAnswer(
         request,
-        tuple((taken, _made(scaled, taken)) for taken in wanted),
+        tuple((taken, _made(scaled, taken, true_m.get(taken))) for taken in wanted),
         tuple(completed),
         pending,
         _pending_ends(surveys, pending),
@@ -184,11 +187,19 @@ def _scaled(surveys: Sequence[Survey], scale: Scale) -> tuple[Sequence[Survey], 
     except InputError as error:
         return surveys, ScaleView(trouble=str(error))
     check = found[scale.by.part][1]
-    return [survey for survey, _ in found], ScaleView(check.factor, check.agrees)
+    return [survey for survey, _ in found], ScaleView(
+        check.factor, check.ratio, check.agrees, advice=check.advice
+    )
 
 
-def _made(surveys: Sequence[Survey], taken: Taken) -> Made:
-    """Return a measure's numbers, and its drawing at the size of the drawn surface."""
+def _made(surveys: Sequence[Survey], taken: Taken, true_m: float | None = None) -> Made:
+    """Return a measure's numbers, and its drawing at the size of the drawn surface.
+
+    Args:
+        surveys: the surfaces.
+        taken: the measure.
+        true_m: the length that it is given, if it set the scale.
+    """
     try:
         survey = surveys[taken.part]
         measure, marks, planes = _measured(survey, taken)
@@ -196,6 +207,8 @@ def _made(surveys: Sequence[Survey], taken: Taken) -> Made:
         return Made(trouble=NO_PART)
     except InputError as error:
         return Made(trouble=str(error))
+    if true_m is not None:
+        measure = declared(measure, true_m)
     quantities = tuple(
         Quantity(one.name, one.value, one.unit, *one.ci95, one.guessed) for one in measure.values
     )

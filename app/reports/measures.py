@@ -23,7 +23,7 @@ def measured_sections(measures: dict[str, Any]) -> Iterator[Markup]:
     ).format(measures["scale"].rstrip("."), HELD)
     if measures["scaled_by"] is not None:
         yield Markup(
-            "<p><b>All lengths are multiplied by {}, from a true length that was entered.</b></p>"
+            "<p><b>One length was entered; all others are multiplied by {} because of it.</b></p>"
         ).format(f"{measures['scaled_by']:.4f}")
 
 

@@ -19,8 +19,8 @@ from packetmesh.settings import differences, key_of
 from pipeline.config import PipelineConfig
 from pipeline.sources import Source
 
-NO_SETTINGS = {"t", "node", "photo", "pictures", "ball", "measure"}
-"""Keys of the address that are not undone: places in a result, and measures, which have their own list."""
+NO_SETTINGS = {"t", "node", "photo", "pictures", "ball"}
+"""Keys of the address that are not undone: places in a result. Nor is what is always in the address."""
 LOOK = "look"
 """Key of the folder *Look*, whose text holds several settings (``app.looking.look``)."""
 SAME_S = 1.5

@@ -45,7 +45,9 @@ class Places:
         """Connect a browser's address to the session. Returns the function that disconnects it."""
         session = self._session
         titles = [panel.title for panel in session.panels]
-        keys = dict.fromkeys(key for panel in session.panels for key in panel.in_address)
+        keys = dict.fromkeys(
+            key for panel in session.panels for key in (*panel.in_address, *panel.always_in_address)
+        )
         address = Address(ui, session.uploads, self._start, titles, (*keys, CAMERA), self._go_to)
         self._addresses.append(address)
         address.show(self._now())
@@ -61,9 +63,10 @@ class Places:
         session = self._session
         for reset in session.ui.resets:
             reset()
-        for part in (part for panel in session.panels for part in panel.in_address.values()):
-            if part.place():
-                part.take("")
+        for panel in session.panels:
+            for part in (*panel.in_address.values(), *panel.always_in_address.values()):
+                if part.place():
+                    part.take("")
         session.want(self._start.spec)
 
     def follow(self) -> None:
@@ -84,6 +87,7 @@ class Places:
         session = self._session
         parts = dict[str, InAddress]()
         for panel in session.panels:
+            parts |= panel.always_in_address
             if panel.drawn_below == session.current.drawn_below:
                 parts |= panel.in_address
         return parts if self._views is None else parts | {CAMERA: self._views}

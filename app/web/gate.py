@@ -24,7 +24,7 @@ from viser import _messages as messages
 from app.web import viser_private as private
 from app.web.upload_gate import REFUSED, UploadGate
 
-MOST_TEXT = 4096
+MOST_TEXT = 7168
 """Longest text in a text field, characters."""
 MOST_NAME = 1024
 """Longest name, such as a file's, characters."""

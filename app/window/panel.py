@@ -151,6 +151,8 @@ class Panel(ABC):
         self.in_address: dict[str, InAddress] = {}
         """Parts whose state is in the address while this is shown, by key; keys of lessons begin with
         ``STOP``."""
+        self.always_in_address: dict[str, InAddress] = {}
+        """Parts whose state is in the address whatever screen is shown, by keys that no other screen has."""
 
     @abstractmethod
     def build(self) -> None:

@@ -10,8 +10,11 @@ import numpy as np
 
 from lab.measuring.clicks import away_from_edges
 from lab.measuring.rooms import Room, TrueView
+from lab.worlds.raycast import world_mesh
 from packetmesh.errors import InputError
 from pipeline.kernels import geometry
+from pipeline.kernels.open3d_runtime import o3d
+from pipeline.kernels.rays import first_hits, triangle_scene
 from pipeline.measuring.boxes import box_of_part
 from pipeline.measuring.holes import hole_area
 from pipeline.measuring.marks import mark_on_ray
@@ -23,10 +26,9 @@ from pipeline.types import BoolArray, FloatArray
 
 LEAST_SIDE_M = 0.08
 """Least side of a top that is measured."""
-LEVEL = 0.99
-"""Cosine of a level place's normal with the vertical."""
 LEVEL_M = 0.002
-"""The vertices of a part that are at most this much below its highest one are its top."""
+"""The vertices of a part that are at most this much below its highest one are its top; levels that differ by
+less are one."""
 SEEN_M = 0.01
 """A camera sees a place if the true point at its pixel is at most this far from it."""
 AROUND_M, OFF_M = 0.03, 0.005
@@ -34,9 +36,8 @@ AROUND_M, OFF_M = 0.03, 0.005
 SEEN_SHARE = 0.97
 """Share of a top's places that one camera has to see, and of those outside that have to be off its plane."""
 GRID = 12
-STANDS_M = 0.05
-"""The true height of what a thing stands on is the median height of the level true places that differ from
-the measured height by less than this."""
+STANDS_SHARE = 0.5
+"""Least share of the places around a top below which the same level is: what the thing stands on."""
 HOLES = 12
 """Most holes in a room, the largest first."""
 RIM_M = 0.05
@@ -52,10 +53,11 @@ def true_boxes(room: Room) -> Iterator[Judged]:
     their middle; the sides are in the order of the measure's values.
     """
     points_m = [view.points_m() for view in room.true]
-    levels_m = np.concatenate(
-        [own[view.normals[..., 2] > LEVEL, 2] for own, view in zip(points_m, room.true, strict=True)]
-    )
+    world = triangle_scene(*world_mesh(room.scene))
     for corner_m, sides_m in _tops(room):
+        stand_m = _stand_m(world, corner_m, sides_m)
+        if stand_m is None:
+            continue
         for k, view in enumerate(room.true):
             if not _alone(view, points_m[k], corner_m, sides_m):
                 continue
@@ -70,12 +72,29 @@ def true_boxes(room: Room) -> Iterator[Judged]:
             except InputError:
                 continue
             elapsed_s = time.perf_counter() - started
-            heights_m = levels_m[np.abs(levels_m - measure.ends_m[:, 2].min()) < STANDS_M]
-            if len(heights_m):
-                flat_m = sorted((float(np.linalg.norm(side_m)) for side_m in sides_m), reverse=True)
-                height_m = float(middle_m[2] - np.median(heights_m))
-                yield measure, (*flat_m, height_m), elapsed_s
-                break
+            flat_m = sorted((float(np.linalg.norm(side_m)) for side_m in sides_m), reverse=True)
+            yield measure, (*flat_m, float(middle_m[2] - stand_m)), elapsed_s
+            break
+
+
+def _stand_m(
+    world: o3d.t.geometry.RaycastingScene, corner_m: FloatArray, sides_m: FloatArray
+) -> float | None:
+    """Return the height of the level below most places around a top; None if there is no such level."""
+    reach = AROUND_M / np.linalg.norm(sides_m, axis=1)
+    steps = np.linspace(0.0, 1.0, GRID)
+    ends = [
+        np.column_stack([np.full(GRID, end), steps])[:, ::turn]
+        for turn, far in ((1, reach[0]), (-1, reach[1]))
+        for end in (-far, 1.0 + far)
+    ]
+    places_m = corner_m + np.concatenate(ends) @ sides_m
+    down = np.tile([0.0, 0.0, -1.0], (len(places_m), 1))
+    below_m = first_hits(world, places_m, down)
+    heights_m = np.where(np.isfinite(below_m), places_m[:, 2] - below_m, np.nan)
+    near = np.abs(heights_m[:, None] - heights_m) < LEVEL_M
+    most = int(near.sum(axis=1).argmax())
+    return float(np.median(heights_m[near[most]])) if near[most].mean() >= STANDS_SHARE else None
 
 
 def _tops(room: Room) -> Iterator[tuple[FloatArray, FloatArray]]:

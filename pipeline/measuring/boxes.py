@@ -12,6 +12,7 @@ from pipeline.measuring.lookup import lookup_of
 from pipeline.measuring.near import spot_near
 from pipeline.measuring.planes import Plane, guess_of, plane_at, rectangle
 from pipeline.measuring.propagation import Z95
+from pipeline.measuring.supports import ABOVE_M, Footprint, levels_below, support_of, unknown_height
 from pipeline.measuring.surface import MeasuredSurface
 from pipeline.measuring.values import Measure, Value
 from pipeline.surface.boundary import connected_parts
@@ -21,14 +22,6 @@ SQUARE_DEG = 20.0
 """Faces of a box are square to each other within this angle."""
 EXTENT = (1.0, 99.0)
 """Percentiles of the vertices between which a thing extends (SPEC 7)."""
-LEVEL_DEG = 25.0
-"""Largest angle between a supporting plane's normal and the vertical."""
-BESIDE_M = 0.6
-"""Largest distance from the marked point at which a thing's supporting plane is looked for."""
-ABOVE_M = 0.015
-"""Least height of a part over its plane; lower, they cannot be told apart."""
-TRIED = 4
-"""Heights at which a supporting plane is looked for, and places at each."""
 GROOVE_DEG = 25.0
 """Angle between converging normals from which two things touch there."""
 LARGEST_SHARE = 0.5
@@ -80,21 +73,19 @@ def box_of_planes(surface: MeasuredSurface, planes: tuple[Plane, Plane, Plane]) 
 def box_of_part(surface: MeasuredSurface, point_m: FloatArray) -> Measure:
     """Return width, depth and height of a thing that stands on a plane, marked by one point on it.
 
-    The plane is the level one below the point with most vertices near it. Of a thing that is marked on its
-    flat top, the footprint is the smallest rectangle around the top; of another, around the vertices above
-    the plane that are connected with the point without crossing a groove (``GROOVE_DEG``). Things that touch
-    it without a groove count as one with it.
+    The plane is a level one that is seen along two sides of the footprint or more (``support_of``). Of a
+    thing that is marked on its flat top, the footprint is the smallest rectangle around the top; of another,
+    around the vertices above the plane that are connected with the point without crossing a groove
+    (``GROOVE_DEG``). Things that touch it without a groove count as one with it.
 
     Raises:
-        InputError: nothing stands there.
+        InputError: nothing stands there, or what it stands on is not seen.
     """
     spot = spot_near(surface, point_m)
     where = "({:.3g}, {:.3g}, {:.3g})".format(*spot.point_m)
     seed = int(spot.corners[np.argmax(spot.shares)])
-    plane = _support(surface, seed, where)
-    rows = _top(surface, spot.point_m, plane)
-    if rows is None:
-        rows = _part(surface, seed, plane, where)
+    top = _top(surface, spot.point_m)
+    rows, plane = _standing(surface, top, seed, where)
     points_m = surface.vertices_m[rows] - plane.point_m
     flat_m = points_m @ plane.axes.T
     turned, low_m, high_m = rectangle(flat_m, EXTENT)
@@ -117,37 +108,39 @@ def _guess_half_m(range_m: float, confidence: float) -> float:
     return relative_half(confidence) * (range_m if np.isfinite(range_m) else UNKNOWN_RANGE_M)
 
 
-def _support(surface: MeasuredSurface, seed: int, where: str) -> Plane:
-    """Return the level plane below a vertex that has most vertices near it; raises InputError without one."""
-    away_m = surface.vertices_m - surface.vertices_m[seed]
-    level = surface.normals[:, 2] > np.cos(np.radians(LEVEL_DEG))
-    below = level & (np.linalg.norm(away_m, axis=1) < BESIDE_M) & (away_m[:, 2] < -ABOVE_M)
-    candidates = np.flatnonzero(below)
-    floors = np.round(away_m[candidates, 2] / ABOVE_M).astype(int)
-    levels, counts = np.unique(floors, return_counts=True)
-    for level_number in levels[np.argsort(-counts)][:TRIED]:
-        some = candidates[floors == level_number]
-        some = some[np.argsort(np.linalg.norm(away_m[some, :2], axis=1))]
-        for row in some[:: max(1, len(some) // TRIED)]:
-            try:
-                plane = plane_at(surface, surface.vertices_m[row])
-            except InputError:
-                continue
-            if plane.normal[2] > np.cos(np.radians(LEVEL_DEG)):
-                return plane
-    raise InputError(
-        f"No level plane is below the point {where} m, so its height is unknown; mark three faces of it "
-        "instead"
-    )
+def _standing(surface: MeasuredSurface, top: Plane | None, seed: int, where: str) -> tuple[IntArray, Plane]:
+    """Return the vertices of a thing's top, or of the whole of it, and the plane that it stands on.
+
+    Raises:
+        InputError: nothing stands there, or what it stands on is not seen.
+    """
+    if top is not None:
+        footprint = _footprint(surface, top.rows)
+        planes = levels_below(surface, footprint, float(np.median(surface.vertices_m[top.rows, 2])))
+        return top.rows, support_of(surface, footprint, planes, where)
+    planes = levels_below(surface, _footprint(surface, np.array([seed])), float(surface.vertices_m[seed, 2]))
+    trouble: InputError | None = None
+    for plane in planes:
+        try:
+            rows = _part(surface, seed, plane, where)
+            if support_of(surface, _footprint(surface, rows), planes, where) is plane:
+                return rows, plane
+        except InputError as error:
+            trouble = error
+    raise trouble or unknown_height(where)
 
 
-def _top(surface: MeasuredSurface, point_m: FloatArray, plane: Plane) -> IntArray | None:
-    """Return the vertices of the flat top of a thing; None if no level plane is at the point."""
+def _footprint(surface: MeasuredSurface, rows: IntArray) -> Footprint:
+    return Footprint(*rectangle(surface.vertices_m[rows, :2], EXTENT))
+
+
+def _top(surface: MeasuredSurface, point_m: FloatArray) -> Plane | None:
+    """Return the flat top of a thing; None if no level plane is at the point."""
     try:
         top = plane_at(surface, point_m)
     except InputError:
         return None
-    return top.rows if float(top.normal @ plane.normal) > np.cos(np.radians(SQUARE_DEG)) else None
+    return top if float(top.normal[2]) > np.cos(np.radians(SQUARE_DEG)) else None
 
 
 def _part(surface: MeasuredSurface, seed: int, plane: Plane, where: str) -> IntArray:

@@ -10,14 +10,15 @@ from pipeline.measuring.holes import hole_area
 from pipeline.measuring.marks import Mark
 from pipeline.measuring.planes import Plane
 from pipeline.measuring.propagation import BENT_OF_SCALE, Places, interval
-from pipeline.measuring.scale import ScaleCheck, with_scale
+from pipeline.measuring.scale import ScaleCheck, declared, with_scale
 from pipeline.measuring.surface import MeasuredSurface
 from pipeline.measuring.values import Kind, Measure, Unit, Value
 from pipeline.types import FloatArray
 
 __all__ = [
     "Kind", "Measure", "ScaleCheck", "Unit", "Value", "angle", "angle_of_planes", "are_parallel",
-    "box_of_part", "box_of_planes", "distance", "hole_area", "plane_to_plane", "point_to_plane", "with_scale",
+    "box_of_part", "box_of_planes", "declared", "distance", "hole_area", "plane_to_plane", "point_to_plane",
+    "with_scale",
 ]  # fmt: skip
 SAME_M = 1e-6
 """Points closer than this are one point."""
@@ -86,7 +87,7 @@ def angle(surface: MeasuredSurface, a: Mark, corner: Mark, b: Mark) -> Measure:
     for end in (a, b):
         if np.linalg.norm(end.point_m - corner.point_m) <= SAME_M:
             raise InputError("An end of the angle is at its corner; mark a point farther away")
-    bent_deg = np.degrees(np.sqrt(2.0) * BENT_OF_SCALE * surface.scale_sd)
+    bent_deg = np.degrees(np.sqrt(2.0) * BENT_OF_SCALE * surface.tilting_sd)
     value, (low, high) = interval(surface, (a, corner, b), _corner_deg, float(bent_deg))
     guessed = a.guessed or corner.guessed or b.guessed
     one = Value("angle", value, "deg", (low, min(high, 180.0)), guessed)

@@ -93,7 +93,7 @@ def joint_covariance(surface: MeasuredSurface, things: Sequence[Thing]) -> Float
     for k, thing in enumerate(things):
         if isinstance(thing, Mark) and not 0 <= thing.node < count:
             covariance[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] += _choice_of_node_m2(surface, thing)
-    bent = (BENT_OF_SCALE * surface.scale_sd) ** 2
+    bent = (BENT_OF_SCALE * surface.tilting_sd) ** 2
     for k, thing in enumerate(things):
         if isinstance(thing, Plane):
             covariance[3 * k + 1, 3 * k + 1] += bent

@@ -59,6 +59,14 @@ class MeasuredSurface:
     """(V,) distance of each vertex from the camera of its ray; None if unknown."""
     confidence: FloatArray | None = None
     """(V,) confidence of a guessed vertex, NaN for a measured one; None if unknown."""
+    bent_sd: float | None = None
+    """Relative standard deviation of the focal lengths, which tilt planes, where a true length has set the
+    scale: it does not straighten them. None: ``scale_sd``."""
+
+    @property
+    def tilting_sd(self) -> float:
+        """Relative standard deviation of the scale that planes and lines are tilted by."""
+        return self.scale_sd if self.bent_sd is None else self.bent_sd
 
 
 def measured_surface(result: Reconstruction) -> MeasuredSurface:
@@ -256,6 +264,8 @@ def read_measured(run: Path) -> MeasuredSurface:
         ) as stored:
             values: dict[str, Any] = {name: stored[name] for name in stored.files}
         values |= {"scale_sd": float(values["scale_sd"]), "scale_source": str(values["scale_source"])}
+        if "bent_sd" in values:
+            values["bent_sd"] = float(values["bent_sd"])
         surface = MeasuredSurface(**values)
         count = len(surface.vertices_m)
         whole = all(

@@ -9,13 +9,18 @@ from pipeline.types import FloatArray
 
 Kind = Literal["distance", "point-plane", "plane-plane", "angle", "hole", "box"]
 Unit = Literal["m", "deg", "m2"]
-HELD_IN_SHORT = "In 20 rendered rooms 94 to 97 % of the intervals of lengths and angles held the true value"
+HELD_IN_SHORT = (
+    "In 20 rendered rooms 94 to 97 % of the intervals of lengths and angles held the true value. Boxes and "
+    "holes are hardly judged: only 6 sides (5 held) and 11 holes (all held). Lengths with a guessed end "
+    "erred 1.7 times as much as those of single measured pixels"
+)
 HELD = (
     "The intervals are computed for 95 %. In 20 rendered rooms that had no part in the constants, those of "
     "96 % of 600 lengths (95 % interval of this share: 92 to 99 %), 95 % of 239 heights over a plane (92 to "
     "98 %), 94 % of 185 angles of two planes (83 to 100 %), 97 % of 240 angles of three points (95 to 99 %), "
     "all of 108 gaps of two planes, and 96 % of 600 lengths with a guessed end (92 to 99 %) held the true "
-    "value; only 6 sides of boxes (5 held) and 11 holes (all held) could be judged"
+    "value; only 6 sides of boxes (5 held) and 11 holes (all held) could be judged. The median error of "
+    "lengths with a guessed end was 1.7 times that of single measured pixels"
 )
 """Shares of intervals that held, by ``packetmesh bench --only measuring``."""
 

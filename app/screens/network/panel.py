@@ -103,7 +103,8 @@ class NetworkPanel(Panel):
         with gui.add_folder("Advanced", expand_by_default=False):
             self._setup.add_advanced()
         self._dock = Dock(ui, self._moved, self._inspector.pick)
-        self.in_address |= self._lessons.in_address | {"measure": self._measures, "look": self._looking}
+        self.in_address |= self._lessons.in_address | {"look": self._looking}
+        self.always_in_address["measure-arrived"] = self._measures
         self.in_address["plan"] = CallbackState(self._plan.place, self._plan.take)
         self.in_address["net"] = CallbackState(self._setup.place, self._take_place)
         self.in_address["t"] = CallbackState(self._moment, self._take_moment)

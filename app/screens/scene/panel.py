@@ -77,7 +77,8 @@ class ScenePanel(Panel):
             self.session, "/scene/measures", "scene.measure_job:measure_job", without=("Hole", "Box")
         )
         self._looking = LookFolder(self.session, self.drawn_below, surface=False)
-        self.in_address |= {"measure": self._measures, "look": self._looking}
+        self.in_address["look"] = self._looking
+        self.always_in_address["measure-points"] = self._measures
         self.ui.when_clicked(self.drawn_below, self._clicked)
         self._notes = gui.add_markdown(Markdown(""))
         self._color = gui.add_image(EMPTY, label="Colour image")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from app.compute.measures import Tape
+from app.measuring.command import measure_commands
 from app.screens.surface.labels import BASELINES, COLORINGS
 from app.screens.surface.view import Coloring
 from app.web.markup import Markdown
@@ -16,6 +17,16 @@ NOTE = Markdown(
 
 MEASURES_HINT = """The measures on the Surface screen: their points, numbers in metres, degrees and square
 metres with 95 % intervals, and what was guessed. They are also in the run folder and in its report."""
+
+RUN = "runs/from-app"
+"""Folder of the command that makes the surface (``Spec.command``)."""
+MEASURES_NOTE = Markdown(
+    "Each command takes one measure on the run of the first command above; with `--json` it prints JSON. "
+    "For an angle of three points it also prints both legs."
+)
+MEASURES_UNSCALED = Markdown(
+    "{} The commands measure at the reconstruction's own scale; `--scale-by` sets that of one command."
+).format(MEASURES_NOTE)
 
 
 def surface_offers(shown: str, colors: str, rims: bool) -> Offers:
@@ -31,8 +42,9 @@ def surface_offers(shown: str, colors: str, rims: bool) -> Offers:
 
 
 def measure_offers(tape: Tape) -> tuple[Offers, ...]:
-    """Return the offer of the list of measures; none without a measure."""
+    """Return the offer of the list of measures, and the commands that take them; none without a measure."""
     if not tape.taken:
         return ()
     files = (Offer("JSON", "measures.json", "surface.measure_job:measures_job"),)
-    return (Offers("Measures", MEASURES_HINT, files),)
+    note = MEASURES_NOTE if tape.scale is None else MEASURES_UNSCALED
+    return (Offers("Measures", MEASURES_HINT, files, measure_commands(tape, RUN), note),)

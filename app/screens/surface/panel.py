@@ -81,7 +81,8 @@ class SurfacePanel(Panel):
         self._histogram = gui.add_plotly(spacing_figure(None), aspect=0.62, config={"displayModeBar": False})
         self._build_folders()
         self.in_address |= self._lessons.in_address
-        self.in_address |= {"ball": self._walks.folder, "measure": self._measures, "look": self._looking}
+        self.in_address |= {"ball": self._walks.folder, "look": self._looking}
+        self.always_in_address["measure"] = self._measures
         self.in_address |= picked(self._shown, self._picked_shown, self._coloring, self._picked_coloring)
         self._ball = ChosenBall(session, self._stage)
         self._baselines = Baselines(session, self._stage, self._quick, self._made)

@@ -82,7 +82,10 @@ def test_a_true_length_scales_everything(capsys, folder):
     ends = ("--points", "0,0,0.15", "0.3,0,0.15")
     code, out, err = run(capsys, folder, *ends, "--planes", TOP, TABLE, "--scale-by", "0.33", "--json")
     assert code == 0
-    assert [one["value"] for one in json.loads(out)] == pytest.approx([0.33, 0.165], abs=1e-3)
+    first, height = json.loads(out)
+    assert [one["value"] for one in (first, height)] == pytest.approx([0.33, 0.165], abs=1e-3)
+    assert first["ci95"] == [0.33, 0.33]
+    assert height["ci95"][0] < height["value"] < height["ci95"][1]
     assert "The true length 0.33 m does not agree with the measured 0.3 m" in err
 
 

@@ -47,6 +47,9 @@ class Session:
         """Click at a point of the surface, which may be drawn elsewhere."""
         return self.folder.clicked(EYE + self.frame.position, np.array(point_m) - EYE, cut)
 
+    def says(self, one):
+        return hasattr(one, "text") and one.name.startswith(f"{self.node}/measures/")
+
     def texts(self):
         found = self.ui.scene._handle_from_node_name
         below = f"{self.node}/measures/"
@@ -117,10 +120,40 @@ def test_clicks_that_come_faster_than_answers_all_count(session):
     session.click(*ON_TOP)
     session.click(*ALSO_ON_TOP)
     session.click(0.1, 0.7, 0.5)
-    for request, on_end in session.asked[1:]:  # the older answers are not waited for
+    assert len(session.asked) == 2  # a running request is not stopped by a further click
+    for row in (1, 2):
+        request, on_end = session.asked[row]
         on_end(answer([session.surface], request))
+    assert len(session.asked) == 3
     assert len(tape_of(session.folder.place()).taken) == 1
     assert "second end" in session.gui.text()
+
+
+def test_a_click_is_marked_at_once_where_it_was_made(session):
+    session.gui.set("Clicks measure", True)
+    session.late = True
+    session.click(*ON_TOP)
+    assert session.texts() == [labels.MEASURING]
+    (label,) = (one for one in session.ui.scene._handle_from_node_name.values() if session.says(one))
+    along = (np.array(label.position) - EYE) / np.linalg.norm(np.array(label.position) - EYE)
+    towards = np.array(ON_TOP) - EYE
+    assert along == pytest.approx(towards / np.linalg.norm(towards))
+    request, on_end = session.asked[-1]
+    on_end(answer([session.surface], request))
+    assert session.texts() == ["Click the second end"]
+
+
+def test_a_miss_and_a_surface_that_is_not_there_yet_are_told_at_the_click(session):
+    session.gui.set("Clicks measure", True)
+    session.click(*np.add(EYE, (0.0, 0.0, 5.0)))
+    assert session.texts() == [session.folder._missed]
+    assert session.folder._missed
+    session.folder.unload()
+    assert session.texts() == []
+    session.click(*ON_TOP)
+    assert session.texts() == [labels.NOT_YET]
+    session.folder.load()
+    assert session.texts() == []
 
 
 def test_a_lost_answer_is_reported_and_another_click_works(session):
@@ -132,6 +165,15 @@ def test_a_lost_answer_is_reported_and_another_click_works(session):
     session.late = False
     session.click(*ON_TOP)
     assert "second end" in session.gui.text()
+
+
+def test_a_kind_that_is_hardly_judged_says_so_where_it_is_chosen(session):
+    session.gui.set("Clicks measure", True)
+    assert "hardly judged" not in session.folder._prompt.content
+    for kind in ("Box", "Hole"):
+        session.gui.set("What", kind)
+        assert "hardly judged" in session.folder._prompt.content
+    assert "only 6 sides (5 held)" in session.gui.text()
 
 
 def test_another_kind_begins_anew(session):
@@ -209,7 +251,7 @@ def test_a_true_length_checks_and_sets_the_scale_and_it_is_undone(session):
     assert "+10.0 %" in session.gui.text()
     session.gui.press("Scale", SET)
     assert "scaled by +10.00 %" in session.gui.text()
-    assert session.texts()[0].startswith("Top: 66.0")
+    assert session.texts()[0] == "Top: 66 cm"
     assert session.folder.place() == f"{PLACE}~t6600"
     assert session.tapes[-1].scale == Scale(session.tapes[-1].taken[0].unnamed, 0.66)
     session.gui.set("Its name", "Side")
@@ -217,6 +259,17 @@ def test_a_true_length_checks_and_sets_the_scale_and_it_is_undone(session):
     session.gui.press("Scale", UNDO)
     assert session.texts()[0].startswith("Side: 60.0")
     assert "scaled" not in session.gui.text()
+
+
+@pytest.mark.parametrize(("true_cm", "text"), [(30.0, "30 cm"), (61.25, "61.25 cm"), (150.0, "1.5 m")])
+def test_a_typed_length_has_one_unit_everywhere(session, true_cm, text):
+    session.folder.take(PLACE)
+    session.gui.set("True length (cm)", true_cm)
+    assert f"**{text} " in session.gui.text()
+    session.gui.press("Scale", SET)
+    assert session.texts()[0] == f"Top: {text}"
+    assert f"**Top is {text}, as typed" in session.gui.text()
+    assert {"30 cm": "0.3 m", "61.25 cm": "0.6125 m", "1.5 m": "150 cm"}[text] not in session.gui.text()
 
 
 def test_a_new_name_leaves_the_typed_true_length_and_its_check(session):
@@ -242,7 +295,7 @@ def test_the_scale_of_an_address_is_not_checked_against_itself(session, true):
 
 def test_the_scale_goes_with_the_measure_that_set_it(session):
     session.folder.take(f"{PLACE}~t6600~~{PLACE.replace('100_100', '100_200')}")
-    assert session.texts()[0].startswith("Top: 66.0")
+    assert session.texts()[0] == "Top: 66 cm"
     session.gui.set("Chosen measure", "1: Top")
     assert session.gui.find("True length (cm)").value == 66.0
     session.gui.press("List", DELETE)

@@ -167,13 +167,14 @@ def test_a_true_length_checks_the_scale_or_scales_all_numbers_but_no_drawing():
     height = Taken("plane-plane", "surface", (ON_TOP, ON_FLOOR))
     nothing = Clicked("distance", "surface")
     checked = answer([surface], MeasureRequest((), nothing, check=Scale(height, 0.505))).checked
-    assert (checked.agrees, checked.factor) == (True, pytest.approx(1.01, abs=2e-3))
+    assert (checked.agrees, checked.ratio) == (True, pytest.approx(1.01, abs=2e-3))
     assert not answer([surface], MeasureRequest((), nothing, check=Scale(height, 0.55))).checked.agrees
     request = MeasureRequest((LENGTH, height), nothing, scale=Scale(height, 0.55))
     answered = answer([surface], request)
     made = dict(answered.made)
     assert value(made[LENGTH]) == pytest.approx(0.66, abs=2e-3)
-    assert value(made[height]) == pytest.approx(0.55, abs=1e-6)
+    (known,) = made[height].quantities
+    assert (known.low, known.value, known.high) == (0.55, 0.55, 0.55)
     np.testing.assert_allclose(made[LENGTH].ends_m, [ON_TOP, ALSO_ON_TOP], atol=1e-3)
     np.testing.assert_allclose(made[height].faces[0].corners_m[:, 2], 0.5, atol=1e-3)
     assert answered.scaled.factor == pytest.approx(1.1, abs=2e-3)

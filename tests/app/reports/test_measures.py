@@ -31,5 +31,5 @@ def test_every_number_of_the_sentence_has_its_interval_also_the_sides_of_a_box()
 
 def test_a_true_length_that_scales_is_named_with_its_factor():
     told = Markup("").join(measured_sections(measures(("shelf", SHELF), scaled_by=1.0312)))
-    assert "All lengths are multiplied by 1.0312, from a true length that was entered." in told
+    assert "One length was entered; all others are multiplied by 1.0312 because of it." in told
     assert "multiplied" not in Markup("").join(measured_sections(measures(("shelf", SHELF))))

@@ -26,7 +26,7 @@ from pipeline.kernels import geometry
 from pipeline.kernels.geometry import look_at
 from pipeline.kernels.rays import hit_depth
 from pipeline.types import CameraIntrinsics, RgbdFrame
-from tests.pipeline.measuring.scenes import BOX_M, box_on_table, measured, sheet
+from tests.pipeline.measuring.scenes import BOX_M, TABLE_M, box_on_table, measured, sheet, table_in_room
 
 CAMERA = CameraIntrinsics.pinhole(130.0, 130.0, 79.5, 59.5, 160, 120)
 FINE = CameraIntrinsics.pinhole(520.0, 520.0, 319.5, 239.5, 640, 480)
@@ -101,6 +101,30 @@ def test_the_true_sides_of_a_box_are_those_of_its_top_and_its_stand():
     assert [value.name for value in measure.values] == ["width", "depth", "height"]
     for value, true_m in zip(measure.values, sides_m, strict=True):
         assert value.ci95[0] <= true_m <= value.ci95[1]
+
+
+def test_the_true_height_of_a_table_is_that_over_the_floor_whatever_was_measured(monkeypatch):
+    """A chair's seat next to the table, on which a measure once stood it, is no truth."""
+    grey = Material(lambda points_m, normals: np.full(points_m.shape, 0.5))
+    floor = board((6.0, 6.0, 0.1), grey, np.eye(4), (0.0, 0.0, -0.05))
+    top = board((1.5, 0.9, 0.04), grey, np.eye(4), (0.75, 0.45, 0.72))
+    seat = board((0.45, 0.45, 0.04), grey, np.eye(4), (1.73, 0.45, 0.43))
+    scene = Scene("table", (*[floor] * 6, top, seat), (), np.ones(3), (), FINE)
+    T = look_at((0.75, 2.2, 2.6), (0.75, 0.45, 0.7))
+    depth = hit_depth(*world_mesh(scene), FINE, T)
+    up = np.broadcast_to([0.0, 0.0, 1.0], (*depth.z_m.shape, 3))
+    frame = RgbdFrame("node", np.zeros((*depth.z_m.shape, 3), np.uint8), depth, FINE, T)
+    surface = measured(table_in_room(((1.505, 0.225, 0.45), (0.45, 0.45))))
+    room = Room(0, (frame,), (T,), surface, (TrueView(FINE, T, depth.z_m.astype(float), up),), scene)
+    (measure, sides_m, _), *_ = true_boxes(room)
+    assert sides_m == pytest.approx(TABLE_M, abs=1e-6)
+    height = measure.values[2]
+    assert height.value == pytest.approx(TABLE_M[2], abs=0.01)
+    wrong = replace(height, value=0.29, ci95=(0.28, 0.3))
+    seated = replace(measure, values=(*measure.values[:2], wrong))
+    monkeypatch.setattr("lab.measuring.things.box_of_part", lambda surface, place_m: seated)
+    (_, again_m, _), *_ = true_boxes(room)
+    assert again_m == sides_m
 
 
 def test_a_box_that_is_partly_hidden_is_not_judged():

@@ -62,3 +62,19 @@ def box_on_table(spacing_m=0.01):
         sheet(nd, nh, spacing_m, (0, d, 0), ny, z),
         sheet(nd, nh, spacing_m, (w, 0, 0), y, z),
     )
+
+
+TABLE_M = (1.5, 0.9, 0.74)
+"""Width, depth and height of the table."""
+
+
+def table_in_room(*others, floor=True, spacing_m=0.025):
+    """A table top without legs in the middle of a room's floor, and level sheets (low corner, sizes in m)."""
+    w, d, h = TABLE_M
+    levels = [((0.0, 0.0, h), (w, d)), *others, *([((-1.0, -1.0, 0.0), (3.5, 2.9))] if floor else [])]
+    return joined(
+        *(
+            sheet(round(wide_m / spacing_m), round(deep_m / spacing_m), spacing_m, corner_m)
+            for corner_m, (wide_m, deep_m) in levels
+        )
+    )

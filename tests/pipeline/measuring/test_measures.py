@@ -257,7 +257,7 @@ def test_three_faces_of_a_box_and_the_box_as_a_part():
         assert np.ptp(found.ends_m, axis=0) == pytest.approx(BOX_M, abs=0.015)
     with pytest.raises(InputError, match="degrees apart, and faces of a box are square"):
         measures.box_of_planes(surface, (faces[0], faces[0], faces[1]))
-    with pytest.raises(InputError, match="No level plane is below"):
+    with pytest.raises(InputError, match="No level plane continues around"):
         measures.box_of_part(surface, np.array([-0.2, -0.2, 0.0]))
 
 
@@ -320,20 +320,71 @@ def test_a_true_length_checks_and_sets_the_scale():
     ends = [np.array([0.0, 0.5, 0.5]), np.array([2.0, 0.5, 0.5])]
     found = measures.distance(surface, *(mark(surface, end) for end in ends))
     scaled, check = measures.with_scale(surface, 2.05, found)
-    assert check.factor == pytest.approx(1.025)
-    assert check.agrees
     own = np.sqrt(2.0) * SIGMA_M / 2.0
-    assert scaled.scale_sd == pytest.approx(own, rel=0.01)
-    again = measures.distance(scaled, *(mark(scaled, 1.025 * end) for end in ends))
-    assert again.values[0].value == pytest.approx(2.05)
-    assert not measures.with_scale(surface, 2.5, found)[1].agrees
-    assert "does not agree" in measures.with_scale(surface, 2.5, found)[1].sentence
+    weight = 0.02**2 / (0.02**2 + own**2)
+    assert check.ratio == pytest.approx(1.025)
+    assert check.factor == pytest.approx(1.025**weight)
+    assert check.agrees
+    assert not check.advice
+    assert scaled.scale_sd == pytest.approx(own * np.sqrt(weight), rel=0.01)
+    again = measures.distance(scaled, *(mark(scaled, check.factor * end) for end in ends))
+    assert again.values[0].value == pytest.approx(2.0 * check.factor)
+    assert measures.declared(again, 2.05).values[0].ci95 == (2.05, 2.05)
     with pytest.raises(InputError, match="try a positive one"):
         measures.with_scale(surface, 0.0, found)
     floor = plane_at(surface, np.array([0.0, 0.5, 0.5]))
     nothing = measures.point_to_plane(surface, mark(surface, np.array([0.0, 0.2, 0.2])), floor)
     with pytest.raises(InputError, match="mark a longer length"):
         measures.with_scale(surface, 0.1, nothing)
+
+
+def test_a_true_length_outside_the_interval_counts_alone():
+    surface = facing_walls(scale_sd=0.02)
+    found = measures.Measure("distance", (length(surface),), np.zeros((2, 3)))
+    scaled, check = measures.with_scale(surface, 2.5, found)
+    assert not check.agrees
+    assert "does not agree" in check.sentence
+    assert check.factor == pytest.approx(1.25)
+    assert scaled.scale_sd == pytest.approx(np.sqrt(2.0) * SIGMA_M / 2.0, rel=0.01)
+
+
+def test_a_length_that_is_less_well_known_than_the_scale_hardly_changes_it_and_says_so():
+    surface = facing_walls(scale_sd=0.0001)
+    found = measures.Measure("distance", (length(surface),), np.zeros((2, 3)))
+    scaled, check = measures.with_scale(surface, 2.004, found)
+    assert scaled.scale_sd < surface.scale_sd
+    assert check.factor == pytest.approx(1.0, abs=1e-4)
+    assert check.advice == "This length is known to 0.14 % only; measure a longer one"
+
+
+@pytest.mark.parametrize("own_sd", [0.002, 0.01, 0.031])
+def test_setting_the_scale_never_widens_an_interval_and_95_of_100_hold(own_sd):
+    rng, before, true_m, held, widths = np.random.default_rng(4), 0.01, 0.3, [], []
+    surface = facing_walls(scale_sd=before)
+    for _ in range(600):
+        scale = np.exp(before * rng.standard_normal())  # true over drawn size
+        measured_m = true_m / scale * np.exp(own_sd * rng.standard_normal())
+        half_m = Z95 * np.hypot(before, own_sd) * measured_m
+        one = measures.Value("length", measured_m, "m", (measured_m - half_m, measured_m + half_m), False)
+        scaled, check = measures.with_scale(
+            surface, true_m, measures.Measure("distance", (one,), np.zeros((2, 3)))
+        )
+        held.append(abs(np.log(scale / check.factor)) < Z95 * scaled.scale_sd)
+        widths.append(scaled.scale_sd if check.agrees else 0.0)
+    assert max(widths) <= before
+    assert 0.90 < np.mean(held) < 0.98
+
+
+def test_a_true_length_does_not_straighten_what_the_lens_has_bent():
+    surface = facing_walls(scale_sd=0.02)
+    found = measures.Measure("distance", (length(surface),), np.zeros((2, 3)))
+    scaled, check = measures.with_scale(surface, 2.01, found)
+    places = ([0.0, 0.5, 0.5], [2.0, 0.5, 0.5])
+    before, after = (
+        measures.angle_of_planes(one, *(plane_at(one, factor * np.array(place)) for place in places))
+        for one, factor in ((surface, 1.0), (scaled, check.factor))
+    )
+    assert after.values[0].ci95 == pytest.approx(before.values[0].ci95, rel=0.01)
 
 
 def test_two_equal_points_have_no_length():

@@ -28,7 +28,7 @@ def test_a_measure_has_its_points_on_one_node_and_is_drawn_with_the_points(sessi
     session.gui.set("What", "Point to plane")
     for point_m in (ON_BOX, ON_TABLE):
         session.ui.scene.click(EYE, np.array(point_m) - EYE)
-    (taken,) = tape_of(session.panel.in_address["measure"].place()).taken
+    (taken,) = tape_of(session.panel.always_in_address["measure-points"].place()).taken
     (height,) = session.panel._measures._made[taken].quantities
     assert height.low < BOX_M[2] < height.high
     assert height.high - height.low < 0.05
@@ -36,7 +36,7 @@ def test_a_measure_has_its_points_on_one_node_and_is_drawn_with_the_points(sessi
 
 
 def test_another_scene_keeps_the_list_but_no_number(session):
-    session.panel.in_address["measure"].take("distance~surface~2480_2530_890~2300_2200_740")
+    session.panel.always_in_address["measure-points"].take("distance~surface~2480_2530_890~2300_2200_740")
     assert len(session.ui.scene.names("/scene/measures")) > 1
     session.gui.set("Scene", DEMOS["office"].title)
     assert session.spec.source == demo_of("office")

@@ -32,7 +32,7 @@ def session(store, server):
 
 @pytest.fixture(autouse=True)
 def anew(session):
-    session.panel.in_address["measure"].take("")
+    session.panel.always_in_address["measure"].take("")
     session.gui.set("Show", session.gui.find("Show").options[0])
     session.gui.set("What", "Plane to plane")
 
@@ -60,10 +60,10 @@ def test_two_clicks_measure_the_height_of_the_box(session):
 
 def test_the_list_survives_another_radius_and_is_measured_anew(session):
     click(session, ON_BOX, ON_TABLE)
-    place = session.panel.in_address["measure"].place()
+    place = session.panel.always_in_address["measure"].place()
     (before,) = measures(session)
     session.edit(with_rule("manual", 30.0))
-    assert session.panel.in_address["measure"].place() == place
+    assert session.panel.always_in_address["measure"].place() == place
     (after,) = measures(session)
     assert after["values"][0]["value"] == pytest.approx(before["values"][0]["value"], abs=0.01)
     assert after["values"] != before["values"]
@@ -73,7 +73,7 @@ def test_clicks_go_to_the_surface_after_fusion_where_it_is_drawn(session):
     session.gui.set("Show", BEFORE)
     click(session, ON_BOX, ON_TABLE)
     assert "not shown" in session.gui.text("Measure")
-    assert session.panel.in_address["measure"].place() == ""
+    assert session.panel.always_in_address["measure"].place() == ""
     session.gui.set("Show", BOTH)
     offset_m = session.panel._stage.offset_m("after")
     assert np.linalg.norm(offset_m) > 1.0
