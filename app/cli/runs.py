@@ -37,11 +37,12 @@ from pipeline.folders.run import (
     write_baseline,
     write_run_folder,
 )
-from pipeline.importing import ImportReport, is_recording, iterate_import
+from pipeline.importing import ImportReport, is_recording
 from pipeline.io.rigs import is_rig
 from pipeline.placement.outcome import APART
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
 from pipeline.recording.checkpoint import files_digest
+from pipeline.recording.imported import iterate_checked_import
 from pipeline.recording.walk import LEAST_FRAMES
 from pipeline.sources import Calibrated, FileSource, Recorded, RigFolder
 from pipeline.spec import Spec, whole_s
@@ -144,7 +145,7 @@ def iterate_imported(
     if rig.is_dir():
         shutil.rmtree(rig)  # from an earlier run
     try:
-        steps = iterate_import(source.path, rig, depth_scale=source.depth_scale)
+        steps = iterate_checked_import(source.path, rig, depth_scale=source.depth_scale)
         report = yield from part(steps, f"import of {source.path}", 0.0, 0.05, detail=True)
     except PacketMeshError:
         if new:
