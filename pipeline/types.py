@@ -11,6 +11,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -289,6 +290,9 @@ class Walk:
     """Assumptions and doubts, one sentence each."""
     resumed_s: float = 0.0
     """Time that interrupted runs had spent on the tracking that this one continued."""
+    state: Path | None = None
+    """File with the tracking, from which another run of the recording goes on; ``checkpoint.Checkpoint``
+    deletes it. None if none was written, as for short recordings."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ import json
 import shutil
 import traceback
 from collections.abc import Generator, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -41,7 +41,7 @@ from pipeline.importing import ImportReport, is_recording
 from pipeline.io.rigs import is_rig
 from pipeline.placement.outcome import APART
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
-from pipeline.recording.checkpoint import files_digest
+from pipeline.recording.checkpoint import Checkpoint, files_digest
 from pipeline.recording.imported import iterate_checked_import
 from pipeline.recording.walk import LEAST_FRAMES
 from pipeline.sources import Calibrated, FileSource, Recorded, RigFolder
@@ -107,6 +107,28 @@ def iterate_run(
     else:
         drain(loading)
     writable_folder(out)
+    with _kept_tracking(spec, cache):
+        return (yield from _iterate_written(spec, cache, report, out, baseline))
+
+
+@contextmanager
+def _kept_tracking(spec: Spec, cache: RunCache) -> Iterator[None]:
+    """Delete the state of a recording's tracking after this block; if it fails, say that it is kept."""
+    walk = drain(run(spec, cache, ["rig"]))["rig"].value.walk
+    if walk is None or walk.state is None:
+        yield
+        return
+    checkpoint = Checkpoint(walk.state)
+    with checkpoint.said():
+        yield
+    checkpoint.delete()
+
+
+def _iterate_written(
+    spec: Spec, cache: RunCache, report: ImportReport | None, out: Path, baseline: Baseline | None
+) -> Generator[Progress, None, tuple[Reconstruction, dict[str, Any]]]:
+    """Reconstruct a rig that is loaded, and write the run folder with its report."""
+    rig = spec.source
     result = yield from iterate_reconstruction(spec, cache)
     beside = None if baseline is None else (yield from compute(spec, baseline, cache)).value
     metrics = metrics_of(result) | ({} if report is None else {"import": asdict(report)})
@@ -191,6 +213,9 @@ def iterate_rigs(
             outcomes[index] = outcome
             summary = outcome.sentence or f"{outcome.no_hit_after:.1%} of the rays are without a surface"
             yield Progress(f"{outcome.name} {outcome.state}: {summary}", len(outcomes) / len(tasks))
+    except BaseException as error:
+        error.add_note("the same command goes on with the rigs that are left")
+        raise
     finally:
         done = tuple(outcomes[index] for index in sorted(outcomes))
         if done:

@@ -146,7 +146,7 @@ def iterate_tracking(
         if checkpoint is not None and time.monotonic() - written_s >= EVERY_S:
             checkpoint.write(tracker.state())
             written_s = time.monotonic()
-    if checkpoint is not None and checkpoint.path.exists():
+    if checkpoint is not None and first < count and checkpoint.path.exists():
         checkpoint.write(tracker.state())
     return tracker.track()
 

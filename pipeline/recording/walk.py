@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +12,9 @@ from packetmesh.errors import InputError
 from packetmesh.progress import Progress, part
 from pipeline.importing.upright import upright
 from pipeline.kernels.geometry import LEVEL_POSE, inverse
-from pipeline.recording.checkpoint import checkpoint_of
+from pipeline.recording.checkpoint import Checkpoint, checkpoint_of
 from pipeline.recording.errors import path_note
-from pipeline.recording.given import checked_poses
+from pipeline.recording.given import Given, checked_poses
 from pipeline.recording.loops import Trajectory, iterate_loops, poses_by_tracking
 from pipeline.recording.photographs import iterate_photographs
 from pipeline.recording.places import Places, iterate_joins
@@ -39,6 +40,8 @@ FARTHEST_VIEW_M, FACING = 2.0, 0.5
 def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
     """Turn a recording into a rig: a few keyframes with final poses, and the map of all frames.
 
+    The state of tracking, if it was written, stays (``Walk.state``) until the caller has written its results.
+
     Raises:
         InputError: the recording has too few frames, or an image cannot be read.
     """
@@ -47,6 +50,14 @@ def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
     yield Progress("reading the first frames", 0.0)
     given = checked_poses(recording)
     checkpoint = checkpoint_of(recording, given.T_world_camera)
+    with nullcontext() if checkpoint is None else checkpoint.said():
+        return (yield from _iterate_rig(recording, given, checkpoint))
+
+
+def _iterate_rig(
+    recording: Recording, given: Given, checkpoint: Checkpoint | None
+) -> Generator[Progress, None, Rig]:
+    """Track, close loops and integrate, from the poses and the state there are."""
     tracking = iterate_tracking(recording, given.T_world_camera, checkpoint)
     track = yield from part(tracking, "tracking", 0.0, 0.45, detail=True)
     if not track.clouds:
@@ -70,12 +81,11 @@ def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
     given_poses = given.T_world_camera or [None] * len(poses)
     corrected = path_note(poses, given_poses, "that of the given poses")
     notes = (*recording.notes, *given.notes, *corrected, *turned)
-    if checkpoint is not None:
-        checkpoint.delete()
     colored = replace(points, colors=seen.colors)
     resumed_s = 0.0 if checkpoint is None else checkpoint.resumed_s
+    state = checkpoint.path if checkpoint is not None and checkpoint.path.exists() else None
     walk = Walk(
-        recording.times_s, poses, keyframes, links, colored, voxel_m, first, tracked, notes, resumed_s
+        recording.times_s, poses, keyframes, links, colored, voxel_m, first, tracked, notes, resumed_s, state
     )
     return Rig(recording.name, seen.views, walk=walk)
 
