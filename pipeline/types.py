@@ -290,6 +290,12 @@ class Walk:
     """Assumptions and doubts, one sentence each."""
     resumed_s: float = 0.0
     """Time that interrupted runs had spent on the tracking that this one continued."""
+    without_depth: tuple[int, ...] = ()
+    """Frames with no depth, or too little to be tracked."""
+    apart: tuple[int, ...] = ()
+    """Frames without a pose that were tracked in a part of the recording that was not joined to the map."""
+    disturbed: tuple[int, ...] = ()
+    """Frames with a pose in which something moved: they agree little with the frames before them."""
     state: Path | None = None
     """File with the tracking, from which another run of the recording goes on; ``checkpoint.Checkpoint``
     deletes it. None if none was written, as for short recordings."""

@@ -87,7 +87,7 @@ def recording_sentences(metrics: dict[str, Any]) -> list[str]:
         f"{recording['frames_per_s']:.0f} frames a second; keyframes: {recording['keyframes']}, loops: "
         f"{recording['loops']}"
     )
-    return [summary, *lost_sentences(recording["lost"], recording["frames"])]
+    return [summary, *lost_sentences(recording)]
 
 
 def imported_notes(report: dict[str, Any] | None) -> list[str]:

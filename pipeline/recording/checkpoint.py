@@ -22,7 +22,7 @@ from pipeline.importing.recorded_bag import BagRecording
 from pipeline.recording.recording import Recording
 from pipeline.types import FloatArray
 
-VERSION = 3
+VERSION = 4
 """Number to increase when tracking changes, so that older states are not read."""
 EVERY_S = 10.0
 """Least time between two writings of the state."""

@@ -18,9 +18,9 @@ from pipeline.config import MOST_AVERAGED
 from pipeline.importing.recorded import DepthView
 from pipeline.io.depth_to_color import register_depth
 from pipeline.kernels.geometry import apply, inverse, is_pinhole, pixel_rays, project
-from pipeline.recording.recording import Recording, spread
+from pipeline.recording.recording import Recording, read_ahead, spread
 from pipeline.recording.still import Vote, voted
-from pipeline.recording.tracking import REPORTED, read_ahead
+from pipeline.recording.tracking import REPORTED
 from pipeline.recording.walk import LEAST_FRAMES, iterate_walk
 from pipeline.types import Averaging, ByteArray, DepthMap, FloatArray, RgbdFrame, Rig
 

@@ -18,8 +18,8 @@ from pipeline.recording.given import Given, checked_poses
 from pipeline.recording.loops import Trajectory, iterate_loops, poses_by_tracking
 from pipeline.recording.photographs import iterate_photographs
 from pipeline.recording.places import Places, iterate_joins
-from pipeline.recording.recording import Recording, spread
-from pipeline.recording.tracking import REPORTED, WITHIN, Track, iterate_tracking, read_ahead
+from pipeline.recording.recording import Recording, read_ahead, spread
+from pipeline.recording.tracking import REPORTED, WITHIN, Track, iterate_tracking
 from pipeline.recording.volume import Volume, voxel_for
 from pipeline.registration.organised import shared_shares
 from pipeline.types import FloatArray, IntArray, PointCloud, Rig, Walk
@@ -85,7 +85,20 @@ def _iterate_rig(
     resumed_s = 0.0 if checkpoint is None else checkpoint.resumed_s
     state = checkpoint.path if checkpoint is not None and checkpoint.path.exists() else None
     walk = Walk(
-        recording.times_s, poses, keyframes, links, colored, voxel_m, first, tracked, notes, resumed_s, state
+        times_s=recording.times_s,
+        T_world_camera=poses,
+        keyframes=keyframes,
+        links=links,
+        map=colored,
+        voxel_m=voxel_m,
+        first_frames=first,
+        T_world_tracked=tracked,
+        notes=notes,
+        resumed_s=resumed_s,
+        without_depth=track.blind,
+        apart=tuple(k for k, one in enumerate(track.frames) if one is not None and poses[k] is None),
+        disturbed=tuple(k for k in track.disturbed if poses[k] is not None),
+        state=state,
     )
     return Rig(recording.name, seen.views, walk=walk)
 

@@ -69,7 +69,7 @@ def test_frames_that_are_lost_are_named(capsys, walk, tmp_path):
     (copy / "depth.txt").write_text("\n".join(lines))
     code, _, said = run(capsys, "reconstruct", "--recording", copy, "--out", tmp_path / "out")
     assert code == 0, said
-    sentence = "The camera was lost in 2 of 12 frames (5 to 6), which are not in the surface"
+    sentence = "2 of 12 frames (5 to 6) have no depth, or too little to be tracked, and are not in the"
     assert sentence in said
     assert sentence in unescape((tmp_path / "out" / "report.html").read_text())
 

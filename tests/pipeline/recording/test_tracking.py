@@ -12,6 +12,7 @@ from packetmesh.progress import drain
 from pipeline.importing.recorded import DepthView
 from pipeline.kernels.geometry import inverse, look_at, rigid
 from pipeline.recording.brightness import Brightness
+from pipeline.recording.recording import read_ahead
 from pipeline.recording.tracking import (
     LEAST_AGREEMENT,
     LEAST_OVERLAP,
@@ -26,7 +27,6 @@ from pipeline.recording.tracking import (
     Track,
     iterate_tracking,
     link,
-    read_ahead,
     registered,
     steadied,
 )
