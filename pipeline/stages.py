@@ -152,6 +152,8 @@ def open_rig(source: Source, frames: int = MOST_AVERAGED) -> Steps[Rig]:
     yield Progress(f"loading {source.title}", 0.0)
     if isinstance(source, Recorded):
         recording = yield from part(source.iterate_open(), "recording", 0.0, 0.01, detail=True)
+        for note in recording.notes:
+            yield Progress(note, 0.01)
         steps = iterate_recording(recording, frames)
         rig = yield from part(steps, "recording", 0.01, 0.05, detail=True)
         if source.true_path is not None:

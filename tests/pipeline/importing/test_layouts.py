@@ -275,7 +275,7 @@ def test_frames_that_were_not_looked_at_and_extrinsics_that_are_missing_are_said
     write_scannet(tmp_path / "recording", written)
     report, _ = imported(tmp_path)
     assert report.candidates == 4
-    assert "One in 3 of the 10 frames is used (at most 4)" in report.notes
+    assert "One in 3 of the 10 frames is used, by number and not by motion (at most 4)" in report.notes
     assert not any("extrinsic" in note for note in report.notes)
 
 
