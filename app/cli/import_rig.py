@@ -50,7 +50,8 @@ def import_rig(
             print_json(asdict(kept))
         return
     report = drain(iterate_checked_import(path, out, frames, depth_scale, intrinsics), say_progress)
-    say(f"100%  {report.kind}: {len(report.frames)} nodes of {report.candidates} moments in {report.folder}")
+    nodes = f"{len(report.frames)} node{'s' * (len(report.frames) != 1)}"
+    say(f"100%  {report.kind}: {nodes} of {report.candidates} moments in {report.folder}")
     for frame in report.frames:
         say(f"{frame.node}  {frame.color}, {frame.depth}")
     for note in report.notes:

@@ -19,7 +19,7 @@ from app.reports.reconstruction import write_reconstruction_report
 from app.web.markup import Markup
 from packetmesh.batch import run_batch
 from packetmesh.errors import InputError, PacketMeshError
-from packetmesh.files import atomic_path, finite, writable_folder, write_json
+from packetmesh.files import atomic_path, finite, removed_if_empty, writable_folder, write_json
 from packetmesh.progress import Progress, drain, part
 from packetmesh.settings import settings
 from pipeline.config import Baseline, PipelineConfig
@@ -106,8 +106,8 @@ def iterate_run(
         yield from loading
     else:
         drain(loading)
-    writable_folder(out)
-    with _kept_tracking(spec, cache):
+    with removed_if_empty(out), _kept_tracking(spec, cache):
+        writable_folder(out)
         return (yield from _iterate_written(spec, cache, report, out, baseline))
 
 
@@ -133,17 +133,30 @@ def _iterate_written(
     beside = None if baseline is None else (yield from compute(spec, baseline, cache)).value
     metrics = metrics_of(result) | ({} if report is None else {"import": asdict(report)})
     clear_run_folder(out)
-    if isinstance(rig, Recorded) and result.rig.walk is not None:
-        recording = yield from part(rig.iterate_open(), "files", 0.9, 0.95, detail=True)
-        yield from part(iterate_keyframes(recording, result.rig.walk, out), "keyframes", 0.95, 1.0)
-    yield Progress("writing the report", 1.0)
-    texture = dressed(result.rig, result.placement, result.after)
-    write_reconstruction_report(result, metrics, out / REPORT, texture)
-    if baseline is not None and beside is not None:
-        write_baseline(baseline, beside, result, out)
-    yield Progress("writing the surfaces", 1.0)
-    write_run_folder(result, metrics, out, texture=texture)
+    try:
+        if isinstance(rig, Recorded) and result.rig.walk is not None:
+            recording = yield from part(rig.iterate_open(), "files", 0.9, 0.95, detail=True)
+            yield from part(iterate_keyframes(recording, result.rig.walk, out), "keyframes", 0.95, 1.0)
+        yield Progress("writing the report", 1.0)
+        texture = dressed(result.rig, result.placement, result.after)
+        write_reconstruction_report(result, metrics, out / REPORT, texture)
+        if baseline is not None and beside is not None:
+            write_baseline(baseline, beside, result, out)
+        yield Progress("writing the surfaces", 1.0)
+        write_run_folder(result, metrics, out, texture=texture)
+    except BaseException:  # a disk that is full, or Ctrl-C
+        _delete_written(out, baseline)
+        raise
     return result, metrics
+
+
+def _delete_written(out: Path, baseline: Baseline | None) -> None:
+    """Delete the files of a run that failed while they were written."""
+    with suppress(InputError, OSError):
+        clear_run_folder(out)
+        (out / REPORT).unlink(missing_ok=True)
+        for suffix in () if baseline is None else (".ply", ".glb"):
+            (out / f"surface_{baseline}{suffix}").unlink(missing_ok=True)
 
 
 def iterate_imported(

@@ -74,7 +74,7 @@ def _sections(
         before["no_hit_ray_share"],
         after["no_hit_ray_share"],
         _use_sentences(metrics["measured"]),
-        _agreeing(metrics["measured"]),
+        _agreeing(metrics["measured"], "keyframes" if "recording" in metrics else "cameras"),
     )
     yield from _recording(metrics)
     yield from _doubts(metrics)
@@ -104,14 +104,14 @@ def _use_sentences(measured: dict[str, float]) -> Markup:
     ).format(**measured)
 
 
-def _agreeing(measured: dict[str, float]) -> Markup:
-    """Return a sentence on the agreement of a rig's cameras; empty if no two saw the same place."""
+def _agreeing(measured: dict[str, float], nodes: str) -> Markup:
+    """Return a sentence on the agreement of the nodes, cameras or keyframes; empty if none share a place."""
     share = measured["agreement_between_nodes"]
     if not math.isfinite(share):
         return Markup("")
     return Markup(
-        " Where two cameras measured the same surface, <b>{:.1%}</b> of the points agree within 2 %."
-    ).format(share)
+        " Where two {} measured the same surface, <b>{:.1%}</b> of the points agree within 2 %."
+    ).format(nodes, share)
 
 
 def _recording(metrics: dict[str, Any]) -> Iterator[Markup]:

@@ -198,7 +198,8 @@ def _scale_note(written: list[ImportedFrame], *units_per_metre: float) -> str:
     """Return a sentence on the depth scale, or on those of different cameras."""
     units = " or ".join(f"{units:g}" for units in units_per_metre)
     median_m = float(np.median([frame.median_depth_m for frame in written]))
-    return f"Depth: {units} units in a metre, which makes the median depth {median_m:.3g} m"
+    noun = "unit" if units == "1" else "units"
+    return f"Depth: {units} {noun} in a metre, which makes the median depth {median_m:.3g} m"
 
 
 def _node_of(candidate: Candidate, sequence: Sequence, T_up_world: FloatArray | None) -> NodeImages:
