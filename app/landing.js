@@ -12,11 +12,14 @@
     else if (tries > 0) setTimeout(once, POLL_MS, find, act, tries - 1);
   }
 
-  const shared = "lecture" in landing.dataset; // a lecture's session has no address of its own
+  const shared = "lecture" in landing.dataset; // the session of a lecture is older than this page
 
+  // Remove the landing, also from the address, or a reload would show it again.
   function leave() {
     landing.remove();
-    if (shared) history.replaceState(null, "", location.pathname); // or a reload would show the landing again
+    const query = new URLSearchParams(location.search);
+    query.delete("welcome");
+    history.replaceState(null, "", `${location.pathname}${`?${query}`.replace(/\?$/, "")}`);
     window.removeEventListener("keydown", escape, true);
   }
 
@@ -26,18 +29,19 @@
     leave();
   }
 
+  // Open a place; one without a scene leaves a lecture's class in the scene that it sees.
   function goTo(place) {
-    const screen = new URLSearchParams(place).get("screen");
+    const query = new URLSearchParams(place);
+    if (!shared || query.has("scene")) return window.packetmeshAddress.ask(place);
     const steps = () => [...document.querySelectorAll("div:has(> .packetmesh-steps) + div button")];
-    if (shared) once(() => steps().find(one => one.textContent.toLowerCase().startsWith(screen)), step => step.click());
-    else window.packetmeshAddress.ask(place);
+    once(() => steps().find(one => one.textContent.toLowerCase().startsWith(query.get("screen"))), step => step.click());
   }
 
   const seen = element => element.offsetParent !== null;
 
   // Open the folder of one of these labels, and call `act` with it.
   function openFolder(labels, act) {
-    const head = () => [...document.querySelectorAll("svg.tabler-icon-chevron-down")]
+    const head = () => window.packetmeshAddress.received && [...document.querySelectorAll("svg.tabler-icon-chevron-down")]
       .map(arrow => arrow.parentElement).find(one => labels.includes(one.textContent.trim()) && seen(one));
     once(head, found => {
       found.click();

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import difflib
+import itertools
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,13 +12,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from app.lesson.faults import Fault, first_of
 from app.lesson.files import LESSONS, Kind, Lesson, screen_of
 from app.lesson.languages import NAMES
 from app.lesson.reading import (
     TRANSLATION,
-    Fault,
     check_lesson,
-    first_of,
     head_of,
     read_text,
     titles_of,
@@ -36,7 +36,7 @@ KINDS: dict[str, Kind[Any]] = {kind.name: kind for kind in (CALIBRATE, DEPTH, FU
 SUFFIX = ".md"
 _HERE = Path(__file__).parent
 _SHARED = ("window", "looking", "measuring", "dock")
-"""Folders with controls that several screens have."""
+"""Folders with controls that several screens have; a screen has those that it imports."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,15 +133,37 @@ def _check(path: Path) -> tuple[OwnLesson | None, list[Fault]]:
         return None, [Fault(path, 0, str(error))]
     head, _ = head_of(text)
     line, screen = head.get("screen", (1, ""))
-    kind = KINDS.get(screen)
-    if kind is None:
-        fault = f"has the unknown screen '{screen[:40]}'" if screen else "names no screen"
-        wrong = Fault(path, line, f"{fault}; write one such as 'screen: surface': {', '.join(KINDS)}")
-        return None, [wrong]
+    if screen in KINDS:
+        return _check_on(path, text, KINDS[screen])
+    fault = f"has the unknown screen '{screen[:40]}'" if screen else "names no screen"
+    fault += f"; write one such as 'screen: surface': {', '.join(KINDS)}"
+    name, others = _likely_screen(path, text, screen)
+    if others:
+        fault += f"; the other faults are those on the screen {name}"
+    return None, sorted([Fault(path, line, fault), *others], key=_place)
+
+
+def _place(fault: Fault) -> tuple[Path, int]:
+    """Return the file and the line of a fault, by which faults are sorted."""
+    return fault.path, fault.line
+
+
+def _likely_screen(path: Path, text: str, screen: str) -> tuple[str, list[Fault]]:
+    """Return the screen that a lesson with the unknown screen ``screen`` means, and its faults there: that of
+    the most similar name, else the one on which it has the fewest faults.
+    """
+    near = difflib.get_close_matches(screen.lower(), KINDS, n=1, cutoff=0.75)
+    found = {name: _check_on(path, text, KINDS[name])[1] for name in near or KINDS}
+    name = min(found, key=lambda one: len(found[one]))
+    return name, found[name]
+
+
+def _check_on(path: Path, text: str, kind: Kind[Any]) -> tuple[OwnLesson | None, list[Fault]]:
+    """Return the lesson of a screen in a file, and all faults; None instead of a lesson with faults."""
     lesson, faults = check_lesson(path, kind)
-    faults += _scene_faults(path, head, kind)
+    faults += _scene_faults(path, head_of(text)[0], kind)
     faults += _unknown_names(path, text, kind)
-    faults.sort(key=lambda fault: (fault.path, fault.line))
+    faults.sort(key=_place)
     return (None if lesson is None or faults else OwnLesson(path, kind.name, lesson)), faults
 
 
@@ -164,9 +186,14 @@ def _unknown_names(path: Path, text: str, kind: Kind[Any]) -> list[Fault]:
         name = value.strip()
         if not colon or key not in ("open", "see") or not name or name in known:
             continue
-        near = difflib.get_close_matches(name, folders if key == "open" else _labels(names), n=3, cutoff=0.4)
+        near = difflib.get_close_matches(name, folders if key == "open" else _labels(names), n=3, cutoff=0.6)
         what = "folder or tab" if key == "open" else "control or number"
-        advice = f"try {' or '.join(near)}" if near else "write its name as it is on the screen"
+        if near:
+            advice = f"try {' or '.join(near)}"
+        elif key == "open":
+            advice = f"it has {', '.join(sorted(folders))}"
+        else:
+            advice = "write its name as it is on the screen"
         sentence = f"has the {what} '{name[:60]}', which its screen does not have; {advice}"
         faults.append(Fault(path, number, sentence))
     return faults
@@ -174,19 +201,87 @@ def _unknown_names(path: Path, text: str, kind: Kind[Any]) -> list[Fault]:
 
 @cache
 def names_on(screen: str) -> tuple[frozenset[str], frozenset[str]]:
-    """Return the titles of a screen's folders and tabs, and all texts in its code, labels included."""
-    folders, texts = set[str](), set[str]()
-    for path in (path for place in (f"screens/{screen}", *_SHARED) for path in (_HERE / place).rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Constant) and isinstance(node.value, str):
-                texts.add(node.value)
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.args:
-                title = node.args[0]
-                if node.func.attr not in ("add_folder", "add_tab") or not isinstance(title, ast.Constant):
-                    continue
-                if isinstance(title.value, str):
-                    folders.add(title.value)
-    return frozenset(folders), frozenset(texts)
+    """Return the titles of a screen's folders and tabs, and all texts in its code, labels included.
+
+    Choices of drop-downs, which cannot be framed, are left out, but for those of one small word: some of them
+    are names of numbers, too, such as fx.
+    """
+    own = _modules(f"screens/{screen}")
+    shared = (_modules(place) for place in _SHARED if any(f"app.{place}" in text for text in own))
+    trees = [ast.parse(text) for text in (*own, *itertools.chain.from_iterable(shared))]
+    constants = _constants(trees)
+    folders, texts, labels, choices = set[str](), set[str](), set[str](), set[str]()
+    for node in (node for tree in trees for node in ast.walk(tree)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            texts.add(node.value)
+        if isinstance(node, ast.Call | ast.List):
+            labels |= _labels_in(node, constants)
+        if isinstance(node, ast.Call) and _called(node) in ("add_folder", "add_tab"):
+            folders |= _texts_in(node.args[:1], {})
+        elif isinstance(node, ast.Call) and _called(node) == "add_dropdown":
+            choices |= _texts_in(node.args[1:2], constants)
+    only_choices = {text for text in choices - labels if " " in text or text[:1].isupper()}
+    return frozenset(folders), frozenset(texts - only_choices)
+
+
+def _modules(place: str) -> list[str]:
+    """Return the code of all modules in a folder of the app."""
+    return [path.read_text(encoding="utf-8") for path in sorted((_HERE / place).rglob("*.py"))]
+
+
+def _called(call: ast.Call) -> str:
+    """Return the last part of the name of the function that is called; empty without a name."""
+    return getattr(call.func, "attr", getattr(call.func, "id", ""))
+
+
+def _constants(trees: Iterable[ast.Module]) -> Mapping[str, list[ast.expr]]:
+    """Return the values of the modules' constants by their names."""
+    found: dict[str, list[ast.expr]] = {}
+    for node in (node for tree in trees for node in tree.body):
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.value is not None:
+            found.setdefault(node.target.id, []).append(node.value)
+        for target in node.targets if isinstance(node, ast.Assign) else ():
+            pairs = [(target, node.value)]
+            if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
+                pairs = list(zip(target.elts, node.value.elts, strict=False))
+            for name, value in pairs:
+                if isinstance(name, ast.Name):
+                    found.setdefault(name.id, []).append(value)
+    return found
+
+
+def _labels_in(node: ast.Call | ast.List, constants: Mapping[str, list[ast.expr]]) -> set[str]:
+    """Return the labels of controls that a call adds, and the names of the rows that a call or list has."""
+    parts = node.args if isinstance(node, ast.Call) else node.elts
+    rows = [part.elts[0] for part in parts if isinstance(part, ast.Tuple) and len(part.elts) > 1]
+    if isinstance(node, ast.Call):
+        name = _called(node)
+        rows += node.args[
+            : 2 if name == "buttons" else int(name.startswith("add_") or name in ("row", "term"))
+        ]
+    return _texts_in(rows, constants)
+
+
+def _texts_in(nodes: Iterable[ast.AST], constants: Mapping[str, list[ast.expr]]) -> set[str]:
+    """Return the texts in expressions, those of constants included, of dictionaries only the keys."""
+    texts, left, seen = set[str](), list(nodes), set[str]()
+    while left:
+        node = left.pop()
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            texts.add(node.value)
+        elif isinstance(node, ast.Name | ast.Attribute):
+            name = node.attr if isinstance(node, ast.Attribute) else node.id
+            if name not in seen:
+                seen.add(name)
+                left += constants.get(name, [])
+        elif isinstance(node, ast.Dict):
+            pairs = zip(node.keys, node.values, strict=True)
+            left += [value if key is None else key for key, value in pairs]
+        elif isinstance(node, ast.Call):
+            left += node.args
+        elif not isinstance(node, ast.DictComp):
+            left += ast.iter_child_nodes(node)
+    return texts
 
 
 def _labels(texts: Iterable[str]) -> list[str]:

@@ -128,7 +128,7 @@ def plan(
         source, imported = drain(iterate_imported(named, out or Path(scratch)), say_progress)
         say_network(network, before, preset, of_network, REPLACED)
         spec, cache = Spec(source, chain, config), RunCache()
-        drain(compute(spec, "rig", cache), say_progress)
+        drain(part(compute(spec, "rig", cache), "reconstruction", 0.0, DONE, detail=True), say_progress)
         if out is not None:
             writable_folder(out)
         steps = iterate_reconstruction(spec, cache)

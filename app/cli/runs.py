@@ -130,19 +130,21 @@ def _iterate_written(
     """Reconstruct a rig that is loaded, and write the run folder with its report."""
     rig = spec.source
     result = yield from iterate_reconstruction(spec, cache)
-    beside = None if baseline is None else (yield from compute(spec, baseline, cache)).value
+    beside = None
+    if baseline is not None:
+        beside = (yield from part(compute(spec, baseline, cache), f"baseline {baseline}", 0.9, 0.92)).value
     metrics = metrics_of(result) | ({} if report is None else {"import": asdict(report)})
     clear_run_folder(out)
     try:
         if isinstance(rig, Recorded) and result.rig.walk is not None:
-            recording = yield from part(rig.iterate_open(), "files", 0.9, 0.95, detail=True)
-            yield from part(iterate_keyframes(recording, result.rig.walk, out), "keyframes", 0.95, 1.0)
-        yield Progress("writing the report", 1.0)
+            recording = yield from part(rig.iterate_open(), "files", 0.92, 0.94, detail=True)
+            yield from part(iterate_keyframes(recording, result.rig.walk, out), "keyframes", 0.94, 0.97)
+        yield Progress("writing the report", 0.97)
         texture = dressed(result.rig, result.placement, result.after)
         write_reconstruction_report(result, metrics, out / REPORT, texture)
         if baseline is not None and beside is not None:
             write_baseline(baseline, beside, result, out)
-        yield Progress("writing the surfaces", 1.0)
+        yield Progress("writing the surfaces", 0.99)
         write_run_folder(result, metrics, out, texture=texture)
     except BaseException:  # a disk that is full, or Ctrl-C
         _delete_written(out, baseline)

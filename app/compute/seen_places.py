@@ -37,7 +37,7 @@ def place_of(store: Store, spec: Spec) -> Generator[Progress, None, Place]:
     held, place = _newest.get(store.folder, (None, None))
     if place is None or held != wanted:
         done = yield from iterate_reconstruction(spec, store)
-        yield Progress("what the cameras see", 0.5)
+        yield Progress("what the cameras see", 0.95)
         seen = seen_place(done)
         place = Place(done, seen, floor_m(seen))
         _newest[store.folder] = wanted, place

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic
 
+from app.lesson.faults import Fault, Faults, first_of
 from app.lesson.files import CHOICES, CLAUSE, FIELD, LESSONS, Choice, Kind, Lesson, Look, Question, Stop
 from app.lesson.files import choice as one_of
 from app.lesson.languages import NAMES
@@ -30,46 +31,17 @@ Lines = Sequence[tuple[int, str]]
 """Lines of a file with their numbers, which start at 1."""
 
 
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """A fault in a lesson's file, with advice on what to write instead."""
-
-    path: Path
-    line: int
-    """Line in the file; 0 for the file as a whole."""
-    sentence: str
-
-    def __str__(self) -> str:
-        where = f", line {self.line}," if self.line else ""
-        return f"The lesson {self.path.name}{where} {self.sentence}."
-
-
-class _Faults(list[Fault]):
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        self._path = path
-
-    def add(self, line: int, sentence: str) -> None:
-        self.append(Fault(self._path, line, sentence))
-
-
 def read_lesson(path: Path, kind: Kind[Look]) -> Lesson[Look]:
     """Read a lesson and its translations, which are next to it.
 
     Raises:
-        InputError: a file cannot be read, has no title or section, sets something unknown, uses an unknown
+        InputError: a file cannot be read, has no title or stop, sets something unknown, uses an unknown
             field, asks without choices or an answer, or is a translation with other parts than the original.
     """
     lesson, faults = check_lesson(path, kind)
     if lesson is None or faults:
         raise first_of(faults)
     return lesson
-
-
-def first_of(faults: Sequence[Fault]) -> InputError:
-    """Return the first fault as an error; if there are others, it names the command that shows them."""
-    more = "; packetmesh lesson check shows the other faults" if faults[1:] else ""
-    return InputError(f"{str(faults[0]).removesuffix('.')}{more}.")
 
 
 shipped_lesson = cache(read_lesson)
@@ -81,19 +53,20 @@ def check_lesson(path: Path, kind: Kind[Look]) -> tuple[Lesson[Look] | None, lis
 
     The lesson is None if its own file has a fault.
     """
-    lesson, faults = _parse(path, kind, None)
-    if lesson is None:
+    read, faults = _parse(path, kind, None)
+    if read is None:
         return None, faults
     translations = {}
+    whole = not faults
     for code, other in translations_of(path).items():
-        translated, wrong = _parse(other, kind, lesson)
-        faults += wrong
-        if code == lesson.language:
+        translated, wrong = _parse(other, kind, read)
+        if code == read.language:
             sentence = f"is in the language of {path.name}; rename it, or write 'language:' in {path.name}"
             faults.append(Fault(other, 0, sentence))
-        if translated is not None:
-            translations[code] = replace(translated, language=code)
-    return replace(lesson, translations=translations), faults
+        if translated is not None and not wrong and whole:
+            translations[code] = replace(_lesson(other, kind, translated), language=code)
+        faults += wrong
+    return (replace(_lesson(path, kind, read), translations=translations) if whole else None), faults
 
 
 def translations_of(path: Path) -> dict[str, Path]:
@@ -168,11 +141,30 @@ def head_of(text: str) -> tuple[dict[str, tuple[int, str]], Lines]:
     return values, others
 
 
+@dataclass(frozen=True, slots=True)
+class _Read(Generic[Look]):
+    """A file of a lesson, as far as it can be read."""
+
+    name: str
+    """Name of the file without its suffix."""
+    title: str
+    language: str
+    scene: str
+    stops: tuple[Stop[Look] | None, ...]
+    """A stop with a fault is None."""
+
+
+def _lesson(path: Path, kind: Kind[Look], read: _Read[Look]) -> Lesson[Look]:
+    """Return the lesson of a file without a fault."""
+    stops = tuple(stop for stop in read.stops if stop is not None)
+    return Lesson(read.title, stops, kind.default, path.stem, read.scene, read.language)
+
+
 def _parse(
-    path: Path, kind: Kind[Look], original: Lesson[Look] | None
-) -> tuple[Lesson[Look] | None, list[Fault]]:
-    """Read one file, a translation if ``original`` is given. Returns None if it has faults, and these."""
-    faults = _Faults(path)
+    path: Path, kind: Kind[Look], original: _Read[Look] | None
+) -> tuple[_Read[Look] | None, list[Fault]]:
+    """Read one file, a translation if ``original`` is given. Returns it, None without stops, and faults."""
+    faults = Faults(path)
     try:
         text = read_text(path)
     except InputError as error:
@@ -193,26 +185,27 @@ def _parse(
     for number, line in others if sections else ():
         faults.add(
             number,
-            f"has '{line.strip()[:40]}' before the first section, where only the title and one line each of "
-            f"{', '.join(HEAD)} can be; leave it out, or begin a section above it with '## title'",
+            f"has '{line.strip()[:40]}' before the first stop, where only the title and one line each of "
+            f"{', '.join(HEAD)} can be; leave it out, or begin a stop above it with '## title'",
         )
     if not sections:
-        faults.add(len(text.splitlines()), "has no sections; begin each with a line '## title'")
-    if original is not None and sections and len(sections) != len(original.stops):
+        faults.add(len(text.splitlines()), "has no stops; begin each with a line '## title'")
+        return None, faults
+    same: Sequence[Stop[Look] | None] = [None] * len(sections)
+    if original is not None and len(sections) == len(original.stops):
+        same = original.stops
+    elif original is not None:
         count = len(original.stops)
         faults.add(
             sections[-1][0][0],
-            f"ends with section {len(sections)}, and {original.name}.md has {count}; translate each once",
+            f"ends with stop {len(sections)}, and {original.name}.md has {count}; translate each once",
         )
-    if faults and (not sections or original is not None):
-        return None, faults
     _check_fields(sections, kind, faults)
-    same = [None] * len(sections) if original is None else list(original.stops)
-    stops = [_stop(section, kind, one, faults) for section, one in zip(sections, same, strict=True)]
-    if faults:
-        return None, faults
-    scene, kept = head.get("scene", (0, ""))[1], [stop for stop in stops if stop is not None]
-    return Lesson(title, tuple(kept), kind.default, path.stem, scene, language), faults
+    stops = tuple(
+        _stop(section, kind, one, faults, original is not None)
+        for section, one in zip(sections, same, strict=True)
+    )
+    return _Read(path.stem, title, language, head.get("scene", (0, ""))[1], stops), faults
 
 
 def _sections(text: str) -> list[Lines]:
@@ -226,7 +219,7 @@ def _sections(text: str) -> list[Lines]:
     return list(sections)
 
 
-def _check_fields(sections: Sequence[Lines], kind: Kind[Look], faults: _Faults) -> None:
+def _check_fields(sections: Sequence[Lines], kind: Kind[Look], faults: Faults) -> None:
     """Add a fault for each field that its screen does not compute, or whose stop may have been skipped, and
     for each brace outside of fields.
     """
@@ -263,14 +256,16 @@ def _check_fields(sections: Sequence[Lines], kind: Kind[Look], faults: _Faults) 
                 )
 
 
-def _stop(section: Lines, kind: Kind[Look], same: Stop[Look] | None, faults: _Faults) -> Stop[Look] | None:
+def _stop(
+    section: Lines, kind: Kind[Look], same: Stop[Look] | None, faults: Faults, translated: bool
+) -> Stop[Look] | None:
     """Return the stop of a section; None if it has a fault.
 
-    A translation has the settings of ``same``, the original's stop.
+    A translation has the settings of ``same``, the original's stop; None if that has a fault or is missing.
     """
     (first, heading), *lines = section
     title, before = heading[3:].strip(), len(faults)
-    where = f"section '{title}'"
+    where = f"stop '{title}'"
     for number, line in lines:
         nearly = _NEARLY.match(line)
         if nearly is not None and nearly[0] != f"{nearly[1].lower()}:":
@@ -281,7 +276,7 @@ def _stop(section: Lines, kind: Kind[Look], same: Stop[Look] | None, faults: _Fa
     changes = [(number, *_parted(line)) for number, line in lines if line.partition(":")[0] in KEYS]
     look, opens, sees = kind.default, list[str](), list[str]()
     for number, key, value in changes:
-        if same is not None:
+        if translated:
             faults.add(number, f"is a translation; leave out '{key}:', it is in the original")
         elif key == "set":
             name, _, setting = (part.strip() for part in value.partition("="))
@@ -329,7 +324,7 @@ def _parts(lines: Lines) -> dict[str, tuple[int, str]]:
 
 
 def _question(
-    parts: dict[str, tuple[int, str]], where: str, kind: Kind[Look], first: int, faults: _Faults
+    parts: dict[str, tuple[int, str]], where: str, kind: Kind[Look], first: int, faults: Faults
 ) -> Question | None:
     line = min(number for number, _ in parts.values())
     if tuple(parts) != PARTS or not all(text for _, text in parts.values()):
@@ -378,9 +373,9 @@ def _question(
     return Question(parts["ask"][1], found, parts["reveal"][1])
 
 
-def _compare(stop: Stop[Look], same: Stop[Look], line: int, faults: _Faults) -> None:
+def _compare(stop: Stop[Look], same: Stop[Look], line: int, faults: Faults) -> None:
     """Add a fault for each part in which a translated stop differs from the original."""
-    where, of = f"section '{stop.title}'", f"'{same.title}' of the original"
+    where, of = f"stop '{stop.title}'", f"'{same.title}' of the original"
     if (stop.question is None) != (same.question is None):
         faults.add(line, f"{where} must ask if and only if {of} does")
     elif stop.question is not None and same.question is not None:

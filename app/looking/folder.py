@@ -26,6 +26,10 @@ LIGHT_DEG = (120, 35)
 STEP_M = 0.01
 SPARE_M = 0.05
 """Distance of the highest cut above the points that were seen."""
+MARGIN = 0.15
+"""Distance of a new box's faces from the extent, as a share of it: walls and floor are at the ends of the
+extent, and some points and inferred surface beyond them.
+"""
 
 
 class LookFolder:
@@ -130,7 +134,7 @@ class LookFolder:
         elif room is not None and self._cut.value == labels.PLANE:
             cut = Plane(_place(room.centre_m), self._view_direction(level=True))
         elif room is not None and self._cut.value == labels.BOX:
-            cut = Box(_place(room.centre_m), _place(0.8 * room.size_m))
+            cut = Box(_place(room.centre_m), _place((1.0 + 2.0 * MARGIN) * room.size_m))
         self._take(replace(self._look, cut=cut))
 
     def _set(self) -> None:

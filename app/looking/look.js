@@ -1,7 +1,7 @@
 // How a screen's drawing is looked at (folder.py): cuts, wireframe, light and size of points are set on viser's
 // three.js objects before every frame, so that a cut follows its handle at once and nothing is sent again.
 window.packetmeshLook = (() => {
-  const HANDLES_MS = 4000; // handles are shown for so long after a movement of the pointer or a change
+  const HANDLES_MS = 4000; // handles are shown for so long after a movement of the pointer, a change, or full screen
   const SHADE = 0.3; // of a surface that the light does not reach
   const looks = new Map(); // by the screen's node: its parts, its state, and whether anything of it was ever unusual
   const usual = new WeakMap(); // by material: the size of its points, and the size that was set
@@ -168,11 +168,12 @@ window.packetmeshLook = (() => {
     hiding = setTimeout(() => window.packetmeshFrames.draw(), HANDLES_MS + 50);
     if (asleep) window.packetmeshFrames.draw();
   }
+  const cutting = () => [...looks.values()].some(({look}) => look.planes.length > 0);
   for (const kind of ["pointermove", "pointerdown"])
     window.addEventListener(kind, ({target}) => {
-      const cutting = [...looks.values()].some(({look}) => look.planes.length > 0);
-      if (cutting && target === document.querySelector("canvas[data-engine]")) wake();
+      if (cutting() && target === document.querySelector("canvas[data-engine]")) wake();
     }, true);
+  window.addEventListener("packetmesh-alone", () => cutting() && wake());
 
   window.packetmeshFrames.before(beforeFrame);
 

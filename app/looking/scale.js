@@ -52,6 +52,10 @@
     if (!place.isConnected) picture.parentElement.parentElement.append(place);
     if (now === text) return;
     text = now;
+    const far = NAMES.map((name, row) => [axes[row].z, `${name},${axes[row].x.toFixed(2)},${axes[row].y.toFixed(2)}`]);
+    far.sort(([one], [other]) => one - other);
+    const directions = far.map(([, axis]) => axis).join(";");
+    place.dataset.bar = away <= 0 ? "" : `${(length / metresPerPx).toFixed(1)} ${lengthText(length)} ${away.toFixed(away < 1 ? 2 : 1)} ${directions}`;
     place.querySelector("i").style.width = `${length / metresPerPx}px`;
     place.querySelector("b").textContent = lengthText(length);
     place.querySelector("span").textContent = `${away.toFixed(away < 1 ? 2 : 1)} m away, where the view turns`;

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +15,15 @@ from pipeline.folders.walk import lost_sentences
 from pipeline.io.textures import Texture
 from pipeline.reconstruct import Reconstruction
 from pipeline.stages import cameras_of, dressed
+from pipeline.surface.boundary import LONGEST_HOLE_M
 from pipeline.surface.pictures import MeshPainter, beside
 
 MOST_SHOWN = 6
 """Most nodes of which the report has pictures."""
 QUALITY_ROWS = (
     ("no_hit_ray_share", "rays without a surface (%)", 100.0),
+    ("gaps.area_m2", "area of the holes that the cameras see (m²)", 1.0),
+    ("gaps.large", "holes from 100 cm²", None),
     ("guessed_ray_share", "rays on inferred surface (%)", 100.0),
     (
         "within_2pct_share",
@@ -28,17 +31,31 @@ QUALITY_ROWS = (
         100.0,
     ),
     ("within_5pct_share", "the same within 5 % of the measurement (%)", 100.0),
-    ("hole_area_m2", "area of the holes inside the surface (m²)", 1.0),
-    ("boundary_loops", "rims around holes and at the ends of the surface", None),
-    ("boundary_length_m", "length of the rims (m)", 1.0),
-    ("non_manifold_edges", "edges with more than two faces", None),
-    ("components", "connected pieces", None),
     ("area_m2", "area (m²)", 1.0),
-    ("vertices", "vertices", None),
     ("triangles", "triangles", None),
-    ("unused_points", "points without a triangle", None),
+    ("vertices", "vertices", None),
 )
 """Key of a quality measure, label, and factor to the label's unit; None for a count."""
+RIM_ROWS = (
+    ("boundary_loops", "rims, of any length", None),
+    ("boundary_length_m", "length of the rims (m)", 1.0),
+    ("hole_area_m2", f"area inside rims shorter than {LONGEST_HOLE_M:g} m, outer rims left out (m²)", 1.0),
+    ("gaps.count", "holes of any size that the cameras see", None),
+    ("components", "connected pieces", None),
+    ("non_manifold_edges", "edges with more than two faces", None),
+    ("unused_points", "points without a triangle", None),
+)
+"""Measures of the mesh's edges and pieces, as in ``QUALITY_ROWS``."""
+HOLES = (
+    "A hole is a patch of a camera's picture whose rays are without a surface. Its area is taken at the "
+    "depth of the surface next to it; a hole that two cameras see counts twice."
+)
+RIMS = (
+    "A rim is a line of edges with one triangle: around a hole of any size, at the end of the surface, and "
+    "where one thing hides another. Fusion fills the middle of a hole and can leave a seam of tiny holes "
+    "where inferred and measured surface do not quite meet, so there can be more rims after it, although the "
+    "holes that the cameras see are smaller."
+)
 
 
 def write_reconstruction_report(
@@ -166,14 +183,33 @@ def _surfaces(
             for when, painter in painters.items()
         )
         yield pictures(figures, columns=2)
-    rows = (
-        (
-            label,
-            *(quality[key] if scale is None else float(scale * quality[key]) for quality in (before, after)),
-        )
-        for key, label, scale in QUALITY_ROWS
+    yield from quality_tables(before, after)
+
+
+def quality_tables(before: dict[str, Any], after: dict[str, Any]) -> Iterator[Markup]:
+    """Yield tables of both surfaces' measures (``surface_metrics``): those that the app shows, then rims."""
+    yield _measures(QUALITY_ROWS, before, after)
+    yield Markup(
+        '<p class="note">{}</p><details><summary>More about the mesh: rims and pieces</summary>'
+    ).format(HOLES)
+    yield _measures(RIM_ROWS, before, after)
+    yield Markup('<p class="note">{}</p></details>').format(RIMS)
+
+
+def _measures(
+    rows: Sequence[tuple[str, str, float | None]], before: dict[str, Any], after: dict[str, Any]
+) -> Markup:
+    """Return a table of measures of both surfaces. A key ``gaps.area_m2`` is that of an inner record."""
+
+    def value(quality: dict[str, Any], key: str, scale: float | None) -> float | int:
+        record, _, name = key.rpartition(".")
+        number: float | int = (quality[record] if record else quality)[name]
+        return number if scale is None else float(scale * number)
+
+    return table(
+        ("", "before", "after"),
+        ((label, *(value(quality, key, scale) for quality in (before, after))) for key, label, scale in rows),
     )
-    yield table(("", "before", "after"), rows)
 
 
 def _whose(nodes: int) -> str:

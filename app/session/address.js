@@ -38,6 +38,11 @@ window.packetmeshAddress = (() => {
       return keys.filter(key => `${now.getAll(key)}` !== `${start.getAll(key)}`);
     },
 
+    // Whether the server has received the place for which the page has asked last.
+    get received() {
+      return unsaid === null;
+    },
+
     // Start a session: after the page loads or reloads, or when the server is back.
     begin(session, own, from) {
       name = session;

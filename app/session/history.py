@@ -8,7 +8,7 @@ earlier results are still in the store.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from app.compute.state import Spec
@@ -21,6 +21,8 @@ from pipeline.sources import Source
 
 NO_SETTINGS = {"t", "node", "photo", "pictures", "ball", "measure"}
 """Keys of the address that are not undone: places in a result, and measures, which have their own list."""
+LOOK = "look"
+"""Key of the folder *Look*, whose text holds several settings (``app.looking.look``)."""
 SAME_S = 1.5
 """Changes of one setting within this time, seconds, are one step, as when a slider is dragged."""
 MOST_STEPS = 100
@@ -39,6 +41,14 @@ NAMES: Mapping[str, str] = {
     "net": "network",
     "lang": "language",
     STOP: "stop of the lesson",
+    "look.top": "Cut away",
+    "look.plane": "Cut away",
+    "look.box": "Cut away",
+    "look.out": "Cut away",
+    "look.wire": "Draw",
+    "look.light": "Draw",
+    "look.points": "Points",
+    "look.ruler": "Scale bar and axes",
 }
 """Names of the parts of a state that have no control of their own; others are named by their field."""
 RESET = "Reset"
@@ -63,9 +73,22 @@ class Settings:
         named += ["preset"] if self.preset != before.preset else []
         if not named:
             named += [key_of(change) for change in differences(self.config, before.config)]
-        named += sorted({key for _, key, _ in set(self.parts) ^ set(before.parts)})
+        named += sorted(set(self._changed_parts(before)))
         names = (NAMES[STOP] if key.startswith(STOP) else NAMES.get(key, _words(key)) for key in named)
         return tuple(dict.fromkeys(names))
+
+    def _changed_parts(self, before: Settings) -> Iterator[str]:
+        """Yield the keys of the parts that differ, of *Look* with the kind of setting (``look.wire``)."""
+        texts, others = ({part[:2]: part[2] for part in one.parts} for one in (self, before))
+        for name in texts.keys() | others.keys():
+            text, other = texts.get(name, ""), others.get(name, "")
+            if text == other:
+                continue
+            if name[1] != LOOK:
+                yield name[1]
+                continue
+            for setting in filter(None, {*text.split("~")} ^ {*other.split("~")}):
+                yield f"{LOOK}.{setting.partition('_')[0]}"
 
 
 @dataclass(slots=True)

@@ -1,4 +1,4 @@
-"""A picture of a browser's 3-D view at twice its size, as a PNG file."""
+"""A picture of a browser's 3-D view at twice its size, with its scale bar if that is shown, as a PNG file."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import cv2
 import viser
 
 from app.drawing.pictures import opaque
+from app.session.scale_bar import BAR, ScaleBar, bar_of, draw_bar
 from app.web.gate import MOST_VIEW_PX
 from app.web.markup import Markup
 from app.window.hidden import add_hidden
@@ -20,8 +21,10 @@ from packetmesh.errors import InputError
 TIMES = 2
 """The picture's size over the size of the view in the window."""
 WAIT_S = 30.0
-SIZE = re.compile(r"\d{1,9} ([1-9]\d{0,4}) ([1-9]\d{0,4})")
-"""The page's answer: a number that makes equal answers differ, width and height of the view, CSS pixels."""
+SIZE = re.compile(rf"\d{{1,9}} ([1-9]\d{{0,4}}) ([1-9]\d{{0,4}})(?: {BAR})?")
+"""The page's answer: a number that makes equal answers differ, width and height of the view, CSS pixels, and
+the scale bar over the view, if there is one.
+"""
 
 
 def size_of(text: str) -> tuple[int, int]:
@@ -69,15 +72,19 @@ class ViewPicture:
     def _answered(self) -> None:
         """Have the browser draw. A thread of its own waits for the picture, which may take seconds."""
         size_px = size_of(self._field.value)
+        bar = bar_of(self._field.value.split(" ", 3)[-1])
         if self._taking.acquire(blocking=False):
-            threading.Thread(target=self._draw, args=(*size_px, self._file()), daemon=True).start()
+            threading.Thread(target=self._draw, args=(*size_px, bar, self._file()), daemon=True).start()
 
-    def _draw(self, width_px: int, height_px: int, file: str) -> None:
+    def _draw(self, width_px: int, height_px: int, bar: ScaleBar | None, file: str) -> None:
         try:
             drawn = self._client.get_render(height_px, width_px, transport_format="png", timeout=WAIT_S)
             if drawn.shape != (height_px, width_px, 4):
                 raise RuntimeError("another size")
-            png = cv2.imencode(".png", cv2.cvtColor(opaque(drawn), cv2.COLOR_RGB2BGR))[1].tobytes()
+            rgb = opaque(drawn)
+            if bar is not None:
+                draw_bar(rgb, bar, TIMES)
+            png = cv2.imencode(".png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR))[1].tobytes()
         except (RuntimeError, TimeoutError, OSError, ValueError):
             self._ui.post(_fail)
         else:

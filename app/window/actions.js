@@ -4,7 +4,7 @@
   const STEPPER = "div:has(> .packetmesh-steps) + div";
   const BUTTON = "button:not([role=tab], .packetmesh-term)";
   const SETTING = `${BUTTON}, [role=option], [role=slider], .mantine-Slider-root, [type=checkbox]`;
-  const NONE = `${STEPPER}, .mantine-Modal-root, .mantine-Spotlight-root, .packetmesh-tools`; // what has no settings
+  const NONE = `${STEPPER}, .mantine-Modal-root, .mantine-Spotlight-root, .packetmesh-tools, #packetmesh-landing`; // what has no settings
   const KEPT = ["screen", "cam"]; // parts of the address that Reset leaves as they are
   let idle = []; // buttons for which the server has nothing to do
   let used = false; // whether a setting was used since the last Reset

@@ -86,12 +86,14 @@
     if (ROOT.classList.contains("packetmesh-alone")) return comeBack();
     ROOT.classList.add("packetmesh-alone");
     document.body.append(back);
+    window.dispatchEvent(new Event("packetmesh-alone"));
     ROOT.requestFullscreen?.().catch(() => {}); // then it fills the window
   }
 
   function comeBack() {
     ROOT.classList.remove("packetmesh-alone");
     back.remove();
+    window.dispatchEvent(new Event("packetmesh-alone"));
     if (document.fullscreenElement) document.exitFullscreen();
   }
   document.addEventListener("fullscreenchange", () => document.fullscreenElement || comeBack());
@@ -139,10 +141,11 @@
       point(name, label);
     },
 
-    // Tell the server the size of the view.
+    // Tell the server the size of the view, and its scale bar if it has one (scale_bar.py).
     measureView(_, field) {
       const {clientWidth, clientHeight} = document.querySelector("canvas[data-engine]");
-      window.packetmeshDockRow.write(field, `${said += 1} ${clientWidth} ${clientHeight}`);
+      const bar = document.querySelector(".packetmesh-scale")?.dataset.bar ?? "";
+      window.packetmeshDockRow.write(field, `${said += 1} ${clientWidth} ${clientHeight} ${bar}`.trim());
     },
 
     say: (_, sentence) => packetmesh.notice(sentence, SAID_MS),

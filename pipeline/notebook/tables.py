@@ -127,7 +127,10 @@ def _reconstruction(result: Reconstruction) -> str:
     placement = result.placement
     frame, T = placement.placed(list(zip(result.rig.frames, placement.T_world_camera, strict=True)))[0]
     figures = [
-        (f"{name} fusion, seen by {frame.name}; magenta: the ray misses", seen_picture(surface, frame, T))
+        (
+            f"{name} fusion, seen by {frame.name}; magenta: a ray without a surface",
+            seen_picture(surface, frame, T),
+        )
         for name, surface in (("before", result.before), ("after", result.after))
         if len(surface.triangles)
     ]

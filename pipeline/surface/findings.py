@@ -86,7 +86,7 @@ class SweepPoint:
     hole_area_m2: float
     """Area of the holes, as ``SurfaceQuality.hole_area_m2`` (SPEC 5)."""
     no_hit_ray_share: float
-    """Share of the cameras' pixel rays that miss the surface; NaN without cameras."""
+    """Rays without a surface: share of the cameras' pixel rays, 0 to 1; NaN without cameras."""
     accuracy_1cm: float
     """Share of the surface within 1 cm of the truth; NaN without truth or without a triangle."""
     f_score_5cm: float

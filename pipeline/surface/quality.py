@@ -110,7 +110,7 @@ def seen_by(
 
 
 def no_hit_ray_share(vertices_m: FloatArray, triangles: IntArray, cameras: Sequence[Camera]) -> float:
-    """Return the share of all cameras' pixel rays that miss the mesh, 0 to 1; NaN without cameras."""
+    """Return the share of all cameras' pixel rays without a surface, 0 to 1; NaN without cameras."""
     return missed_share(list(hit_depths(vertices_m, triangles, cameras)), cameras)
 
 

@@ -1,5 +1,7 @@
 """A command as a user gives it, and what it has to say of what cannot be."""
 
+import re
+
 from app.cli import main
 
 
@@ -12,6 +14,11 @@ def run(capsys, *argv: object) -> tuple[int, str, str]:
         code = int(stop.code or 0)
     out, err = capsys.readouterr()
     return code, out, err
+
+
+def shares(said: str) -> list[int]:
+    """The per cents at the beginnings of the lines on stderr, in their order."""
+    return [int(found) for found in re.findall(r"^ *(\d+)%  ", said, re.MULTILINE)]
 
 
 def check_one_sentence(got: tuple[int, str, str], code: int, says: str) -> None:

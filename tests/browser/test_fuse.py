@@ -145,6 +145,27 @@ def test_two_methods_race_by_default_and_ceicp_arrives(fuse):
     fuse.get_by_text(re.compile("ends .* cm from the truth")).wait_for()
 
 
+CUT_CAPTIONS = """() => [...document.querySelectorAll(".packetmesh-board .caption span")].filter(one => {
+  const words = document.createRange();
+  words.selectNodeContents(one);
+  const [text, room] = [words, one.closest(".caption")].map(part => part.getBoundingClientRect());
+  return text.height > room.height + 1 || text.right > one.nextSibling.getBoundingClientRect().left;
+}).length"""
+"""Captions of magnified corners that are wider or higher than their room."""
+
+
+@pytest.mark.parametrize("width_px", [900, 700])
+def test_the_caption_of_a_narrow_corner_is_whole(fuse, width_px):
+    size = fuse.viewport_size
+    try:
+        fuse.set_viewport_size({"width": width_px, "height": 640})
+        fuse.locator(".packetmesh-board .caption span").first.wait_for()
+        fuse.wait_for_timeout(500)
+        assert fuse.evaluate(CUT_CAPTIONS) == 0
+    finally:
+        fuse.set_viewport_size(size)
+
+
 def test_a_third_method_gets_a_lane_a_column_and_room(fuse):
     before, picture = numbers(fuse, "End error"), canvas(fuse)
     unfold(fuse, "Methods, nodes and pairs")

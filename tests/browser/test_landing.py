@@ -41,6 +41,12 @@ def test_it_covers_the_page_while_the_scene_loads_and_escape_leaves_to_it(landin
     landing.get_by_text("Each camera node delivers").wait_for()
 
 
+def test_a_click_on_explore_is_nothing_that_could_be_reset(landing):
+    landing.get_by_role("button", name="Explore").click()
+    landing.get_by_text("Up to date").wait_for()
+    expect(landing.get_by_role("button", name="Reset", exact=True)).to_be_disabled()
+
+
 def test_a_lesson_opens_at_its_first_stop(landing):
     landing.get_by_role("button", name="What one lost packet costs").click()
     landing.get_by_text("(1 of 8)").locator("visible=true").first.wait_for()

@@ -22,12 +22,25 @@ from tests.browser.hands import (
 STEERS = "You see what the teacher sees"
 
 
+STOP = "## Too small a ball\nset: radii = 0.6 r_F\n\nThis ball leaves {unused} of the points unused.\n"
+OWN = {
+    "elsewhere": f"# How good is the other scene?\nscreen: surface\nscene: uncalibrated\n{STOP}",
+    "here": f"# How good is this scene?\nscreen: surface\n{STOP}",
+}
+"""A teacher's own lessons: one in a scene of its own, one in the scene that is shown."""
+
+
 @pytest.fixture(scope="module")
-def lecture(app):
+def lecture(app, tmp_path_factory):
     """A server of its own, with the computing processes of the other one, which goes on with them."""
+    from app.lessons import own_lessons
     from app.server import build_server
 
-    lecture = build_server("box-on-table", port=0, lecture=True, pool=app.pool)
+    folder = tmp_path_factory.mktemp("lessons")
+    for name, text in OWN.items():
+        (folder / f"{name}.md").write_text(text, encoding="utf-8")
+    lessons = own_lessons([folder])
+    lecture = build_server("box-on-table", port=0, lecture=True, pool=app.pool, lessons=lessons)
     yield lecture
     lecture.pool = SimpleNamespace(close=lambda: None)
     lecture.stop()
@@ -165,3 +178,22 @@ def test_the_address_of_the_class_is_shown_large(teacher, lecture):
     expect(teacher.locator(".packetmesh-join")).to_contain_text(lecture.class_link)
     expect(teacher.locator(".packetmesh-join")).to_contain_text("No other machine reaches this address")
     press(teacher, "Close")
+
+
+def learn(page, lecture, title, key):
+    """Open the teacher's link anew, and a lesson on its start page; its first stop is then in the address."""
+    page.goto(lecture.teacher_url)
+    page.get_by_role("dialog", name="Welcome").get_by_role("button", name=title).click()
+    page.wait_for_url(f"**{key}=1**")
+    expect(page.get_by_role("dialog", name="Welcome")).to_have_count(0)
+    return page.url
+
+
+def test_a_lesson_begins_in_its_scene_and_one_without_a_scene_in_the_one_that_is_shown(teacher, lecture):
+    """Last, because the class is then in another scene."""
+    url = learn(teacher, lecture, "How good is the other scene?", "stop-own-elsewhere")
+    assert "scene=uncalibrated&" in url
+    assert "screen=surface" in url
+    assert "welcome" not in url
+    assert "scene=uncalibrated" in learn(teacher, lecture, "How good is this scene?", "stop-own-here")
+    assert "screen=depth" in learn(teacher, lecture, "Can a picture measure?", "scene=living-room**stop")

@@ -2,10 +2,11 @@
 
 import re
 
+import cv2
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.hands import afresh, go, pick, press, unfold, visible
+from tests.browser.hands import afresh, drawn, go, pick, press, unfold, visible
 
 PLANE = """() => {
   let found = null;
@@ -74,6 +75,36 @@ def test_two_surfaces_side_by_side_keep_their_names_above_a_cut(looking):
     plane(looking)
     looking.wait_for_timeout(1000)
     assert looking.evaluate(SHOWN_LABELS) == 2
+
+
+HANDLES = "() => window.__viserMutable.nodeRefFromName['/surface/look']?.visible === {}"
+SHADOWS = """() => [...document.querySelectorAll("[data-dock-root] div")]
+  .filter(one => one.offsetParent !== null && getComputedStyle(one).boxShadow !== "none").length"""
+
+
+def test_full_screen_shows_the_handles_of_a_cut_again_and_no_edge_of_the_panel(looking):
+    pick(looking, "Cut away", "Around a box")
+    with drawn(looking):
+        looking.wait_for_function(HANDLES.format("true"))
+        for key in ("m", "Escape"):
+            looking.wait_for_function(HANDLES.format("false"))
+            looking.keyboard.press(key)
+            looking.wait_for_function(HANDLES.format("true"))
+            assert (looking.evaluate(SHADOWS) == 0) == (key == "m")
+
+
+def test_a_picture_of_the_view_has_the_scale_bar(looking, tmp_path):
+    pictures = []
+    for name in ("without", "with"):
+        with looking.expect_download() as got:
+            looking.keyboard.press("p")
+        got.value.save_as(tmp_path / name)
+        pictures.append(cv2.imread(str(tmp_path / name)))
+        visible(looking, "Scale bar and axes").click()
+        with drawn(looking):
+            looking.wait_for_timeout(500)
+    bare, ruled = (picture[-200:, 20:220].astype(float) for picture in pictures)
+    assert ruled.mean() > bare.mean() + 10.0  # white under the bar
 
 
 def test_the_scale_bar_is_a_round_length_where_the_view_turns(looking):

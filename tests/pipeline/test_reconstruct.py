@@ -7,14 +7,15 @@ import pytest
 
 from packetmesh.errors import PacketMeshError
 from packetmesh.progress import Progress, drain
+from packetmesh.settings import with_settings
 from pipeline.config import PRESETS, AcquisitionConfig, SurfaceConfig
 from pipeline.io.demos import load_demo
 from pipeline.kernels import geometry
 from pipeline.reconstruct import iterate_reconstruction, reconstruct
 from pipeline.registration import point_error_m
 from pipeline.sources import Demo, LoadedRig
-from pipeline.spec import Spec
-from pipeline.stages import run
+from pipeline.spec import CHAIN, Spec
+from pipeline.stages import RunCache, run
 from pipeline.types import DepthMap, PointSource, Rig
 
 pytestmark = pytest.mark.xdist_group("reconstruct")  # one worker makes the shared reconstruction once
@@ -82,6 +83,17 @@ def test_progress_rises_and_an_abandoned_run_stops(rig):
             steps.close()
     assert fractions == sorted(fractions)
     assert len(fractions) == 3
+
+
+@pytest.mark.parametrize(
+    "stages", [CHAIN, ("after", "before", "truth"), ("clouds", "alpha"), ("after", "alpha")]
+)
+def test_progress_never_falls_in_whatever_order_the_stages_are_computed(rig, stages):
+    config = with_settings(PRESETS["packetmesh"], ["surface.max_points=3000"])
+    steps = run(Spec(LoadedRig(Rig("pair", rig.frames[:1])), config=config), RunCache(), stages)
+    fractions = [progress.fraction for progress in steps]
+    assert fractions == sorted(fractions)
+    assert fractions[-1] < 1.0
 
 
 def test_a_node_that_overlaps_nothing_keeps_its_believed_pose_and_says_so(rig):

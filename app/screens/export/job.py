@@ -60,7 +60,7 @@ def export_job(store: Store, spec: Spec, name: str, shown: Shown = "after") -> G
             else:
                 baseline = (yield from store.stage(spec, shown)) if shown in get_args(Baseline) else None
                 measures = (yield from measures_of(store, spec)) if spec.tape.taken else None
-                yield Progress("writing the run folder", 0.8)
+                yield Progress("writing the run folder", 0.95)
                 _archive(result, metrics, path, shown, baseline, measures)
         return path.read_bytes()
 

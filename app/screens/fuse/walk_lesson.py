@@ -110,7 +110,7 @@ def _loop_numbers(view: WalkView) -> dict[str, str]:
 
 
 def _surface_numbers(surface: Any) -> dict[str, str]:
-    """Return the shares of rays that miss the surfaces after and before fusion."""
+    """Return the shares of rays without a surface after and before fusion."""
     if surface is None or surface.before is None:
         return dict.fromkeys(("missed", "missed_before"), WAITING)
     return {

@@ -12,7 +12,7 @@ from app.compute.state import Spec
 from app.compute.store import Store
 from app.screens.surface.view import ClosingCamera, ClosingView, Which
 from packetmesh.errors import InputError, PacketMeshError
-from packetmesh.progress import Progress
+from packetmesh.progress import Progress, part
 from pipeline.planning.hole_targets import hole_targets
 from pipeline.planning.plan import PlanConfig, iterate_candidates, plan_of
 from pipeline.planning.sensors import AS_PRESENT, sensor_named
@@ -29,7 +29,7 @@ def closing_job(store: Store, spec: Spec, which: Which, index: int) -> Generator
 
 
 def _camera(store: Store, spec: Spec, which: Which, index: int) -> Generator[Progress, None, ClosingCamera]:
-    place = yield from place_of(store, spec)
+    place = yield from part(place_of(store, spec), "the present cameras", 0.0, 0.6, detail=True)
     surface = place.done.after if which == "after" else place.done.before
     holes = find_holes(surface.vertices_m, surface.triangles)
     if not 0 <= index < len(holes):
@@ -39,7 +39,7 @@ def _camera(store: Store, spec: Spec, which: Which, index: int) -> Generator[Pro
     targets = hole_targets(surface, holes[index], place.seen.views, surface.radii_m[-1])
     seen = replace(place.seen, targets=targets)
     sensor = sensor_named(AS_PRESENT, place.done.rig)
-    judged = yield from iterate_candidates(seen, sensor)
+    judged = yield from part(iterate_candidates(seen, sensor), "judging places", 0.6, 1.0, detail=True)
     (camera,) = plan_of(seen, judged, sensor, PlanConfig()).cameras
     row = next(k for k, one in enumerate(judged.candidates) if one.T_world_camera is camera.T_world_camera)
     lens = sensor.intrinsics

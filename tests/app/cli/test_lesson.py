@@ -55,6 +55,9 @@ def test_a_good_lesson_and_all_that_ship_have_no_fault(capsys, tmp_path):
             8,
             "has the control or number 'Radius (cm)', which its screen does not",
         ),
+        ("Radius (mm)", "Nothing", 8, "has the control or number 'Nothing', which its screen does not have"),
+        ("Radius (mm)", "after fusion", 8, "has the control or number 'after fusion', which its screen"),
+        ("open: Holes", "open: Nowhere", 7, "it has Advanced, "),
         ("set: radii = 2 r_F", "set: radius = 2", 6, "cannot set radius = 2: try one of show, radii"),
         ("open: Holes", "open: Look\nopen: Measure\nopen: None", 9, "the folder or tab 'None'"),
         ("open: Holes", "Open: Holes", 7, "begins with 'Open:'; write 'open:', without a space and in small"),
@@ -107,6 +110,37 @@ def test_a_fault_is_one_sentence_with_file_line_and_remedy(capsys, tmp_path, old
     assert (found["faults"][0]["file"], found["faults"][0]["line"]) == (str(tmp_path / "mine.md"), line)
     assert sentence in found["faults"][0]["sentence"]
     assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("screen", ["screen: Surfaces", "screen: kitchen", ""])
+def test_with_an_unknown_screen_all_other_faults_are_named_too(capsys, tmp_path, screen):
+    faulty = LESSON.replace("scene: office", "scene: moon").replace("open: Holes", "open: Nowhere")
+    faulty = faulty.replace("set: radii = 2 r_F", "set: radii = 0 r_F").replace("reveal: So.\n", "")
+    (tmp_path / "mine.md").write_text(faulty)
+    (tmp_path / "mine.de.md").write_text(TRANSLATION.replace("{missed}", "{mised}"))
+    others = checked(capsys, tmp_path)[1]["faults"]
+    assert len({fault["line"] for fault in others if fault["file"].endswith("mine.md")}) == 4
+    assert any(fault["file"].endswith("mine.de.md") for fault in others)
+    (tmp_path / "mine.md").write_text(faulty.replace("screen: surface", screen))
+    faults = checked(capsys, tmp_path)[1]["faults"]
+    of_screen = [fault for fault in faults if "screen: surface" in fault["sentence"]]
+    assert len(of_screen) == 1
+    assert of_screen[0]["sentence"].endswith("; the other faults are those on the screen surface")
+    assert [fault for fault in faults if fault not in of_screen] == others
+
+
+def test_a_translation_is_checked_although_the_original_has_a_fault(capsys, tmp_path):
+    (tmp_path / "mine.md").write_text(LESSON.replace("{missed}", "{mised}"))
+    (tmp_path / "mine.de.md").write_text(
+        f"{TRANSLATION}\n## Zwei\nset: radii = 1 r_F\n".replace("Jetzt {", "{")
+    )
+    found = [(fault["file"], fault["sentence"]) for fault in checked(capsys, tmp_path)[1]["faults"]]
+    assert [file.rpartition("/")[2] for file, _ in found].count("mine.md") == 1
+    of_translation = "; ".join(sentence for file, sentence in found if file.endswith("mine.de.md"))
+    assert "ends with stop 2, and mine.md has 1" in of_translation
+    assert "is a translation; leave out 'set:'" in of_translation
+    assert "stop 'Zwei' has no text" in of_translation
+    assert "section" not in of_translation
 
 
 @pytest.mark.parametrize(

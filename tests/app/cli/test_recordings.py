@@ -13,7 +13,7 @@ from lab.worlds.rooms import random_room
 from pipeline.importing.tum import poses_at
 from pipeline.io.meshes import read_mesh
 from pipeline.recording.errors import ate_m
-from tests.app.commands import check_one_sentence, run
+from tests.app.commands import check_one_sentence, run, shares
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +36,9 @@ def test_a_recording_becomes_a_surface_a_trajectory_and_a_report(capsys, walk, o
     recording = metrics["recording"]
     assert recording["frames"] == 12
     assert recording["lost"] == []
+    told = shares(said)
+    assert told == sorted(told)
+    assert told.count(100) == 1
     assert f"Tracked 12 frames over {recording['path_m']:.1f} m at" in said
     truth = read_truth(walk)
     times_s = np.arange(12) / 30.0

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.io.demos import load_demo
 from pipeline.io.rigs import save_rig
 from pipeline.types import DepthMap, RgbdFrame, Rig
-from tests.app.commands import check_one_sentence, run
+from tests.app.commands import check_one_sentence, run, shares
 from tests.pipeline.importing.bags import write_bag
 
 QUICK = ("--set", "surface.max_points=3000")
@@ -28,6 +28,17 @@ def test_two_rooms_are_no_rig_and_the_command_says_so(capsys, tmp_path):
     assert last == "No two nodes could be placed relative to each other: the surface is of one node only"
     assert list(json.loads((tmp_path / "out" / "poses.json").read_text())) == ["node_00"]
     assert left_out in unescape((tmp_path / "out" / "report.html").read_text())
+
+
+def test_progress_never_falls_and_is_whole_once(capsys, tmp_path):
+    save_rig(tmp_path / "rig", Rig("pair", load_demo("box-on-table").frames[:1]))
+    words = ["reconstruct", "--rig", tmp_path / "rig", "--out", tmp_path / "out", *QUICK]
+    code, _, err = run(capsys, *words, "--baseline", "alpha")
+    told = shares(err)
+    assert code == 0
+    assert told == sorted(told)
+    assert told.count(100) == 1
+    assert len(told) > 8
 
 
 def test_a_rig_that_finds_its_places_says_how_well_it_agrees(capsys, tmp_path):

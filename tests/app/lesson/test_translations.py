@@ -114,7 +114,7 @@ def test_a_language_has_all_phrases_with_the_same_places():
         ("## Eins\n", "## Eins\nset: radii = 2 r_F\n", 4, "leave out 'set:'"),
         ("# Mein Radius\n", "# Mein Radius\nscreen: surface\n", 2, "leave out 'screen:', it is in mine.md"),
         ("# Mein Radius\n", "# Mein Radius\nlanguage: de\n", 2, "it is in this file's name"),
-        ("reveal: So.", "reveal: So.\n\n## Zwei\nDort.", 13, "ends with section 2, and mine.md has 1"),
+        ("reveal: So.", "reveal: So.\n\n## Zwei\nDort.", 13, "ends with stop 2, and mine.md has 1"),
         (TRANSLATION.partition("ask:")[2], "", 6, "must ask with 'ask:', 'choices:' and 'reveal:'"),
         (QUESTION, "", 3, "must ask if and only if 'One' of the original does"),
         ("{missed}", "", 3, "lacks the field {missed}"),

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.compute.cuts import Box, Plane, Top
+from app.compute.cuts import Box, Plane, Top, kept
 from app.looking import labels
 from app.looking.folder import LookFolder
 from app.looking.look import look_of
@@ -105,6 +105,15 @@ def test_a_plane_leaves_out_what_is_nearer_and_turns_and_flips(session):
     session.gui.press("Plane", labels.VIEW)
     assert look_of(session.folder.place()).cut.normal == pytest.approx((0.0, 0.8, -0.6))
     assert session.sent["planes"][0]["axis"] == [0.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize("points_m", [CLOSED, OPEN])
+def test_a_box_first_holds_the_whole_room_and_is_not_much_larger(server, points_m):
+    session = Session(server.scene, points_m)
+    session.gui.set("Cut away", labels.BOX)
+    cut = look_of(session.folder.place()).cut
+    assert kept(cut, points_m).all()
+    assert (np.array(cut.size_m) < 1.5 * np.ptp(points_m, axis=0)).all()
 
 
 def test_a_box_turns_and_can_be_left_out_itself(session):

@@ -104,6 +104,28 @@ def test_two_settings_or_a_long_rest_are_two_steps(hand):
     assert hand.get(POINTS) == 6000
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "name"),
+    [
+        ("", "wire", "Draw"),
+        ("wire~ruler", "light_120_35~ruler", "Draw"),
+        ("light_120_35", "light_90_35", "Draw"),
+        ("", "top_2400", "Cut away"),
+        ("box_1_2_3_4_5_6_0", "plane_1_2_3_0_0_1000~ruler", "Cut away and 1 more"),
+        ("wire", "wire~ruler", "Scale bar and axes"),
+        ("points_8", "", "Points"),
+    ],
+)
+def test_a_change_of_the_look_names_its_setting(hand, before, after, name):
+    look = hand.panels[0].in_address["look"] = Part(before)
+    hand.history.begin()
+    look.text = after
+    hand.history.follow(by_hand=True)
+    assert hand.history.undo() == f"Undone: {name}."
+    assert look.text == before
+    assert hand.history.redo() == f"Redone: {name}."
+
+
 def test_what_is_set_back_at_once_was_no_step(hand):
     hand.set(POINTS, 6000)
     hand.set(POINTS, START.config.surface.max_points, after_s=0.1)

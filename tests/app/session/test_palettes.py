@@ -88,6 +88,7 @@ def test_terms_are_found_in_the_screens_tables_as_they_are_written():
 
 def test_the_page_tells_the_size_of_a_picture_and_nonsense_is_refused():
     assert size_of("3 720 450") == (1440, 900)
+    assert size_of("4 720 450 120.0 50 cm 2.4 x,1.00,0.00;y,0.00,1.00;z,0.00,0.00") == (1440, 900)
     for text in ("", "3 720", "3 0 450", "3 720 450 1", "3 -720 450", "x 1 2", "3 99999 10", "3 1e3 10"):
         with pytest.raises(InputError):
             size_of(text)

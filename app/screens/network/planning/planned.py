@@ -50,7 +50,7 @@ def plan_of_request(
     Raises:
         PacketMeshError: there is no plan; the message says why and what to try.
     """
-    whole = yield from place_of(store, spec)
+    whole = yield from part(place_of(store, spec), "the present cameras", 0.0, 0.6, detail=True)
     place = whole if request.dark_surface else _without_dark(whole)
     key = ("plan", spec.key("surface"), request)
     plan, delivery = yield from store.remember(key, partial(_planned, store, spec, whole, place, request))
