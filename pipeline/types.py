@@ -293,7 +293,7 @@ class Walk:
     without_depth: tuple[int, ...] = ()
     """Frames with no depth, or too little to be tracked."""
     apart: tuple[int, ...] = ()
-    """Frames without a pose that were tracked in a part of the recording that was not joined to the map."""
+    """Frames without a pose of parts of the recording that were tracked, but not joined to the map."""
     disturbed: tuple[int, ...] = ()
     """Frames with a pose in which something moved: they agree little with the frames before them."""
     state: Path | None = None

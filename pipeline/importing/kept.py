@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -66,7 +66,8 @@ def iterate_keep(
     check_new(Path(out))
     opening = iterate_opening(path, depth_scale, intrinsics)
     recording = yield from part(opening, "files", 0.0, 0.1, detail=True)
-    count, poses, of_poses = len(recording.times_s), recording.T_world_camera, tuple[str, ...]()
+    count, of_poses = len(recording.times_s), tuple[str, ...]()
+    poses: Sequence[FloatArray | None] | None = recording.T_world_camera
     if check is not None and poses is not None:
         yield Progress("poses", 0.1)
         poses, of_poses = check(recording)

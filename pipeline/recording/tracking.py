@@ -141,7 +141,7 @@ def iterate_tracking(
     written_s = time.monotonic()
     for k, view in read_ahead(recording, range(first, count)):
         if k % REPORTED == 0:
-            yield Progress(f"tracking frame {k} of {count}", k / count)
+            yield Progress(f"frame {k} of {count}", k / count)
         tracker.follow(k, organised(view.depth, view.camera))
         if checkpoint is not None and time.monotonic() - written_s >= EVERY_S:
             checkpoint.write(tracker.state())

@@ -96,11 +96,21 @@ def _iterate_rig(
         notes=notes,
         resumed_s=resumed_s,
         without_depth=track.blind,
-        apart=tuple(k for k, one in enumerate(track.frames) if one is not None and poses[k] is None),
+        apart=_apart(track, poses),
         disturbed=tuple(k for k in track.disturbed if poses[k] is not None),
         state=state,
     )
     return Rig(recording.name, seen.views, walk=walk)
+
+
+def _apart(track: Track, poses: Sequence[FloatArray | None]) -> tuple[int, ...]:
+    """Return the frames of parts that were not joined, with those lost just before each part began."""
+    found, blind = set[int](), set(track.blind)
+    for k in reversed(range(len(poses))):
+        tracked = track.frames[k] is not None
+        if poses[k] is None and (tracked or (k + 1 in found and k not in blind)):
+            found.add(k)
+    return tuple(sorted(found))
 
 
 def iterate_map(
@@ -119,7 +129,7 @@ def iterate_map(
     volume = Volume(voxel_m)
     for count, (k, view) in enumerate(read_ahead(recording, numbers)):
         if count % REPORTED == 0:
-            yield Progress(f"mapping frame {k} of {len(T_world_depth)}", count / len(numbers))
+            yield Progress(f"frame {k} of {len(T_world_depth)}", count / len(numbers))
         T = T_world_depth[k]
         assert T is not None
         volume.integrate(view, T)

@@ -24,6 +24,10 @@ def walk(tmp_path_factory):
     return folder
 
 
+def share_of(line):
+    return int(line.split("%")[0])
+
+
 @pytest.fixture(scope="module")
 def out(walk, tmp_path_factory):
     return tmp_path_factory.mktemp("out") / "run"
@@ -39,6 +43,8 @@ def test_a_recording_becomes_a_surface_a_trajectory_and_a_report(capsys, walk, o
     told = shares(said)
     assert told == sorted(told)
     assert told.count(100) == 1
+    assert min(share_of(line) for line in said.splitlines() if "recording: mapping" in line) > 20
+    assert "tracking: frame 0 of 12" in said
     assert f"Tracked 12 frames over {recording['path_m']:.1f} m at" in said
     truth = read_truth(walk)
     times_s = np.arange(12) / 30.0
