@@ -6,7 +6,7 @@ import json
 import shutil
 import traceback
 from collections.abc import Generator, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -41,7 +41,7 @@ from pipeline.importing import ImportReport, is_recording
 from pipeline.io.rigs import is_rig
 from pipeline.placement.outcome import APART
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
-from pipeline.recording.checkpoint import Checkpoint, files_digest
+from pipeline.recording.checkpoint import deleted_after, files_digest
 from pipeline.recording.imported import iterate_checked_import
 from pipeline.recording.walk import LEAST_FRAMES
 from pipeline.sources import Calibrated, FileSource, Recorded, RigFolder
@@ -102,26 +102,11 @@ def iterate_run(
     rig, report = yield from iterate_imported(source, out)
     spec, cache = Spec(rig, preset, config), RunCache()
     loading = run(spec, cache, ["rig"])
-    if isinstance(rig, Recorded):
-        yield from loading
-    else:
-        drain(loading)
-    with removed_if_empty(out), _kept_tracking(spec, cache):
+    loaded = (yield from loading) if isinstance(rig, Recorded) else drain(loading)
+    walk = loaded["rig"].value.walk
+    with removed_if_empty(out), deleted_after(None if walk is None else walk.state):
         writable_folder(out)
         return (yield from _iterate_written(spec, cache, report, out, baseline))
-
-
-@contextmanager
-def _kept_tracking(spec: Spec, cache: RunCache) -> Iterator[None]:
-    """Delete the state of a recording's tracking after this block; if it fails, say that it is kept."""
-    walk = drain(run(spec, cache, ["rig"]))["rig"].value.walk
-    if walk is None or walk.state is None:
-        yield
-        return
-    checkpoint = Checkpoint(walk.state)
-    with checkpoint.said():
-        yield
-    checkpoint.delete()
 
 
 def _iterate_written(

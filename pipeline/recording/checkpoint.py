@@ -78,6 +78,18 @@ class Checkpoint:
             raise
 
 
+@contextmanager
+def deleted_after(state: Path | None) -> Iterator[None]:
+    """Delete a file with a state after this block; if it fails, its error says that the state is kept."""
+    if state is None:
+        yield
+        return
+    checkpoint = Checkpoint(state)
+    with checkpoint.said():
+        yield
+    checkpoint.delete()
+
+
 def delete_old() -> None:
     """Delete the states that were not written for ``OLD_S``."""
     for path in (cache_folder() / "tracking").glob("*.npz"):
