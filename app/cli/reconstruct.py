@@ -87,7 +87,7 @@ def recording_sentences(metrics: dict[str, Any]) -> list[str]:
         f"{per_s} frame{'s' * (per_s != '1')} a second; keyframes: {recording['keyframes']}, loops: "
         f"{recording['loops']}"
     )
-    return [summary, *lost_sentences(recording)]
+    return [summary, *lost_sentences(recording, metrics["measured"]["agreement_between_nodes"])]
 
 
 def imported_notes(report: dict[str, Any] | None) -> list[str]:

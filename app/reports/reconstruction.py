@@ -141,7 +141,7 @@ def _recording(metrics: dict[str, Any]) -> Iterator[Markup]:
         "keyframes: {keyframes}, loops: {loops}; {map_points:,} points measured in voxels of "
         "{voxel_mm:.0f} mm. Tracking and mapping: {frames_per_s:.0f} frames a second.</p>"
     ).format(voxel_mm=1000.0 * recording["voxel_m"], **recording)
-    for sentence in lost_sentences(recording):
+    for sentence in lost_sentences(recording, metrics["measured"]["agreement_between_nodes"]):
         yield Markup('<p class="lead"><b>{}.</b></p>').format(sentence)
 
 

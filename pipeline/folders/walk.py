@@ -14,6 +14,8 @@ from pipeline.types import FloatArray, Walk
 
 LEAST_DISTURBED = 3
 """Fewest frames in which something moved that are worth a sentence."""
+LEAST_AGREEING = 0.92
+"""Smallest agreement of cameras at their right poses in the demo rooms (SPEC 4.10)."""
 FILES = ("trajectory.txt", "trajectory.json")
 
 
@@ -86,8 +88,13 @@ def _losses(walk: Walk) -> dict[str, Any]:
     }
 
 
-def lost_sentences(recording: Mapping[str, Any]) -> list[str]:
-    """Return sentences on frames without a pose, by cause, and on what moved, from ``walk_metrics``."""
+def lost_sentences(recording: Mapping[str, Any], agreeing_share: float = 1.0) -> list[str]:
+    """Return sentences on frames without a pose, by cause, and on what moved.
+
+    Args:
+        recording: numbers of ``walk_metrics``.
+        agreeing_share: share of what two keyframes measured that agrees; NaN if no two measured the same.
+    """
     frames = recording["frames"]
     blind, apart = (_numbers(recording[name]) for name in ("without_depth", "apart"))
     other = _spans(sorted(_numbers(recording["lost"]) - blind - apart))
@@ -100,7 +107,8 @@ def lost_sentences(recording: Mapping[str, Any]) -> list[str]:
     if apart:
         found.append(
             f"{_of(_spans(sorted(apart)), frames)} no connection with the mapped part of the recording, "
-            "because too little was recognised in them, and are not in the surface; record a way between"
+            "because too little was recognised in them, and are not in the surface; record a way between, "
+            "with little that moves in view"
         )
     if other:
         where = _where(other)
@@ -108,11 +116,18 @@ def lost_sentences(recording: Mapping[str, Any]) -> list[str]:
             f"The camera was lost in {_count(other)} of {frames} frames ({where}), which are not in the "
             "surface; turn more slowly, keep in view what was seen before, and let little of the view move"
         )
+    moved = (
+        "something moved, such as a person, and the surface may be wrong; try to record when nothing moves"
+    )
     if recording["disturbed"] >= LEAST_DISTURBED:
         found.append(
             f"In {recording['disturbed']} of {frames} frames a tenth or more of the view does not agree with "
-            "the frames before: something moved there, such as a person, and the surface may be wrong; try "
-            "to record when nothing moves"
+            f"the frames before: {moved}"
+        )
+    elif agreeing_share < LEAST_AGREEING:
+        found.append(
+            f"Of what two keyframes measured only {agreeing_share:.1%} agrees (in the demo rooms "
+            f"{LEAST_AGREEING:.0%} or more): probably {moved}"
         )
     return found
 

@@ -45,3 +45,11 @@ def test_what_moved_is_said_if_it_is_in_more_than_two_frames():
     (sentence,) = lost_sentences(walk_metrics(walk_of(disturbed=(4, 5, 7)), 1.0))
     assert sentence.startswith("In 3 of 10 frames")
     assert "something moved" in sentence
+
+
+def test_keyframes_that_agree_little_show_that_something_moved():
+    metrics = walk_metrics(walk_of(), 1.0)
+    assert [lost_sentences(metrics, share) for share in (0.97, float("nan"))] == [[], []]
+    (sentence,) = lost_sentences(metrics, 0.875)
+    assert sentence.startswith("Of what two keyframes measured only 87.5% agrees")
+    assert "probably something moved" in sentence
