@@ -67,6 +67,7 @@ if TYPE_CHECKING:
     from pipeline.planning.plan import Plan, PlanConfig, PlannedCamera
     from pipeline.planning.promise import Promise
     from pipeline.planning.radio import CameraDelivery, PlanDelivery, PlanRadio
+    from pipeline.quality import SurfaceQuality
     from pipeline.reconstruct import Reconstruction, reconstruct
     from pipeline.registration import iterate_registration, point_error_m, register
     from pipeline.surface.ball_pivoting import iterate_ball, roll_ball
@@ -84,7 +85,6 @@ if TYPE_CHECKING:
         Rig,
         RigTruth,
         Surface,
-        SurfaceQuality,
         SurfaceResult,
     )
 
@@ -125,6 +125,7 @@ _NAMES = {
     "pipeline.planning.plan": "Plan PlanConfig PlannedCamera",
     "pipeline.planning.promise": "Promise",
     "pipeline.planning.radio": "CameraDelivery PlanDelivery PlanRadio",
+    "pipeline.quality": "SurfaceQuality",
     "pipeline.reconstruct": "Reconstruction reconstruct",
     "pipeline.registration": "iterate_registration point_error_m register",
     "pipeline.surface.ball_pivoting": "iterate_ball roll_ball",
@@ -133,7 +134,7 @@ _NAMES = {
     "pipeline.surface.radii": "spacing",
     "pipeline.types": (
         "CameraIntrinsics DepthMap PointCloud PointSource RegistrationResult RegistrationStep RgbdFrame "
-        "Rig RigTruth Surface SurfaceQuality SurfaceResult"
+        "Rig RigTruth Surface SurfaceResult"
     ),
 }
 _PLACES = {name: (module, name) for module, names in _NAMES.items() for name in names.split()} | {

@@ -11,12 +11,14 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from packetmesh.notebook import ShownInNotebooks
+from pipeline.quality import SurfaceQuality
 
 FloatArray = NDArray[np.floating]
 IntArray = NDArray[np.integer]
@@ -289,6 +291,15 @@ class Walk:
     """Assumptions and doubts, one sentence each."""
     resumed_s: float = 0.0
     """Time that interrupted runs had spent on the tracking that this one continued."""
+    without_depth: tuple[int, ...] = ()
+    """Frames with no depth, or too little to be tracked."""
+    apart: tuple[int, ...] = ()
+    """Frames without a pose of parts of the recording that were tracked, but not joined to the map."""
+    disturbed: tuple[int, ...] = ()
+    """Frames with a pose in which something moved: they agree little with the frames before them."""
+    state: Path | None = None
+    """File with the tracking, from which another run of the recording goes on; ``checkpoint.Checkpoint``
+    deletes it. None if none was written, as for short recordings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -333,45 +344,6 @@ class RegistrationResult(ShownInNotebooks):
     converged: bool
     stop_reason: str
     """``converged``, ``stalled``, ``max_iterations`` or ``degenerate: <why>``."""
-
-
-@dataclass(frozen=True, slots=True)
-class Gaps:
-    """Gaps in a mesh, counted in each camera's image; an image without any of the mesh has none."""
-
-    count: int
-    """Connected groups of pixels whose rays miss the mesh, of any size."""
-    large: int
-    """Groups of 100 cm² or more."""
-    area_m2: float
-    """Area of all groups, as if each pixel faced the camera at the depth of the nearest pixel that hits."""
-
-
-@dataclass(frozen=True, slots=True)
-class SurfaceQuality:
-    """Measures of a mesh's holes and validity (SPEC 5); ``no_hit_ray_share`` is the main one."""
-
-    no_hit_ray_share: float
-    """Rays without a surface: share of the cameras' pixel rays that meet no triangle, 0 to 1."""
-    boundary_loops: int
-    """Holes and outer rims: number of connected components of the graph of edges with exactly one face."""
-    boundary_length_m: float
-    hole_area_m2: float
-    """Area of the holes: loops under 1 m, without each component's longest loop and islands (``Hole``)."""
-    non_manifold_edges: int
-    """Edges with more than two faces."""
-    components: int
-    area_m2: float
-    unused_points: int
-    """Input points that no triangle uses."""
-    within_2pct_share: float = float("nan")
-    """Share of the measured pixels whose ray meets the mesh within 2 % of the depth; NaN without depth."""
-    within_5pct_share: float = float("nan")
-    """The same share within 5 %."""
-    guessed_ray_share: float = float("nan")
-    """Share of the pixel rays that meet a triangle with two or three inferred corners; NaN if unknown."""
-    gaps: Gaps | None = None
-    """Gaps as groups of pixels; None without cameras."""
 
 
 @dataclass(frozen=True, slots=True)

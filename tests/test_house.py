@@ -27,7 +27,18 @@ def test_no_imports_go_in_a_circle_those_for_types_alone_included():
 def test_only_the_story_lies_at_the_top_of_each_package():
     assert len(modules("app")) <= 8
     assert modules("pipeline") == sorted(
-        ["types", "config", "spec", "sources", "stages", "nodes", "merging", "reconstruct", "deliver"]
+        [
+            "types",
+            "quality",
+            "config",
+            "spec",
+            "sources",
+            "stages",
+            "nodes",
+            "merging",
+            "reconstruct",
+            "deliver",
+        ]
     )
     assert modules("network_sim") == sorted(["config", "presets", "types", "simulate", "replicate"])
 

@@ -64,18 +64,37 @@ def run(argv: list[str] | None) -> None:
             config=(tyro.conf.FlagCreatePairsOff,),
         )
         sys.stdout.flush()
-    except PacketMeshError as error:
-        say(f"packetmesh: {error}")
+    except BaseException as error:
+        if _interrupted(error):
+            say("; ".join(["packetmesh: stopped", *getattr(error, "__notes__", ())]))
+            sys.exit(130)
+        if isinstance(error, BrokenPipeError):  # the reader of the output has gone
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            sys.exit(1)
+        sentence = _sentence(error)
+        if sentence is None:
+            raise
+        say(f"packetmesh: {sentence}")
         sys.exit(1)
-    except MemoryError as error:
-        say(f"packetmesh: There is not enough memory ({error}); try fewer images or nodes, or a shorter run")
-        sys.exit(1)
-    except BrokenPipeError:  # the reader of the output has gone
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)
-    except OSError as error:
-        say(f"packetmesh: {file_trouble(error)}")
-        sys.exit(1)
-    except KeyboardInterrupt:
-        say("packetmesh: stopped")
-        sys.exit(130)
+
+
+def _interrupted(error: BaseException | None) -> bool:
+    """Return whether an error is Ctrl-C, or was raised because of it.
+
+    Compiled code raises another error: numba a SystemError when Ctrl-C stops it while it loads a kernel.
+    """
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
+
+
+def _sentence(error: BaseException) -> str | None:
+    """Return what an error says to the user; None for an error of the program."""
+    match error:
+        case PacketMeshError():
+            return str(error)
+        case MemoryError():
+            return f"There is not enough memory ({error}); try fewer images or nodes, or a shorter run"
+        case OSError():
+            return file_trouble(error)
+    return None

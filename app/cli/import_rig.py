@@ -38,10 +38,10 @@ def import_rig(
     """
     from dataclasses import asdict
 
-    from pipeline.importing import iterate_import, iterate_keep
+    from pipeline.recording.imported import iterate_checked_import, iterate_checked_keep
 
     if frames == "all":
-        kept = drain(iterate_keep(path, out, depth_scale, intrinsics), say_progress)
+        kept = drain(iterate_checked_keep(path, out, depth_scale, intrinsics), say_progress)
         say(f"100%  {kept.kind}: {kept.frames} of {kept.candidates} frames in {kept.folder}")
         for note in kept.notes:
             say(note)
@@ -49,8 +49,9 @@ def import_rig(
         if json:
             print_json(asdict(kept))
         return
-    report = drain(iterate_import(path, out, frames, depth_scale, intrinsics), say_progress)
-    say(f"100%  {report.kind}: {len(report.frames)} nodes of {report.candidates} moments in {report.folder}")
+    report = drain(iterate_checked_import(path, out, frames, depth_scale, intrinsics), say_progress)
+    nodes = f"{len(report.frames)} node{'s' * (len(report.frames) != 1)}"
+    say(f"100%  {report.kind}: {nodes} of {report.candidates} moments in {report.folder}")
     for frame in report.frames:
         say(f"{frame.node}  {frame.color}, {frame.depth}")
     for note in report.notes:

@@ -72,7 +72,7 @@ def reconstruct(
         say(note)
     if json:
         print_json(metrics)
-    say_places(result.placement)
+    say_places(result.placement, "keyframes" if "recording" in metrics else "cameras")
 
 
 def recording_sentences(metrics: dict[str, Any]) -> list[str]:
@@ -81,20 +81,21 @@ def recording_sentences(metrics: dict[str, Any]) -> list[str]:
         return []
     from pipeline.folders.walk import lost_sentences
 
-    recording = metrics["recording"]
+    recording, per_s = metrics["recording"], f"{metrics['recording']['frames_per_s']:.2g}"
     summary = (
         f"Tracked {recording['frames']} frames over {recording['path_m']:.1f} m at "
-        f"{recording['frames_per_s']:.0f} frames a second; keyframes: {recording['keyframes']}, loops: "
+        f"{per_s} frame{'s' * (per_s != '1')} a second; keyframes: {recording['keyframes']}, loops: "
         f"{recording['loops']}"
     )
-    return [summary, *lost_sentences(recording["lost"], recording["frames"])]
+    return [summary, *lost_sentences(recording, metrics["measured"]["agreement_between_nodes"])]
 
 
 def imported_notes(report: dict[str, Any] | None) -> list[str]:
     """Return sentences on the import of a recording and its assumptions."""
     if report is None:
         return []
-    taken = f"imported as {len(report['frames'])} nodes of {report['candidates']} moments"
+    count = len(report["frames"])
+    taken = f"imported as {count} node{'s' * (count != 1)} of {report['candidates']} moments"
     return [f"{report['folder']} is a recording ({report['kind']}), {taken}", *report["notes"]]
 
 
@@ -135,15 +136,18 @@ def _many(
         sys.exit(1)
 
 
-def say_places(placement: Placement) -> None:
-    """Print how far the nodes of a rig agree and which have no pose; exit with 1 if no two agree."""
+def say_places(placement: Placement, nodes: str = "cameras") -> None:
+    """Print how far the nodes of a rig agree and which have no pose; exit with 1 if no two agree.
+
+    ``nodes`` is what they are: cameras, or the keyframes of one.
+    """
     from pipeline.placement.outcome import APART
 
     if len(placement.verdicts) < 2:
         return
     share = placement.agreement.within_2pct_share
-    if isfinite(share):  # some two cameras measured the same surface
-        say(f"Where two cameras measured the same surface, {share:.1%} of the points agree within 2 %")
+    if isfinite(share):  # some two measured the same surface
+        say(f"Where two {nodes} measured the same surface, {share:.1%} of the points agree within 2 %")
     for sentence in placement.sentences:
         say(sentence)
     if placement.apart:

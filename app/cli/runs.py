@@ -19,7 +19,7 @@ from app.reports.reconstruction import write_reconstruction_report
 from app.web.markup import Markup
 from packetmesh.batch import run_batch
 from packetmesh.errors import InputError, PacketMeshError
-from packetmesh.files import atomic_path, finite, writable_folder, write_json
+from packetmesh.files import atomic_path, finite, removed_if_empty, writable_folder, write_json
 from packetmesh.progress import Progress, drain, part
 from packetmesh.settings import settings
 from pipeline.config import Baseline, PipelineConfig
@@ -37,11 +37,12 @@ from pipeline.folders.run import (
     write_baseline,
     write_run_folder,
 )
-from pipeline.importing import ImportReport, is_recording, iterate_import
+from pipeline.importing import ImportReport, is_recording
 from pipeline.io.rigs import is_rig
 from pipeline.placement.outcome import APART
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
-from pipeline.recording.checkpoint import files_digest
+from pipeline.recording.checkpoint import deleted_after, files_digest
+from pipeline.recording.imported import iterate_checked_import
 from pipeline.recording.walk import LEAST_FRAMES
 from pipeline.sources import Calibrated, FileSource, Recorded, RigFolder
 from pipeline.spec import Spec, whole_s
@@ -101,28 +102,48 @@ def iterate_run(
     rig, report = yield from iterate_imported(source, out)
     spec, cache = Spec(rig, preset, config), RunCache()
     loading = run(spec, cache, ["rig"])
-    if isinstance(rig, Recorded):
-        yield from loading
-    else:
-        drain(loading)
-    writable_folder(out)
+    loaded = (yield from loading) if isinstance(rig, Recorded) else drain(loading)
+    walk = loaded["rig"].value.walk
+    with removed_if_empty(out), deleted_after(None if walk is None else walk.state):
+        writable_folder(out)
+        return (yield from _iterate_written(spec, cache, report, out, baseline))
+
+
+def _iterate_written(
+    spec: Spec, cache: RunCache, report: ImportReport | None, out: Path, baseline: Baseline | None
+) -> Generator[Progress, None, tuple[Reconstruction, dict[str, Any]]]:
+    """Reconstruct a rig that is loaded, and write the run folder with its report."""
+    rig = spec.source
     result = yield from iterate_reconstruction(spec, cache)
     other = None
     if baseline is not None:
         other = (yield from part(compute(spec, baseline, cache), f"baseline {baseline}", 0.9, 0.92)).value
     metrics = metrics_of(result) | ({} if report is None else {"import": asdict(report)})
     clear_run_folder(out)
-    if isinstance(rig, Recorded) and result.rig.walk is not None:
-        recording = yield from part(rig.iterate_open(), "files", 0.92, 0.94, detail=True)
-        yield from part(iterate_keyframes(recording, result.rig.walk, out), "keyframes", 0.94, 0.97)
-    yield Progress("writing the report", 0.97)
-    texture = dressed(result.rig, result.placement, result.after)
-    write_reconstruction_report(result, metrics, out / REPORT, texture)
-    if baseline is not None and other is not None:
-        write_baseline(baseline, other, result, out)
-    yield Progress("writing the surfaces", 0.99)
-    write_run_folder(result, metrics, out, texture=texture)
+    try:
+        if isinstance(rig, Recorded) and result.rig.walk is not None:
+            recording = yield from part(rig.iterate_open(), "files", 0.92, 0.94, detail=True)
+            yield from part(iterate_keyframes(recording, result.rig.walk, out), "keyframes", 0.94, 0.97)
+        yield Progress("writing the report", 0.97)
+        texture = dressed(result.rig, result.placement, result.after)
+        write_reconstruction_report(result, metrics, out / REPORT, texture)
+        if baseline is not None and other is not None:
+            write_baseline(baseline, other, result, out)
+        yield Progress("writing the surfaces", 0.99)
+        write_run_folder(result, metrics, out, texture=texture)
+    except BaseException:  # a disk that is full, or Ctrl-C
+        _delete_written(out, baseline)
+        raise
     return result, metrics
+
+
+def _delete_written(out: Path, baseline: Baseline | None) -> None:
+    """Delete the files of a run that failed while they were written."""
+    with suppress(InputError, OSError):
+        clear_run_folder(out)
+        (out / REPORT).unlink(missing_ok=True)
+        for suffix in () if baseline is None else (".ply", ".glb"):
+            (out / f"surface_{baseline}{suffix}").unlink(missing_ok=True)
 
 
 def iterate_imported(
@@ -146,7 +167,7 @@ def iterate_imported(
     if rig.is_dir():
         shutil.rmtree(rig)  # from an earlier run
     try:
-        steps = iterate_import(source.path, rig, depth_scale=source.depth_scale)
+        steps = iterate_checked_import(source.path, rig, depth_scale=source.depth_scale)
         report = yield from part(steps, f"import of {source.path}", 0.0, 0.05, detail=True)
     except PacketMeshError:
         if new:
@@ -192,6 +213,9 @@ def iterate_rigs(
             outcomes[index] = outcome
             summary = outcome.sentence or f"{outcome.no_hit_after:.1%} of the rays are without a surface"
             yield Progress(f"{outcome.name} {outcome.state}: {summary}", len(outcomes) / len(tasks))
+    except BaseException as error:
+        error.add_note("the same command goes on with the rigs that are left")
+        raise
     finally:
         done = tuple(outcomes[index] for index in sorted(outcomes))
         if done:

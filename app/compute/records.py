@@ -8,7 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.types import BoolArray, ByteArray, FloatArray, IntArray, SurfaceQuality
+from pipeline.quality import SurfaceQuality
+from pipeline.types import BoolArray, ByteArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, slots=True)

@@ -91,7 +91,7 @@ def _sections(
         before["no_hit_ray_share"],
         after["no_hit_ray_share"],
         _use_sentences(metrics["measured"]),
-        _agreeing(metrics["measured"]),
+        _agreeing(metrics["measured"], "keyframes" if "recording" in metrics else "cameras"),
     )
     yield from _recording(metrics)
     yield from _doubts(metrics)
@@ -121,14 +121,14 @@ def _use_sentences(measured: dict[str, float]) -> Markup:
     ).format(**measured)
 
 
-def _agreeing(measured: dict[str, float]) -> Markup:
-    """Return a sentence on the agreement of a rig's cameras; empty if no two saw the same place."""
+def _agreeing(measured: dict[str, float], nodes: str) -> Markup:
+    """Return a sentence on the agreement of the nodes, cameras or keyframes; empty if none share a place."""
     share = measured["agreement_between_nodes"]
     if not math.isfinite(share):
         return Markup("")
     return Markup(
-        " Where two cameras measured the same surface, <b>{:.1%}</b> of the points agree within 2 %."
-    ).format(share)
+        " Where two {} measured the same surface, <b>{:.1%}</b> of the points agree within 2 %."
+    ).format(nodes, share)
 
 
 def _recording(metrics: dict[str, Any]) -> Iterator[Markup]:
@@ -141,7 +141,7 @@ def _recording(metrics: dict[str, Any]) -> Iterator[Markup]:
         "keyframes: {keyframes}, loops: {loops}; {map_points:,} points measured in voxels of "
         "{voxel_mm:.0f} mm. Tracking and mapping: {frames_per_s:.0f} frames a second.</p>"
     ).format(voxel_mm=1000.0 * recording["voxel_m"], **recording)
-    for sentence in lost_sentences(recording["lost"], recording["frames"]):
+    for sentence in lost_sentences(recording, metrics["measured"]["agreement_between_nodes"]):
         yield Markup('<p class="lead"><b>{}.</b></p>').format(sentence)
 
 

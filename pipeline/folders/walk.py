@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,10 @@ from packetmesh.files import write_json
 from pipeline.io.poses import write_tum
 from pipeline.types import FloatArray, Walk
 
+LEAST_DISTURBED = 3
+"""Fewest frames in which something moved that are worth a sentence."""
+LEAST_AGREEING = 0.92
+"""Smallest agreement of cameras at their right poses in the demo rooms (SPEC 4.10)."""
 FILES = ("trajectory.txt", "trajectory.json")
 
 
@@ -53,7 +58,7 @@ def walk_metrics(walk: Walk, elapsed_s: float) -> dict[str, Any]:
         "frames": frames,
         "keyframes": len(walk.keyframes),
         "loops": _loops(walk),
-        "lost": lost_spans(walk.T_world_camera),
+        **_losses(walk),
         "path_m": path_m(walk.T_world_camera),
         "voxel_m": walk.voxel_m,
         "map_points": len(walk.map),
@@ -67,20 +72,84 @@ def walk_sentences(walk: Walk, shown: int) -> list[str]:
         f"A recording of {len(walk.times_s)} frames over {path_m(walk.T_world_camera):.1f} m; its nodes are "
         f"{shown} of its {len(walk.keyframes)} keyframe{'s' * (len(walk.keyframes) != 1)}"
     )
-    return [summary, *lost_sentences(lost_spans(walk.T_world_camera), len(walk.times_s))]
+    return [summary, *lost_sentences(_losses(walk) | {"frames": len(walk.times_s)})]
 
 
-def lost_sentences(spans: list[tuple[int, int]], frames: int) -> list[str]:
-    """Return a sentence on the frames without a pose, from ``lost_spans``; nothing if all have one."""
-    if not spans:
-        return []
-    count = sum(last - first + 1 for first, last in spans)
+def _losses(walk: Walk) -> dict[str, Any]:
+    """Return the spans of frames without poses, in all and by cause, and the number of disturbed frames.
+
+    ``without_depth`` and ``apart`` are as in ``Walk``.
+    """
+    return {
+        "lost": lost_spans(walk.T_world_camera),
+        "without_depth": _spans(walk.without_depth),
+        "apart": _spans(walk.apart),
+        "disturbed": len(walk.disturbed),
+    }
+
+
+def lost_sentences(recording: Mapping[str, Any], agreeing_share: float = 1.0) -> list[str]:
+    """Return sentences on frames without a pose, by cause, and on what moved.
+
+    Args:
+        recording: numbers of ``walk_metrics``.
+        agreeing_share: share of what two keyframes measured that agrees; NaN if no two measured the same.
+    """
+    frames = recording["frames"]
+    blind, apart = (_numbers(recording[name]) for name in ("without_depth", "apart"))
+    other = _spans(sorted(_numbers(recording["lost"]) - blind - apart))
+    found = []
+    if blind:
+        found.append(
+            f"{_of(_spans(sorted(blind)), frames)} no depth, or too little to be tracked, and are not in the "
+            "surface; keep the camera uncovered, and within its range of what it sees"
+        )
+    if apart:
+        found.append(
+            f"{_of(_spans(sorted(apart)), frames)} no connection with the mapped part of the recording, "
+            "because too little was recognised in them, and are not in the surface; record a way between, "
+            "with little that moves in view"
+        )
+    if other:
+        where = _where(other)
+        found.append(
+            f"The camera was lost in {_count(other)} of {frames} frames ({where}), which are not in the "
+            "surface; turn more slowly, keep in view what was seen before, and let little of the view move"
+        )
+    moved = (
+        "something moved, such as a person, and the surface may be wrong; try to record when nothing moves"
+    )
+    if recording["disturbed"] >= LEAST_DISTURBED:
+        found.append(
+            f"In {recording['disturbed']} of {frames} frames a tenth or more of the view does not agree with "
+            f"the frames before: {moved}"
+        )
+    elif agreeing_share < LEAST_AGREEING:
+        found.append(
+            f"Of what two keyframes measured only {agreeing_share:.1%} agrees (in the demo rooms "
+            f"{LEAST_AGREEING:.0%} or more): probably {moved}"
+        )
+    return found
+
+
+def _of(spans: list[tuple[int, int]], frames: int) -> str:
+    """Return how many frames are in spans, and which, with a verb."""
+    count = _count(spans)
+    return f"{count} of {frames} frames ({_where(spans)}) {'has' if count == 1 else 'have'}"
+
+
+def _where(spans: list[tuple[int, int]]) -> str:
+    """Return the first few spans as text."""
     where = ", ".join(f"{first} to {last}" if last > first else f"{first}" for first, last in spans[:4])
-    more = "" if len(spans) <= 4 else f" and {len(spans) - 4} more times"
-    return [
-        f"The camera was lost in {count} of {frames} frames ({where}{more}), which are not in the surface; "
-        "turn more slowly, and keep in view what was seen before"
-    ]
+    return where if len(spans) <= 4 else f"{where} and {len(spans) - 4} more times"
+
+
+def _count(spans: list[tuple[int, int]]) -> int:
+    return sum(last - first + 1 for first, last in spans)
+
+
+def _numbers(spans: list[tuple[int, int]]) -> set[int]:
+    return {k for first, last in spans for k in range(first, last + 1)}
 
 
 def _loops(walk: Walk) -> int:
@@ -89,11 +158,15 @@ def _loops(walk: Walk) -> int:
 
 def lost_spans(T_world_camera: tuple[FloatArray | None, ...]) -> list[tuple[int, int]]:
     """Return first and last frame number of each gap without poses."""
+    return _spans([k for k, T in enumerate(T_world_camera) if T is None])
+
+
+def _spans(numbers: Sequence[int]) -> list[tuple[int, int]]:
+    """Return first and last of each run of consecutive numbers, which ascend."""
     spans: list[tuple[int, int]] = []
-    for k, T in enumerate(T_world_camera):
-        if T is None:
-            first = spans.pop()[0] if spans and spans[-1][1] == k - 1 else k
-            spans.append((first, k))
+    for k in numbers:
+        first = spans.pop()[0] if spans and spans[-1][1] == k - 1 else k
+        spans.append((first, k))
     return spans
 
 

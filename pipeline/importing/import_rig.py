@@ -16,6 +16,7 @@ from pipeline.importing.choosing import choose
 from pipeline.importing.depth_units import depth_in
 from pipeline.importing.kinds import kind_of
 from pipeline.importing.reading import MOST_CANDIDATES, check_bag_intrinsics, check_scale, read_sequence
+from pipeline.importing.recorded import Check, FolderRecording, first_depth
 from pipeline.importing.rig_folder import NodeImages, check_new, new_folder, write_node
 from pipeline.importing.sequence import SAME_VIEW_REMEDY, Candidate, Sequence, left_out_note
 from pipeline.importing.stored import read_color_of
@@ -68,6 +69,7 @@ def iterate_import(
     frames: int = 3,
     depth_scale: float | None = None,
     intrinsics: AnyPath | None = None,
+    check: Check | None = None,
 ) -> Generator[Progress, None, ImportReport]:
     """Import a few frames of another program's recording as a rig folder, completely or not at all.
 
@@ -78,6 +80,8 @@ def iterate_import(
         depth_scale: depth units per metre; by default that of the kind of recording.
         intrinsics: intrinsics file of the colour camera; by default the recording's, or those of its kind; a
             bag takes none.
+        check: compares the poses with the depth before frames are chosen; None takes them as they are. The
+            moments of a bag are chosen without it.
 
     Raises:
         InputError: the path is no usable recording, or the folder cannot be written.
@@ -92,6 +96,9 @@ def iterate_import(
         return (yield from _from_bag(Path(path), out, frames, depth_scale))
     yield Progress("files", 0.0)
     kind, folder, sequence = read_sequence(Path(path), depth_scale, intrinsics, MOST_CANDIDATES)
+    if check is not None:
+        yield Progress("poses", 0.1)
+        sequence = _checked(FolderRecording(kind.name, folder, sequence), check)
     sequence = sequence.only_posed()
     yield Progress("choice of frames", 0.2)
     sequence, chosen, middle = _chosen(sequence, frames)
@@ -121,6 +128,19 @@ def iterate_import(
         tuple(written),
         tuple(notes),
     )
+
+
+def _checked(recording: FolderRecording, check: Check) -> Sequence:
+    """Return a recording's frames with the poses that a check returns, and its notes."""
+    sequence = recording.sequence
+    if recording.T_world_camera is None or first_depth(sequence) is None:
+        return sequence
+    poses, notes = check(recording)
+    poses = poses or [None] * len(sequence.candidates)
+    candidates = tuple(
+        replace(candidate, T_world_camera=T) for candidate, T in zip(sequence.candidates, poses, strict=True)
+    )
+    return replace(sequence, candidates=candidates, notes=(*sequence.notes, *notes))
 
 
 def _from_bag(
@@ -178,7 +198,8 @@ def _scale_note(written: list[ImportedFrame], *units_per_metre: float) -> str:
     """Return a sentence on the depth scale, or on those of different cameras."""
     units = " or ".join(f"{units:g}" for units in units_per_metre)
     median_m = float(np.median([frame.median_depth_m for frame in written]))
-    return f"Depth: {units} units in a metre, which makes the median depth {median_m:.3g} m"
+    noun = "unit" if units == "1" else "units"
+    return f"Depth: {units} {noun} in a metre, which makes the median depth {median_m:.3g} m"
 
 
 def _node_of(candidate: Candidate, sequence: Sequence, T_up_world: FloatArray | None) -> NodeImages:

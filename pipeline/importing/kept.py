@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from packetmesh.errors import InputError
 from packetmesh.progress import Progress, part, spaced
-from pipeline.importing.recorded import iterate_opening
+from pipeline.importing.recorded import Check, iterate_opening
 from pipeline.importing.rig_folder import check_new, new_folder
 from pipeline.importing.tum import UNITS_PER_METRE
 from pipeline.io.images import write_color
@@ -40,7 +40,11 @@ class KeptReport:
 
 
 def iterate_keep(
-    path: AnyPath, out: AnyPath, depth_scale: float | None = None, intrinsics: AnyPath | None = None
+    path: AnyPath,
+    out: AnyPath,
+    depth_scale: float | None = None,
+    intrinsics: AnyPath | None = None,
+    check: Check | None = None,
 ) -> Generator[Progress, None, KeptReport]:
     """Write the frames of a recording in TUM's form, completely or not at all.
 
@@ -54,6 +58,7 @@ def iterate_keep(
         out: the new folder, or an empty one.
         depth_scale: depth units per metre; by default that of the kind of recording.
         intrinsics: intrinsics file of the colour camera; by default the recording's, or those of its kind.
+        check: compares the poses with the depth; None takes them as they are.
 
     Raises:
         InputError: the path is no usable recording, its camera changes, or the folder cannot be written.
@@ -61,7 +66,12 @@ def iterate_keep(
     check_new(Path(out))
     opening = iterate_opening(path, depth_scale, intrinsics)
     recording = yield from part(opening, "files", 0.0, 0.1, detail=True)
-    count, notes = len(recording.times_s), [*recording.notes]
+    count, of_poses = len(recording.times_s), tuple[str, ...]()
+    poses: Sequence[FloatArray | None] | None = recording.T_world_camera
+    if check is not None and poses is not None:
+        yield Progress("poses", 0.1)
+        poses, of_poses = check(recording)
+    notes = [*recording.notes, *of_poses]
     left_out: list[str] = []
     with new_folder(Path(out)) as folder:
         writer = _Writer(folder)
@@ -73,7 +83,7 @@ def iterate_keep(
             except InputError as error:
                 left_out.append(str(error))
                 continue
-            writer.write(frame, float(recording.times_s[number]))
+            writer.write(frame, float(recording.times_s[number]), None if poses is None else poses[number])
         if writer.camera is None:
             raise InputError(f"No frame of {recording.name} can be read, the first because: {left_out[0]}")
         writer.finish(writer.camera)
@@ -96,8 +106,8 @@ class _Writer:
     path: list[tuple[float, FloatArray]] = field(default_factory=list)
     """Times, seconds, and (4, 4) poses, metres, of the frames that have a pose."""
 
-    def write(self, frame: RgbdFrame, time_s: float) -> None:
-        """Write the images of a frame, and keep its pose; depths beyond ``FARTHEST_M`` are written as 0.
+    def write(self, frame: RgbdFrame, time_s: float, T_world_camera: FloatArray | None) -> None:
+        """Write the images of a frame, and keep its pose, if known; depths beyond ``FARTHEST_M`` become 0.
 
         Raises:
             InputError: the frame's camera differs from that of earlier frames.
@@ -118,8 +128,8 @@ class _Writer:
         self.too_far += int(far.sum())
         png = cv2.imencode(".png", np.rint(np.where(far, 0.0, units)).astype(np.uint16))[1]
         (self.folder / "depth" / name).write_bytes(png.tobytes())
-        if frame.pose_known:
-            self.path.append((time_s, frame.T_world_camera))
+        if T_world_camera is not None:
+            self.path.append((time_s, T_world_camera))
 
     def finish(self, camera: CameraIntrinsics) -> None:
         """Write the lists and the camera."""

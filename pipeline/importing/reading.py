@@ -25,7 +25,7 @@ time and memory."""
 def slice_of_frames(frames: int, most: int) -> tuple[slice, tuple[str, ...]]:
     """Return a slice with at most ``most`` of a recording's frames, and a note if it lacks some."""
     step = max(1, -(-frames // most))
-    note = f"One in {step} of the {frames} frames is used (at most {most})"
+    note = f"One in {step} of the {frames} frames is used, by number and not by motion (at most {most})"
     return slice(None, None, step), (note,) if step > 1 else ()
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
+from collections.abc import Sequence as Listed
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
@@ -119,9 +120,13 @@ class FolderRecording:
     @cached_property
     def _depth_shape(self) -> tuple[int, ...]:
         """Height and width of the first depth image that has depth."""
-        first = _first_depth(self.sequence)
+        first = first_depth(self.sequence)
         assert first is not None  # else it would not have been opened
         return first.depth.z_m.shape
+
+
+Check = Callable[[FolderRecording | BagRecording], tuple[Listed[FloatArray | None] | None, tuple[str, ...]]]
+"""Returns the poses of a recording as they are to be used, None if they cannot be, and notes on them."""
 
 
 def open_recording(
@@ -152,7 +157,7 @@ def iterate_opening(
         check_bag_intrinsics(bag, intrinsics)
         return (yield from iterate_bag_recording(bag, depth_scale))
     kind, folder, sequence = read_sequence(place, depth_scale, intrinsics, MOST_FRAMES)
-    if _first_depth(sequence) is None:
+    if first_depth(sequence) is None:
         raise NoDepthError(f"No frame of {folder} has depth; check the depth images and the depth scale")
     return FolderRecording(kind.name, folder, sequence)
 
@@ -189,6 +194,6 @@ def _bag_in(place: Path) -> Path | None:
     return bags[0]
 
 
-def _first_depth(sequence: Sequence) -> ReadDepth | None:
+def first_depth(sequence: Sequence) -> ReadDepth | None:
     """Return the first depth image that has depth, as ``first_with_depth``."""
     return first_with_depth(partial(depth_in, candidate, sequence) for candidate in sequence.candidates)

@@ -80,6 +80,8 @@ def new_folder(out: Path) -> Iterator[Path]:
                 path.rename(out / path.name)
         else:
             hidden.rename(out)
+    except InputError as error:
+        raise InputError(str(error).replace(str(hidden), str(out))) from None
     except OSError as error:
         raise InputError(f"{out} cannot be written ({error.strerror or error}); {remedy(error)}") from None
     finally:

@@ -155,9 +155,10 @@ def distinct(candidates: tuple[Candidate, ...]) -> tuple[tuple[Candidate, ...], 
     seen: set[AnyImage] = set()
     times_s: set[float] = set()
     found = []
-    repeated = 0
+    again = repeated = 0
     for candidate in candidates:
         if seen & {candidate.color, candidate.depth}:
+            again += 1
             continue
         if candidate.time_s in times_s:
             repeated += 1
@@ -166,8 +167,14 @@ def distinct(candidates: tuple[Candidate, ...]) -> tuple[tuple[Candidate, ...], 
         seen |= {candidate.color, candidate.depth}
         if candidate.time_s is not None:
             times_s.add(candidate.time_s)
-    note = f"{repeated} frames have the time of another frame and were left out; each needs its own time"
-    return tuple(found), (note,) if repeated else ()
+    notes = []
+    if again:
+        notes.append(f"{again} frames name an image that an earlier frame has, and were left out")
+    if repeated:
+        notes.append(
+            f"{repeated} frames have the time of another frame and were left out; each needs its own time"
+        )
+    return tuple(found), tuple(notes)
 
 
 def posed(

@@ -50,11 +50,7 @@ def read_tum(folder: Path, intrinsics: Path | None) -> Sequence:
     (rgb_s, pictures), (depth_s, depths) = listed(folder / "rgb.txt"), listed(folder / "depth.txt")
     pairs = associate(rgb_s, depth_s)
     if not pairs:
-        raise InputError(
-            f"Of the {len(pictures)} images in {folder / 'rgb.txt'} and the {len(depths)} in depth.txt "
-            f"no two are less than {1000 * LARGEST_GAP_S:g} ms apart; check that their clocks agree and "
-            "that the times are in seconds"
-        )
+        raise InputError(_no_pair(folder, rgb_s, depth_s))
     truth = folder / "groundtruth.txt"
     poses = poses_at(truth, rgb_s)
     there, missing = existing(
@@ -75,8 +71,37 @@ def read_tum(folder: Path, intrinsics: Path | None) -> Sequence:
         f"pose in {truth.name} at the time of an image" if truth.is_file() else truth.name,
     )
     camera, assumed = camera_of(folder, candidates[0].color, intrinsics, *known_camera(folder))
-    notes = (*missing, *assumed, *notes)
+    notes = (*_without_partner(len(pairs), len(pictures), len(depths)), *missing, *assumed, *notes)
     return Sequence(candidates, camera, UNITS_PER_METRE, without_poses=without, notes=notes)
+
+
+def _without_partner(pairs: int, pictures: int, depths: int) -> tuple[str, ...]:
+    """Return a sentence on the images of the two lists that are in no pair, if there are any."""
+    if pairs == pictures == depths:
+        return ()
+    return (
+        f"{pairs} pairs: {pictures - pairs} of {pictures} images of rgb.txt and {depths - pairs} of {depths} "
+        f"of depth.txt have no partner less than {1000 * LARGEST_GAP_S:g} ms away and were left out",
+    )
+
+
+def _no_pair(folder: Path, rgb_s: FloatArray, depth_s: FloatArray) -> str:
+    """Return the sentence on lists of which no two images are of one moment, with their median offset."""
+    told = (
+        f"Of the {len(rgb_s)} images in {folder / 'rgb.txt'} and the {len(depth_s)} in depth.txt no two are "
+        f"less than {1000 * LARGEST_GAP_S:g} ms apart"
+    )
+    if not len(rgb_s) or not len(depth_s):
+        return f"{told}; check that the lists are whole"
+    after = np.searchsorted(depth_s, rgb_s).clip(1, max(1, len(depth_s) - 1))
+    around = np.stack([depth_s[after - 1], depth_s[np.minimum(after, len(depth_s) - 1)]]) - rgb_s
+    offset_s = float(np.median(np.where(np.abs(around[0]) <= np.abs(around[1]), *around)))
+    late = "later" if offset_s > 0.0 else "earlier"
+    change = "subtract this from" if offset_s > 0.0 else "add this to"
+    return (
+        f"{told}: the nearest depth image is {abs(offset_s):.4g} s {late} (median). If the clocks differ, "
+        f"{change} the times in depth.txt; and check that the times are in seconds"
+    )
 
 
 def associate(first_s: FloatArray, second_s: FloatArray) -> list[tuple[int, int]]:

@@ -10,19 +10,11 @@ from markupsafe import Markup
 
 from pipeline.kernels.geometry import rotation_angle_rad
 from pipeline.notebook.pictures import cloud_picture, png_of, seen_picture, small_photograph, surface_picture
+from pipeline.quality import SurfaceQuality
 from pipeline.reconstruct import Reconstruction
 from pipeline.spec import whole_s
 from pipeline.surface.radii import spacing
-from pipeline.types import (
-    ByteArray,
-    PointCloud,
-    PointSource,
-    RegistrationResult,
-    Rig,
-    Surface,
-    SurfaceQuality,
-    SurfaceResult,
-)
+from pipeline.types import ByteArray, PointCloud, PointSource, RegistrationResult, Rig, Surface, SurfaceResult
 
 UNKNOWN = "–"
 SHOWN_NODES = 4

@@ -6,8 +6,8 @@ import hashlib
 import os
 import sys
 import time
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,12 +22,14 @@ from pipeline.importing.recorded_bag import BagRecording
 from pipeline.recording.recording import Recording
 from pipeline.types import FloatArray
 
-VERSION = 3
+VERSION = 4
 """Number to increase when tracking changes, so that older states are not read."""
 EVERY_S = 10.0
 """Least time between two writings of the state."""
 OLD_S = 14 * 86400.0
 """States that were not written for so long are deleted."""
+GOES_ON = "the tracking so far is kept, and the same command goes on after it"
+"""Note on an error of a run of which a state was written."""
 State = Mapping[str, NDArray[Any]]
 
 
@@ -61,17 +63,45 @@ class Checkpoint:
             np.savez(file, allow_pickle=False, elapsed_s=elapsed_s, **state)
 
     def delete(self) -> None:
-        """Delete the state, and those of other recordings that are old."""
+        """Delete the state."""
         with suppress(OSError):
-            written_s = self.path.stat().st_mtime
             self.path.unlink()
-            for other in self.path.parent.glob("*.npz"):
-                if written_s - other.stat().st_mtime > OLD_S:
-                    other.unlink(missing_ok=True)
+
+    @contextmanager
+    def said(self) -> Iterator[None]:
+        """Add a note to an error in this block, Ctrl-C for example, if a state was written."""
+        try:
+            yield
+        except BaseException as error:
+            if self.path.exists():
+                error.add_note(GOES_ON)
+            raise
+
+
+@contextmanager
+def deleted_after(state: Path | None) -> Iterator[None]:
+    """Delete a file with a state after this block; if it fails, its error says that the state is kept."""
+    if state is None:
+        yield
+        return
+    checkpoint = Checkpoint(state)
+    with checkpoint.said():
+        yield
+    checkpoint.delete()
+
+
+def delete_old() -> None:
+    """Delete the states that were not written for ``OLD_S``."""
+    for path in (cache_folder() / "tracking").glob("*.npz"):
+        with suppress(OSError):  # deleted by another run
+            if time.time() - path.stat().st_mtime > OLD_S:
+                path.unlink()
 
 
 def checkpoint_of(recording: Recording, given: Sequence[FloatArray | None] | None) -> Checkpoint | None:
     """Return the checkpoint of a recording on disk, named by a hash of all that determines its tracking.
+
+    Old states of any recording are deleted.
 
     None if the recording is not on disk or no frame has depth. Of the images, the hash contains only the
     first depth, in metres, so that it depends on the depth scale.
@@ -93,6 +123,7 @@ def checkpoint_of(recording: Recording, given: Sequence[FloatArray | None] | Non
         digest.update(np.ascontiguousarray(values).tobytes())
     for T in given or ():
         digest.update(b"none" if T is None else np.ascontiguousarray(T).tobytes())
+    delete_old()
     return Checkpoint.of(cache_folder() / "tracking" / f"{digest.hexdigest()[:32]}.npz")
 
 

@@ -18,11 +18,11 @@ from pipeline.config import MOST_AVERAGED
 from pipeline.importing.recorded import DepthView
 from pipeline.io.depth_to_color import register_depth
 from pipeline.kernels.geometry import apply, inverse, is_pinhole, pixel_rays, project
-from pipeline.recording.recording import Recording, spread
+from pipeline.recording.recording import Recording, read_ahead, spread
 from pipeline.recording.still import Vote, voted
-from pipeline.recording.tracking import REPORTED, read_ahead
+from pipeline.recording.tracking import REPORTED
 from pipeline.recording.walk import LEAST_FRAMES, iterate_walk
-from pipeline.types import Averaging, ByteArray, DepthMap, FloatArray, RgbdFrame, Rig
+from pipeline.types import Averaging, ByteArray, DepthMap, FloatArray, RgbdFrame, Rig, Walk
 
 COMPARED = 12
 """Frames that are compared with the first one, evenly chosen."""
@@ -45,6 +45,8 @@ PHOTOGRAPHS = 3
 """Photographs of which the median colour is taken: an object that is in one of them only is left out."""
 READERS = 2
 """Threads that read depth images: decoding takes longer than their processing."""
+LEAST_RESTING = 3
+"""Fewest frames at rest that are worth averaging."""
 NAME = "camera"
 """Name of the node."""
 
@@ -54,36 +56,60 @@ def iterate_recording(recording: Recording, frames: int = MOST_AVERAGED) -> Gene
 
     Args:
         recording: the frames.
-        frames: number of frames that are averaged if the camera stands.
+        frames: number of frames that are averaged if the camera stands; if it is below ``MOST_AVERAGED``, the
+            camera need not stand after them.
 
     Raises:
         InputError: as ``iterate_walk``.
     """
     yield Progress("comparing frames", 0.0)
-    if not stands(recording):
-        return (yield from iterate_walk(recording))
+    if not stands(recording, frames):
+        rig = yield from iterate_walk(recording)
+        return rig if rig.walk is None else replace(rig, walk=_with_rest_note(recording, rig.walk))
     steps = iterate_still(recording, frames)
     frame = yield from part(steps, "a camera that stands", 0.0, 1.0, detail=True)
     return Rig(recording.name, (frame,))
 
 
-def stands(recording: Recording) -> bool:
+def stands(recording: Recording, frames: int = MOST_AVERAGED) -> bool:
     """Return whether the camera is at rest: in every compared frame most squares of the first one keep their
     distance, and those of its photograph their texture. Frames without depth are not compared.
+
+    Args:
+        recording: the frames.
+        frames: number of the first frames that are judged if it is below ``MOST_AVERAGED``; else all are.
     """
     count = len(recording.times_s)
-    if count < LEAST_FRAMES or _walks_by_poses(recording):
+    count = min(count, max(frames, LEAST_FRAMES)) if frames < MOST_AVERAGED else count
+    if count < LEAST_FRAMES or _walks_by_poses(recording, count):
         return False
     compared = read_ahead(recording, spread(range(count), COMPARED + 1), READERS)
     views = [view for _, view in compared if view.depth.valid.any()]
     shares = [unchanged_share(views[0], other) for other in views[1:]]
-    return bool(shares) and min(shares) >= AT_REST and _same_photographs(recording)
+    return bool(shares) and min(shares) >= AT_REST and _same_photographs(recording, count)
 
 
-def _same_photographs(recording: Recording) -> bool:
-    """Return whether a few photographs show the same; those that cannot be read are not compared."""
+def _with_rest_note(recording: Recording, walk: Walk) -> Walk:
+    """Return a walk with a note on its first frames if it has one keyframe and began at rest."""
+    if len(walk.keyframes) > 1:
+        return walk
+    resting, moving = 1, min(len(recording.times_s), MOST_AVERAGED)
+    while moving - resting > 1:
+        middle = (resting + moving) // 2
+        resting, moving = (middle, moving) if stands(recording, middle) else (resting, middle)
+    if resting < LEAST_RESTING:
+        return walk
+    note = (
+        f"The camera hardly moved, and stood in the first {resting} frames: "
+        f"`--set recording.frames={resting}` averages these instead of tracking all"
+    )
+    return replace(walk, notes=(*walk.notes, note))
+
+
+def _same_photographs(recording: Recording, count: int) -> bool:
+    """Return whether a few of the first photographs show the same; those that cannot be read are left out."""
     small = []
-    for number in spread(range(len(recording.times_s)), PHOTOGRAPHS + 1):
+    for number in spread(range(count), PHOTOGRAPHS + 1):
         with suppress(InputError):
             small.append(_small(recording.frame(number).rgb))
     return all(alike_share(small[0], other) >= AT_REST for other in small[1:])
@@ -114,9 +140,10 @@ def alike_share(first: FloatArray, other: FloatArray) -> float:
     return float(np.mean(correlation[textured] >= ALIKE))
 
 
-def _walks_by_poses(recording: Recording) -> bool:
-    """Return whether the poses that came with a recording are apart; their convention does not matter."""
-    at_m = np.array([T[:3, 3] for T in recording.T_world_camera or () if T is not None]).reshape(-1, 3)
+def _walks_by_poses(recording: Recording, count: int) -> bool:
+    """Return whether given poses of the first frames are apart; their convention does not matter."""
+    poses = (recording.T_world_camera or ())[:count]
+    at_m = np.array([T[:3, 3] for T in poses if T is not None]).reshape(-1, 3)
     return len(at_m) > 0 and float(np.linalg.norm(at_m - at_m[0], axis=1).max()) > MOVED_M
 
 

@@ -1,13 +1,16 @@
-"""Protocol of a recording: frames of one camera in order of time; and the even choice of some of them."""
+"""Protocol of a recording: frames of one camera in order of time; how they are read ahead and chosen."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future
 from typing import Protocol
 
 import numpy as np
 
 from pipeline.importing.recorded import DepthView
+from pipeline.kernels.threads import threads
 from pipeline.types import FloatArray, RgbdFrame
 
 
@@ -41,6 +44,21 @@ class Recording(Protocol):
     def frame(self, index: int) -> RgbdFrame:
         """Read colour and depth of a frame on one pixel grid."""
         ...
+
+
+def read_ahead(
+    recording: Recording, numbers: Iterable[int], ahead: int = 1
+) -> Iterator[tuple[int, DepthView]]:
+    """Yield frames' numbers and depth; the next ``ahead`` are read, in parallel, while the caller works."""
+    reader = threads("recording", ahead)
+    waiting: deque[tuple[int, Future[DepthView]]] = deque()
+    for k in numbers:
+        waiting.append((k, reader.submit(recording.view, k)))
+        if len(waiting) > ahead:
+            number, view = waiting.popleft()
+            yield number, view.result()
+    for number, view in waiting:
+        yield number, view.result()
 
 
 def spread(numbers: Sequence[int], most: int) -> list[int]:

@@ -68,7 +68,7 @@ def _iterate_node(node: Path, frames: int, depth_scale: float | None) -> Generat
     intrinsics = None if is_recording(node) else files.get("intrinsics")
     steps = iterate_opening(node, depth_scale, intrinsics)
     recording = yield from part(steps, "opening", 0.0, 0.2, detail=True)
-    if len(recording.times_s) >= LEAST_FRAMES and not stands(recording):
+    if len(recording.times_s) >= LEAST_FRAMES and not stands(recording, frames):
         raise InputError(
             f"The camera of {node} does not stand still, as a rig's cameras must; for it alone, try "
             f"`packetmesh reconstruct --recording {node}`"

@@ -7,9 +7,7 @@ Once a frame shows little of the keyframe, it becomes the next one.
 from __future__ import annotations
 
 import time
-from collections import deque
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Future
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,13 +15,11 @@ import numpy as np
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import Progress
 from pipeline.config import RegistrationConfig
-from pipeline.importing.recorded import DepthView
 from pipeline.kernels.geometry import inverse, orthonormal, rigid, rotation_angle_rad, rotation_exp
-from pipeline.kernels.threads import threads
 from pipeline.recording.brightness import Brightness
 from pipeline.recording.checkpoint import EVERY_S, Checkpoint, State
 from pipeline.recording.clouds import KeyframeClouds
-from pipeline.recording.recording import Recording
+from pipeline.recording.recording import Recording, read_ahead
 from pipeline.registration.graph.edges import registration_information, small_motion
 from pipeline.registration.organised import (
     OrganisedCloud,
@@ -80,6 +76,10 @@ class Track:
     """The keyframes' points by frame number, in order of time."""
     links: tuple[Link, ...]
     """Registrations of each keyframe to an earlier one."""
+    blind: tuple[int, ...] = ()
+    """Frames with fewer than ``LEAST_POINTS`` points."""
+    disturbed: tuple[int, ...] = ()
+    """Frames with a pose that agree with their keyframe in less than ``LEAST_AGREEMENT``: something moved."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,29 +141,14 @@ def iterate_tracking(
     written_s = time.monotonic()
     for k, view in read_ahead(recording, range(first, count)):
         if k % REPORTED == 0:
-            yield Progress(f"tracking frame {k} of {count}", k / count)
+            yield Progress(f"frame {k} of {count}", k / count)
         tracker.follow(k, organised(view.depth, view.camera))
         if checkpoint is not None and time.monotonic() - written_s >= EVERY_S:
             checkpoint.write(tracker.state())
             written_s = time.monotonic()
-    if checkpoint is not None and checkpoint.path.exists():
+    if checkpoint is not None and first < count and checkpoint.path.exists():
         checkpoint.write(tracker.state())
     return tracker.track()
-
-
-def read_ahead(
-    recording: Recording, numbers: Iterable[int], ahead: int = 1
-) -> Iterator[tuple[int, DepthView]]:
-    """Yield frames' numbers and depth; the next ``ahead`` are read, in parallel, while the caller works."""
-    reader = threads("recording", ahead)
-    waiting: deque[tuple[int, Future[DepthView]]] = deque()
-    for k in numbers:
-        waiting.append((k, reader.submit(recording.view, k)))
-        if len(waiting) > ahead:
-            number, view = waiting.popleft()
-            yield number, view.result()
-    for number, view in waiting:
-        yield number, view.result()
 
 
 class _Tracker:
@@ -175,6 +160,8 @@ class _Tracker:
         self._clouds = KeyframeClouds()
         self._frames: list[Tracked | None] = []
         self._links: list[Link] = []
+        self._blind: list[int] = []
+        self._disturbed: list[int] = []
         self._keyframe = -1
         self._pose: FloatArray = np.eye(4)
         """Pose of the last tracked frame in its keyframe."""
@@ -186,6 +173,7 @@ class _Tracker:
     def follow(self, k: int, cloud: OrganisedCloud) -> None:
         """Track the next frame."""
         if len(cloud) < LEAST_POINTS:
+            self._blind.append(k)
             self._frames.append(None)
             return
         if self._keyframe < 0:
@@ -200,6 +188,8 @@ class _Tracker:
             found = self._corrected_by_color(k, cloud, found)
         self._motion = inverse(self._pose) @ found.T_target_source if follows else np.eye(4)
         self._pose, self._last = found.T_target_source, k
+        if found.agreeing_share < LEAST_AGREEMENT:
+            self._disturbed.append(k)
         if found.overlap_share < NEW_BELOW:
             self._renew(k, cloud, self._keyframe, found)
         else:
@@ -219,7 +209,8 @@ class _Tracker:
 
     def track(self) -> Track:
         """Return the result."""
-        return Track(tuple(self._frames), self._clouds, tuple(self._links))
+        of_frames = tuple(self._blind), tuple(self._disturbed)
+        return Track(tuple(self._frames), self._clouds, tuple(self._links), *of_frames)
 
     def state(self) -> State:
         """Return the arrays from which ``iterate_restoring`` continues, without the points."""
@@ -235,6 +226,8 @@ class _Tracker:
             "shares": np.array([(one.overlap_share, one.agreeing_share) for one in self._links]).reshape(
                 -1, 2
             ),
+            "blind": np.array(self._blind, int),
+            "disturbed": np.array(self._disturbed, int),
             "now": np.array([self._keyframe, self._last]),
             "pose_motion": np.array([self._pose, self._motion]),
         }
@@ -257,6 +250,7 @@ class _Tracker:
         for (source, target), T, information, shares in zip(*parts, strict=True):
             overlap, agreeing = shares.tolist()
             self._links.append(Link(int(source), int(target), T, information, overlap, agreeing))
+        self._blind, self._disturbed = state["blind"].tolist(), state["disturbed"].tolist()
         self._keyframe, self._last = state["now"].tolist()
         self._pose, self._motion = state["pose_motion"]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -11,14 +12,14 @@ from packetmesh.errors import InputError
 from packetmesh.progress import Progress, part
 from pipeline.importing.upright import upright
 from pipeline.kernels.geometry import LEVEL_POSE, inverse
-from pipeline.recording.checkpoint import checkpoint_of
+from pipeline.recording.checkpoint import Checkpoint, checkpoint_of
 from pipeline.recording.errors import path_note
-from pipeline.recording.given import checked_poses
+from pipeline.recording.given import Given, checked_poses
 from pipeline.recording.loops import Trajectory, iterate_loops, poses_by_tracking
 from pipeline.recording.photographs import iterate_photographs
 from pipeline.recording.places import Places, iterate_joins
-from pipeline.recording.recording import Recording, spread
-from pipeline.recording.tracking import REPORTED, WITHIN, Track, iterate_tracking, read_ahead
+from pipeline.recording.recording import Recording, read_ahead, spread
+from pipeline.recording.tracking import REPORTED, WITHIN, Track, iterate_tracking
 from pipeline.recording.volume import Volume, voxel_for
 from pipeline.registration.organised import shared_shares
 from pipeline.types import FloatArray, IntArray, PointCloud, Rig, Walk
@@ -39,6 +40,8 @@ FARTHEST_VIEW_M, FACING = 2.0, 0.5
 def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
     """Turn a recording into a rig: a few keyframes with final poses, and the map of all frames.
 
+    The state of tracking, if it was written, stays (``Walk.state``) until the caller has written its results.
+
     Raises:
         InputError: the recording has too few frames, or an image cannot be read.
     """
@@ -47,6 +50,14 @@ def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
     yield Progress("reading the first frames", 0.0)
     given = checked_poses(recording)
     checkpoint = checkpoint_of(recording, given.T_world_camera)
+    with nullcontext() if checkpoint is None else checkpoint.said():
+        return (yield from _iterate_rig(recording, given, checkpoint))
+
+
+def _iterate_rig(
+    recording: Recording, given: Given, checkpoint: Checkpoint | None
+) -> Generator[Progress, None, Rig]:
+    """Track, close loops and integrate, from the poses and the state there are."""
     tracking = iterate_tracking(recording, given.T_world_camera, checkpoint)
     track = yield from part(tracking, "tracking", 0.0, 0.45, detail=True)
     if not track.clouds:
@@ -70,14 +81,36 @@ def iterate_walk(recording: Recording) -> Generator[Progress, None, Rig]:
     given_poses = given.T_world_camera or [None] * len(poses)
     corrected = path_note(poses, given_poses, "that of the given poses")
     notes = (*recording.notes, *given.notes, *corrected, *turned)
-    if checkpoint is not None:
-        checkpoint.delete()
     colored = replace(points, colors=seen.colors)
     resumed_s = 0.0 if checkpoint is None else checkpoint.resumed_s
+    state = checkpoint.path if checkpoint is not None and checkpoint.path.exists() else None
     walk = Walk(
-        recording.times_s, poses, keyframes, links, colored, voxel_m, first, tracked, notes, resumed_s
+        times_s=recording.times_s,
+        T_world_camera=poses,
+        keyframes=keyframes,
+        links=links,
+        map=colored,
+        voxel_m=voxel_m,
+        first_frames=first,
+        T_world_tracked=tracked,
+        notes=notes,
+        resumed_s=resumed_s,
+        without_depth=track.blind,
+        apart=_apart(track, poses),
+        disturbed=tuple(k for k in track.disturbed if poses[k] is not None),
+        state=state,
     )
     return Rig(recording.name, seen.views, walk=walk)
+
+
+def _apart(track: Track, poses: Sequence[FloatArray | None]) -> tuple[int, ...]:
+    """Return the frames of parts that were not joined, with those lost just before each part began."""
+    found, blind = set[int](), set(track.blind)
+    for k in reversed(range(len(poses))):
+        tracked = track.frames[k] is not None
+        if poses[k] is None and (tracked or (k + 1 in found and k not in blind)):
+            found.add(k)
+    return tuple(sorted(found))
 
 
 def iterate_map(
@@ -96,7 +129,7 @@ def iterate_map(
     volume = Volume(voxel_m)
     for count, (k, view) in enumerate(read_ahead(recording, numbers)):
         if count % REPORTED == 0:
-            yield Progress(f"mapping frame {k} of {len(T_world_depth)}", count / len(numbers))
+            yield Progress(f"frame {k} of {len(T_world_depth)}", count / len(numbers))
         T = T_world_depth[k]
         assert T is not None
         volume.integrate(view, T)

@@ -9,7 +9,8 @@ import numpy as np
 
 from pipeline.kernels.geometry import has_ray
 from pipeline.kernels.rays import Camera
-from pipeline.types import BoolArray, DepthMap, FloatArray, Gaps
+from pipeline.quality import Gaps
+from pipeline.types import BoolArray, DepthMap, FloatArray
 
 LARGE_M2 = 0.01
 """Least area of a large gap: a hand fits through it."""

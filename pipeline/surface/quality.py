@@ -17,19 +17,11 @@ from pipeline.kernels.rays import (
     triangle_areas_m2,
     triangle_scene,
 )
+from pipeline.quality import SurfaceQuality
 from pipeline.surface.boundary import connected_parts, edges_and_faces
 from pipeline.surface.gaps import gaps_of
 from pipeline.surface.holes import open_area_m2
-from pipeline.types import (
-    BoolArray,
-    ByteArray,
-    DepthMap,
-    FloatArray,
-    IntArray,
-    Surface,
-    SurfaceQuality,
-    SurfaceResult,
-)
+from pipeline.types import BoolArray, ByteArray, DepthMap, FloatArray, IntArray, Surface, SurfaceResult
 
 
 @dataclass(frozen=True, slots=True)

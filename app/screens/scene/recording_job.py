@@ -13,9 +13,10 @@ from app.web.zips import opened_zip
 from packetmesh.errors import InputError
 from packetmesh.files import path_below
 from packetmesh.progress import Progress
-from pipeline.importing import is_recording, iterate_import
+from pipeline.importing import is_recording
 from pipeline.importing.recorded import iterate_opening
 from pipeline.io.rigs import is_pair, is_rig, load_rig
+from pipeline.recording.imported import iterate_checked_import
 from pipeline.sources import Recorded, RigFolder
 from pipeline.types import Rig
 
@@ -105,7 +106,7 @@ def _used(
     or next to it if it is a file, which keeps its name.
     """
     if frames is not None:
-        report = yield from iterate_import(path, place, frames, depth_scale)
+        report = yield from iterate_checked_import(path, place, frames, depth_scale)
         found = f"{report.kind}: {len(report.frames)} of {report.candidates} frames became nodes"
         return ReadRecording(RigFolder(str(place)), (found, *report.notes))
     opened = yield from iterate_opening(path, depth_scale)  # reports errors of the recording now

@@ -93,6 +93,8 @@ def test_a_disk_that_fills_is_one_sentence_and_leaves_nothing_half_written(
     assert [path.name for path in left if path.name.startswith(".")] == []
     assert not {"metrics.json", "plan.json"} & {path.name for path in left}
     assert all(path.stat().st_size < room for path in left)
+    if command == "reconstruct":
+        assert not out.exists()
 
 
 def killed_while_writing(rig, out):

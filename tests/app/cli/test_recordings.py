@@ -24,6 +24,10 @@ def walk(tmp_path_factory):
     return folder
 
 
+def share_of(line):
+    return int(line.split("%")[0])
+
+
 @pytest.fixture(scope="module")
 def out(walk, tmp_path_factory):
     return tmp_path_factory.mktemp("out") / "run"
@@ -39,6 +43,8 @@ def test_a_recording_becomes_a_surface_a_trajectory_and_a_report(capsys, walk, o
     told = shares(said)
     assert told == sorted(told)
     assert told.count(100) == 1
+    assert min(share_of(line) for line in said.splitlines() if "recording: mapping" in line) > 20
+    assert "tracking: frame 0 of 12" in said
     assert f"Tracked 12 frames over {recording['path_m']:.1f} m at" in said
     truth = read_truth(walk)
     times_s = np.arange(12) / 30.0
@@ -72,7 +78,7 @@ def test_frames_that_are_lost_are_named(capsys, walk, tmp_path):
     (copy / "depth.txt").write_text("\n".join(lines))
     code, _, said = run(capsys, "reconstruct", "--recording", copy, "--out", tmp_path / "out")
     assert code == 0, said
-    sentence = "The camera was lost in 2 of 12 frames (5 to 6), which are not in the surface"
+    sentence = "2 of 12 frames (5 to 6) have no depth, or too little to be tracked, and are not in the"
     assert sentence in said
     assert sentence in unescape((tmp_path / "out" / "report.html").read_text())
 

@@ -9,7 +9,8 @@ import trimesh
 from app.drawing.glb import lines_glb, mesh_glb, textured_glb
 from app.drawing.meshes import DARKEST, mesh_view, rim_segments_m, surface_glb, vertex_normals
 from app.drawing.ordering import reordered
-from pipeline.types import SurfaceQuality, SurfaceResult
+from pipeline.quality import SurfaceQuality
+from pipeline.types import SurfaceResult
 from tests.app.gltf import arrays, srgb
 
 SPHERE = trimesh.creation.icosphere()

@@ -8,7 +8,8 @@ import numpy as np
 
 from app.reports.reconstruction import quality_tables
 from pipeline.folders.run import surface_metrics
-from pipeline.types import Gaps, SurfaceQuality, SurfaceResult
+from pipeline.quality import Gaps, SurfaceQuality
+from pipeline.types import SurfaceResult
 
 
 def surface(share, gaps, rims, inside_m2):

@@ -275,7 +275,7 @@ def test_frames_that_were_not_looked_at_and_extrinsics_that_are_missing_are_said
     write_scannet(tmp_path / "recording", written)
     report, _ = imported(tmp_path)
     assert report.candidates == 4
-    assert "One in 3 of the 10 frames is used (at most 4)" in report.notes
+    assert "One in 3 of the 10 frames is used, by number and not by motion (at most 4)" in report.notes
     assert not any("extrinsic" in note for note in report.notes)
 
 
@@ -311,3 +311,15 @@ def test_what_a_killed_import_left_in_its_folder_is_no_obstacle_and_goes(tmp_pat
     left.mkdir(parents=True)
     drain(iterate_import(tmp_path / "recording", tmp_path / "rig"))
     assert sorted(path.name for path in (tmp_path / "rig").iterdir()) == ["node_00", "node_01", "node_02"]
+
+
+def test_a_disk_that_is_full_names_the_folder_that_was_asked_for(tmp_path, monkeypatch):
+    def full(path, *_):
+        raise InputError(f"{path} cannot be written (No space left on device); delete something there")
+
+    monkeypatch.setattr("pipeline.importing.rig_folder.write_color", full)
+    write_tum(tmp_path / "recording", orbit(3))
+    with pytest.raises(InputError) as stopped:
+        drain(iterate_import(tmp_path / "recording", tmp_path / "rig"))
+    assert str(stopped.value).startswith(f"{tmp_path.resolve() / 'rig' / 'node_00' / 'color.png'} cannot")
+    assert [path.name for path in tmp_path.iterdir()] == ["recording"]

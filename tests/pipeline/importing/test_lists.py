@@ -138,3 +138,42 @@ def test_images_of_one_time_are_one_node(tmp_path):
     assert any("1 frames have the time of another frame and were left out" in note for note in report.notes)
     assert len(frames) == 2
     assert not np.allclose(frames[0].T_world_camera, frames[1].T_world_camera)
+
+
+def test_images_without_a_partner_are_counted(tmp_path, written):
+    """``write_tum`` writes a photograph and a depth image without one; one depth image more is 30 ms late."""
+    note = "3 pairs: 1 of 4 images of rgb.txt and 1 of 4 of depth.txt have no partner"
+    assert any(one.startswith(note) for one in imported(tmp_path)[0].notes)
+    file = tmp_path / "recording" / "depth.txt"
+    lines = file.read_text().splitlines()
+    lines[1] = f"{float(lines[1].split()[0]) - 0.03} {lines[1].split()[1]}"
+    file.write_text("\n".join(lines))
+    report = drain(iterate_import(tmp_path / "recording", tmp_path / "other"))
+    assert any(one.startswith("2 pairs: 2 of 4 images of rgb.txt and 2 of 4") for one in report.notes)
+
+
+@pytest.mark.parametrize(("late_s", "says"), [(0.03, "0.03 s later"), (-0.025, "0.025 s earlier")])
+def test_clocks_that_differ_are_named_by_how_much_and_can_be_set_right(tmp_path, late_s, says):
+    """A picture every 100 ms."""
+    folder = tmp_path / "recording"
+    write_tum(folder, orbit(3))
+    rows = {"rgb.txt": 0.0, "depth.txt": late_s}
+    for name, shift_s in rows.items():
+        images = [line.split()[1] for line in (folder / name).read_text().splitlines()[1:4]]
+        lines = [f"{5.0 + 0.1 * k + shift_s:.6f} {image}" for k, image in enumerate(images)]
+        (folder / name).write_text("\n".join(lines))
+    with pytest.raises(InputError, match=rf"{says} \(median\)") as refused:
+        imported(tmp_path)
+    assert ("subtract this from" if late_s > 0.0 else "add this to") in str(refused.value)
+    change(folder, ["depth.txt"], lambda line: f"{float(line.split()[0]) - late_s:.6f} {line.split()[1]}")
+    assert len(imported(tmp_path)[1]) == 3
+
+
+def test_images_that_are_listed_again_are_left_out_and_counted(tmp_path, written):
+    for name in LISTS[:2]:
+        file = tmp_path / "recording" / name
+        time_s, image = file.read_text().splitlines()[1].split()
+        file.write_text(file.read_text() + f"{float(time_s) + 10.0} {image}\n")
+    report, frames = imported(tmp_path)
+    assert len(frames) == 3
+    assert "1 frames name an image that an earlier frame has, and were left out" in report.notes

@@ -409,7 +409,7 @@ def test_of_a_long_recording_every_nth_frame_is_used(tmp_path, monkeypatch):
     np.testing.assert_array_equal(recording.times_s, every.times_s[[0, 3, 6]])
     np.testing.assert_array_equal(recording.T_world_camera[2], every.T_world_camera[6])
     np.testing.assert_array_equal(recording.frame(1).rgb, every.frame(3).rgb)
-    assert "One in 3 of the 7 frames is used (at most 3)" in recording.notes
+    assert "One in 3 of the 7 frames is used, by number and not by motion (at most 3)" in recording.notes
     assert not any("One in" in note for note in every.notes)
 
 

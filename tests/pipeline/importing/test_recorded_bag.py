@@ -14,7 +14,7 @@ from pipeline.importing.recorded_bag import BagRecording
 from pipeline.io.depth_to_color import register_depth
 from pipeline.io.images import NoDepthError
 from pipeline.kernels.geometry import rigid, rotation_exp
-from pipeline.recording.tracking import read_ahead
+from pipeline.recording.recording import read_ahead
 from pipeline.types import DepthMap, Rig
 from tests.pipeline.importing.bag_parts import D, Images, Info, K, colors, wall, write_parts
 from tests.pipeline.importing.bags import BagWriter, write_bag

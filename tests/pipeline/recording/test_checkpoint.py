@@ -13,7 +13,7 @@ from lab.walks.walk import kinect, render_walk
 from lab.worlds.rooms import random_room
 from packetmesh.progress import drain
 from pipeline.importing.recorded import open_recording
-from pipeline.recording.checkpoint import Checkpoint, cache_folder, checkpoint_of
+from pipeline.recording.checkpoint import GOES_ON, OLD_S, Checkpoint, cache_folder, checkpoint_of
 from pipeline.recording.tracking import Track, iterate_tracking
 from pipeline.recording.walk import iterate_walk
 from tests.pipeline.recording.rendered import around, in_the_living_room, moved
@@ -135,18 +135,45 @@ def test_the_depth_scale_counts_although_the_first_image_is_empty(tmp_path):
     assert one != other
 
 
-def test_a_finished_walk_leaves_no_state(walk, cache):
+def test_a_finished_walk_keeps_its_tracking_until_the_results_are_written(walk, monkeypatch):
     recording = open_recording(walk)
     steps = iterate_walk(recording)
     for step in steps:
         if "mapping" in step.stage:
             break
-    assert len(list((cache_folder() / "tracking").glob("*.npz"))) == 1
     steps.close()
     rig = drain(iterate_walk(recording))
     assert rig.walk.resumed_s > 0.0
-    assert list((cache / "packetmesh" / "tracking").iterdir()) == []
+    assert list((cache_folder() / "tracking").iterdir()) == [rig.walk.state]
+    tracked = []
+    monkeypatch.setattr("pipeline.recording.tracking._Tracker.follow", counted(tracked))
     again = drain(iterate_walk(recording))
-    assert again.walk.resumed_s == 0.0
+    assert tracked == []
+    assert again.walk.resumed_s == rig.walk.resumed_s
     np.testing.assert_array_equal(rig.walk.map.points_m, again.walk.map.points_m)
     np.testing.assert_array_equal(rig.walk.map.colors, again.walk.map.colors)
+
+
+def test_an_error_says_whether_the_tracking_is_kept(walk):
+    steps = iterate_walk(open_recording(walk))
+    for step in steps:
+        if "mapping" in step.stage:
+            break
+    with pytest.raises(KeyboardInterrupt) as stopped:
+        steps.throw(KeyboardInterrupt())
+    assert stopped.value.__notes__ == [GOES_ON]
+    steps = iterate_walk(in_the_living_room(around(6)))
+    next(steps)
+    with pytest.raises(KeyboardInterrupt) as stopped:
+        steps.throw(KeyboardInterrupt())
+    assert not hasattr(stopped.value, "__notes__")
+
+
+def test_old_states_are_deleted(walk):
+    own = checkpoint_of(open_recording(walk), None)
+    own.write({})
+    old = own.path.with_name("old.npz")
+    shutil.copy(own.path, old)
+    os.utime(old, (time.time() - 1.1 * OLD_S,) * 2)
+    checkpoint_of(open_recording(walk), None)
+    assert list(own.path.parent.iterdir()) == [own.path]

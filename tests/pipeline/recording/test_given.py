@@ -6,16 +6,19 @@ import numpy as np
 import pytest
 
 from packetmesh.progress import drain
-from pipeline.kernels.geometry import inverse
+from pipeline.kernels.geometry import inverse, rigid
 from pipeline.recording.errors import ate_m
 from pipeline.recording.given import CONVENTIONS, checked_poses
 from pipeline.recording.walk import iterate_walk
 from tests.pipeline.recording.rendered import Rendered, around, in_the_living_room, moved
 
 OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
+FORWARD_LEFT_UP = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+"""Maps a point in the camera's axes (right, down, forward) to a body's."""
 WRITTEN = {
     "from camera to world": lambda T: T,
     "from camera to world with OpenGL's axes": lambda T: T @ OPENGL,
+    "from camera to world with the axes of a body in ROS": lambda T: T @ inverse(FORWARD_LEFT_UP),
     "from world to camera": inverse,
     "from world to camera with OpenGL's axes": lambda T: inverse(T @ OPENGL),
 }
@@ -48,6 +51,27 @@ def test_every_convention_is_found_and_said(convention, beside):
     expected = convention == "from camera to world"
     assert (given.notes == ()) == expected
     assert expected or convention in given.notes[0]
+
+
+def enlarged(T, factor):
+    return rigid(T[:3, :3], factor * T[:3, 3])
+
+
+@pytest.mark.parametrize("convention", list(CONVENTIONS))
+def test_centimetres_are_found_in_every_convention(convention):
+    truth = around(40)
+    given = checked_poses(written([enlarged(WRITTEN[convention](T), 100.0) for T in truth]))
+    for T, true in zip(given.T_world_camera, truth, strict=True):
+        np.testing.assert_allclose(T, true, atol=1e-9)
+    assert "in centimetres: they were read so" in given.notes[0]
+    assert ("as from" in given.notes[0]) == (convention != "from camera to world")
+
+
+def test_positions_by_another_factor_are_not_used_and_the_factor_is_named():
+    given = checked_poses(written([enlarged(T, 5.0) for T in around(40)]))
+    assert given.T_world_camera is None
+    assert "moves 5 times as far as the depth shows" in given.notes[0]
+    assert "--depth-scale" in given.notes[0]
 
 
 def test_poses_that_drift_are_kept():

@@ -41,6 +41,26 @@ def test_it_walks_if_it_moves_at_any_time():
             assert not stands(in_the_living_room(poses, noise_m=0.002))
 
 
+def resting_then_moving():
+    """Eight frames at rest, and four that are 3 cm to the side: not far enough for another keyframe."""
+    aside = around(30)[0] @ moved([0, 0, 1], 0.0, [0.03, 0.0, 0.0])
+    return in_the_living_room([*poses_at_rest(8), *[aside] * 4], noise_m=0.002)
+
+
+def test_rest_is_judged_within_the_frames_that_are_asked_for():
+    recording = resting_then_moving()
+    assert [stands(recording, frames) for frames in (1, 2, 8, 9, 12, 64)] == [True] * 3 + [False] * 3
+    rig = drain(iterate_recording(recording, 8))
+    assert rig.walk is None
+    assert rig.frames[0].averaging.frames == 8
+
+
+def test_a_walk_that_hardly_moves_names_its_frames_at_rest():
+    walk = drain(iterate_recording(resting_then_moving())).walk
+    assert len(walk.keyframes) == 1
+    assert "stood in the first 8 frames: `--set recording.frames=8` averages" in walk.notes[-1]
+
+
 def test_noise_alone_is_no_motion():
     assert stands(standing())
     recording = standing()

@@ -12,6 +12,7 @@ from packetmesh.progress import drain
 from pipeline.importing.recorded import DepthView
 from pipeline.kernels.geometry import inverse, look_at, rigid
 from pipeline.recording.brightness import Brightness
+from pipeline.recording.recording import read_ahead
 from pipeline.recording.tracking import (
     LEAST_AGREEMENT,
     LEAST_OVERLAP,
@@ -26,7 +27,6 @@ from pipeline.recording.tracking import (
     Track,
     iterate_tracking,
     link,
-    read_ahead,
     registered,
     steadied,
 )
@@ -325,7 +325,7 @@ def test_every_frame_is_read_once_and_progress_grows():
     steps = list(iterate_tracking(recording, recording.T_world_camera))
     assert sorted(recording.read)[1:] == list(range(12))  # the first one also for the depth camera's pose
     assert [step.fraction for step in steps] == sorted(step.fraction for step in steps)
-    assert steps[0].stage == "tracking frame 0 of 12"
+    assert steps[0].stage == "frame 0 of 12"
     assert len(steps) == 2
 
 

@@ -64,6 +64,7 @@ def test_a_third_without_depth_in_the_middle():
     walk = walked(recording)
     lost = assert_right(walk, recording.T_true)
     assert set(range(12, 24)) <= set(lost)
+    assert walk.without_depth == tuple(range(12, 24))
     assert not set(range(12)) & set(lost)
 
 
@@ -100,6 +101,7 @@ def test_two_rooms_are_not_one():
     walk = walked(recording)
     rooms = {k >= len(poses) for k, T in enumerate(walk.T_world_camera) if T is not None}
     assert len(rooms) == 1
+    assert walk.apart == tuple(k for k, T in enumerate(walk.T_world_camera) if T is None)
     assert_right(walk, recording.T_true)
 
 

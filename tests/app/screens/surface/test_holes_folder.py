@@ -13,9 +13,9 @@ from app.screens.surface.draw_holes import tape
 from app.screens.surface.holes import FILL_OFF, NONE, HolesFolder, filled_sentence, hole_name, parts_sentence
 from app.screens.surface.view import ExplainView, FilledView, HoleView
 from pipeline.kernels.geometry import rotation_exp
+from pipeline.quality import SurfaceQuality
 from pipeline.surface.boundary import boundary_loops
 from pipeline.surface.findings import Explanation, RayParts
-from pipeline.types import SurfaceQuality
 from tests.app.fakes import ui_of
 
 EYE = np.zeros(3)
