@@ -295,7 +295,7 @@ class NetworkSetup:
         known before the cameras have sent."""
         what_if = self.what_if
         alone = what_if.in_room and what_if.count - len(what_if.off) < 2
-        can = coding == REQUESTABLE and network.mac.reaches_nodes
+        can = coding == REQUESTABLE and network.mac.reaches_nodes and not what_if.walks
         return can, can and not alone
 
     def runs(self) -> dict[str, NetworkConfig]:
