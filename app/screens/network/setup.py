@@ -67,8 +67,8 @@ class NetworkSetup:
             "Most surface first",
             False,
             hint="Every camera first sends a coarse image. By these the sink asks each for the tiles that "
-            "add most to the surface first. Needs the coding with AVIF colour, and a radio by which the sink "
-            "reaches the cameras.",
+            "add most to the surface first. Needs the coding with AVIF colour, a radio by which the sink "
+            "reaches the cameras, and cameras that stand: a walking one sends its images as it takes them.",
         )
         self._share = gui.add_slider(
             "Lose packets (%)",

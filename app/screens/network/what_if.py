@@ -85,7 +85,9 @@ class WhatIf:
             "radios have one rate each, set by Medium access.",
         )
         self._mover = gui.add_dropdown(
-            "Move radio of", [NOBODY], hint="Node whose radio the arrows move; its camera stays in place."
+            "Move radio of",
+            [NOBODY],
+            hint="Node whose radio the arrows move; its camera stays in place. Not for a walking camera.",
         )
         self._text = gui.add_markdown(Markdown(""))
         self._visible = True
