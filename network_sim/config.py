@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from network_sim.bounds.image_times import check_image_times
 from network_sim.bounds.limits import LARGEST_S, check_limits
 from network_sim.bounds.requests import check_requests
 from network_sim.settings.mac import OFDM_KINDS, WLAN_KINDS, MacConfig, MacKind
@@ -127,6 +128,11 @@ class NodesConfig:
     others. Empty: nodes send their whole images without a request."""
     request_bytes_by_node: tuple[int, ...] = ()
     """Bytes of the sink's request to each node, without its header, if nodes wait for one."""
+    image_times_s: tuple[float, ...] = ()
+    """Times, from the start of the run, at which the only node takes its images, one for each of
+    nodes.images; it sends them in this order. Empty takes them every nodes.interval_s."""
+    bytes_by_image: tuple[int, ...] = ()
+    """Size of each of these images, depth included."""
     request_after_s: float = 1.0
     """Time that the sink computes before it sends these requests."""
     payload_bytes: int = 116
@@ -180,6 +186,7 @@ class NodesConfig:
             one_each(f"nodes.{key}", getattr(self, key), self.count, f"one size for each node ({nodes})")
         finite("nodes.places_m", self.places_m, "metres")
         at_least("nodes.bytes_by_node", min(self.bytes_by_node, default=1), 1)
+        check_image_times(self.image_times_s, self.bytes_by_image, self.images, self.count)
         sizes = [self.size_bytes(node) for node in range(len(self.first_bytes_by_node))]
         check_requests(self.first_bytes_by_node, self.request_bytes_by_node, sizes, self.images)
         if self.header_bytes >= self.payload_bytes:
@@ -188,8 +195,10 @@ class NodesConfig:
                 f"{self.payload_bytes} bytes; try a larger nodes.payload_bytes"
             )
 
-    def size_bytes(self, node: int) -> int:
-        """Return the bytes of one image of a node, depth image included."""
+    def size_bytes(self, node: int, number: int = 0) -> int:
+        """Return the bytes of a node's image with this number, counted from 0, depth image included."""
+        if self.bytes_by_image:
+            return self.bytes_by_image[number]
         return self.bytes_by_node[node] if self.bytes_by_node else self.image_bytes + self.depth_bytes
 
 
@@ -302,6 +311,11 @@ class NetworkConfig:
             headers_bytes = self.scheme.headers_bytes
         else:
             key, data_bytes, headers_bytes = "nodes.payload_bytes", self.nodes.payload_bytes, 0
+        if self.nodes.image_times_s and self.nodes.image_times_s[-1] >= self.run.horizon_s:
+            raise InputError(
+                f"nodes.image_times_s has an image at {self.nodes.image_times_s[-1]:g} s, but the run stops "
+                f"at run.horizon_s={self.run.horizon_s:g}; try a larger run.horizon_s"
+            )
         if self.nodes.first_bytes_by_node and not self.mac.reaches_nodes:
             confirmed = self.mac.kind == "lora"
             raise InputError(

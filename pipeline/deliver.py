@@ -1,6 +1,7 @@
 """Delivery of a rig's images through a network, and the surface from what has arrived so far (SPEC 6.5).
 
-Every node sends its own encoded colour and depth image. At each moment the sink decodes exactly the
+Every node sends its own encoded colour and depth image; the camera of a recording is one node, which sends
+its keyframes, each from the time at which it was taken. At each moment the sink decodes exactly the
 bytes that have arrived by then, and the usual chain reconstructs what it can from them.
 """
 

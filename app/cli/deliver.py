@@ -36,7 +36,8 @@ def deliver(
     """Send a rig's images through a network and rebuild the scene from what has arrived by each moment.
 
     Args:
-        images: Images that the nodes send; of a recording each node sends a keyframe.
+        images: Images that the nodes send. The camera of a recording is one node, which sends its keyframes,
+            each from the time at which it was taken.
         out: Folder for the final result (the files of `reconstruct`), moments.csv and delivery.html.
         preset: The network: thesis-link, greenhouse, office, wifi-n, wifi-ax, wifi-ah, lora, ble, lte-m,
             nb-iot, or the config.json of a finished simulation.
@@ -47,9 +48,10 @@ def deliver(
             share), a mahimahi trace, or the output of iperf3 --json.
         down: Names of nodes that have failed and send nothing, for example node_02.
         leave_out_seen: Leave out tiles that another camera shows. Every node first sends a coarse image; by
-            these the sink tells each node its tiles. Needs the coding exact and two cameras.
+            these the sink tells each node its tiles. Needs the coding exact and two cameras, no recording.
         order: Order of the depth tiles: the coding's own, or by what they add to the surface: every node
-            first sends a coarse image, by which the sink requests them. Needs the coding exact.
+            first sends a coarse image, by which the sink requests them. Needs the coding exact, and no
+            recording.
         every_radio: Send the images by every radio, each in a network of its own, and print what each needs
             for the surface; `--preset` and `--link-trace` then have no effect, and only every_radio.json
             is written. It takes minutes; fewer `--moments` are quicker.
@@ -73,6 +75,7 @@ def deliver(
         left_out_sentences,
         ordered_sentences,
         summary,
+        walk_sentences,
         write_delivery_folder,
     )
     from pipeline.folders.run import check_run_folder, clear_run_folder
@@ -108,7 +111,8 @@ def deliver(
     page = write_hand_out(delivery, out)
     write_delivery_folder(delivery, metrics, preset, out)
     say(f"100%  {summary(delivery)}; see {page}")
-    for sentence in (*left_out_sentences(delivery.sending), *ordered_sentences(delivery.sending)):
+    sending = delivery.sending
+    for sentence in (*walk_sentences(sending), *left_out_sentences(sending), *ordered_sentences(sending)):
         say(sentence)
     for note in (*imported_notes(report), *delivery.sending.rig.notes):
         say(note)

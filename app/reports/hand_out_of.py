@@ -14,7 +14,7 @@ from network_sim.types import NS_PER_S, Cause, EventKind, to_s
 from packetmesh.files import atomic_path
 from pipeline.deliver import Delivery
 from pipeline.delivery.moments import Moment
-from pipeline.delivery.sending import Sending, received_at
+from pipeline.delivery.sending import Sending, nodes_of, received_at
 from pipeline.folders.delivery import left_out_sentences, ordered_sentences, summary
 
 RECEIVED = "received"
@@ -46,15 +46,15 @@ def hand_out_of(delivery: Delivery) -> HandOut:
     rig, poses = sending.rig, delivery.lossless.placement.T_world_camera
     return HandOut(
         title=f"{rig.name}: from packets to a surface",
-        sentence=f"{_cameras(len(rig.frames))} colour and depth images ({sending.coding.title}); the "
+        sentence=f"{_cameras(sending)} colour and depth images ({sending.coding.title}); the "
         f"surface is rebuilt from the data that have arrived. Result: {summary(delivery)}."
         + "".join(f" {one[0].upper()}{one[1:]}." for one in _requests(sending)),
         nodes=tuple(
-            HandOutNode(frame.name, frame.intrinsics, pose)
-            for frame, pose in zip(rig.frames, poses, strict=True)
+            HandOutNode(name, frame.intrinsics, pose)
+            for name, frame, pose in zip(_names(sending), rig.frames, poses, strict=True)
         ),
         moments=tuple(_moment(sending, index, moment) for index, moment in enumerate(delivery.moments)),
-        frames=_frames(sending.trace, len(rig.frames)),
+        frames=_frames(sending.trace, len(nodes_of(rig)), by_image=rig.walk is not None),
         end_s=to_s(sending.trace.horizon_ns),
         lossless_f_score=None if truth is None else truth["f_score_5cm"],
     )
@@ -75,13 +75,16 @@ def _moment(sending: Sending, index: int, moment: Moment) -> HandOutMoment:
     )
 
 
-def _frames(trace: NetworkTrace, nodes: int) -> FramesOnAir:
-    """Return the frames of the cameras; those of the sink, which request missing packets, are left out."""
+def _frames(trace: NetworkTrace, nodes: int, by_image: bool) -> FramesOnAir:
+    """Return the frames of the cameras; those of the sink, which request missing packets, are left out.
+
+    With ``by_image`` the rows are the images of the only camera.
+    """
     frames = trace.events.of(EventKind.AIR)
     frames = frames.where(frames.node < nodes)
     words = (RECEIVED, *(cause.name.lower().replace("_", " ") for cause in Cause if cause))
     return FramesOnAir(
-        node=frames.node,
+        node=frames.image if by_image else frames.node,
         start_s=frames.t_ns / NS_PER_S,
         end_s=(frames.t_ns + frames.duration_ns) / NS_PER_S,
         cause=fates(frames, trace.events.of(EventKind.LOSS)).astype(np.int64),
@@ -89,5 +92,19 @@ def _frames(trace: NetworkTrace, nodes: int) -> FramesOnAir:
     )
 
 
-def _cameras(count: int) -> str:
+def _names(sending: Sending) -> list[str]:
+    """Return a name for each image: its node's; of a recording, when its camera took it."""
+    names = [frame.name for frame in sending.rig.frames]
+    if sending.rig.walk is None:
+        return names
+    return [f"{name} at {ready_s:.3g} s" for name, ready_s in zip(names, sending.ready_s, strict=True)]
+
+
+def _cameras(sending: Sending) -> str:
+    count = len(sending.rig.frames)
+    if sending.rig.walk is not None:
+        return (
+            f"A walking camera, one node with one radio, sends {count} of its keyframes in order, each from "
+            "the time at which it took it, as"
+        )
     return "One camera sends its" if count == 1 else f"{count} cameras send their"

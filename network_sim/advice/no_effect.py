@@ -176,6 +176,9 @@ def _of_nodes(config: NetworkConfig) -> Reasons:
         yield _PLACES, f"mac.kind is {kind}, which connects nodes at any distance; only drawings show it"
     if nodes.bytes_by_node:
         yield ("nodes.image_bytes", "nodes.depth_bytes"), "nodes.bytes_by_node has the size of each image"
+    if nodes.image_times_s:
+        own = "nodes.image_times_s and nodes.bytes_by_image have the time and the size of each image"
+        yield ("nodes.interval_s", "nodes.image_bytes", "nodes.depth_bytes", "nodes.bytes_by_node"), own
     if not nodes.first_bytes_by_node:
         yield ("nodes.request_after_s",), "nodes.first_bytes_by_node is empty, so the sink requests nothing"
     if nodes.duty_cycle == 1.0:

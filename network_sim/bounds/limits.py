@@ -37,6 +37,7 @@ _MOST_BY_NAME = {
     "nakagami_m": 1e9,
     "failures_per_h": 1e9,
     "bytes_by_node": 1e9,
+    "bytes_by_image": 1e9,
     "first_bytes_by_node": 1e9,
     "request_bytes_by_node": 1e6,
     "payload_bytes": 1e6,

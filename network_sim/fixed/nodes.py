@@ -247,7 +247,7 @@ class Camera:
     """Takes images and keeps each until the sink has it or it is given up."""
 
     def __init__(self, shared: Shared, station: Station, phase_ns: int) -> None:
-        """Start the camera; it takes its first image at ``phase_ns``."""
+        """Start the camera; it takes its first image at ``phase_ns``, unless its images have times."""
         self.recovered = shared.env.event()
         """Event that triggers when the node recovers from a failure; then a new event replaces it."""
         self._shared = shared
@@ -353,30 +353,33 @@ class Camera:
 
     def _capture(self, phase_ns: int) -> Generator[simpy.Event, Any, None]:
         shared, config = self._shared, self._shared.config
-        taken = 0
-        yield shared.env.timeout(phase_ns)
+        taken, times_ns = 0, [to_ns(time_s) for time_s in config.image_times_s]
+        yield shared.env.timeout(times_ns[0] if times_ns else phase_ns)
         while config.images == 0 or taken < config.images:
             if shared.failed[self._station.index]:
                 yield self.recovered
                 continue
-            settled = self._take_image()
+            settled = self._take_image(taken)
             taken += 1
             if settled is None and config.images == 0 and config.interval_s == 0.0:
                 break  # there will never be a route: one expired image is enough
-            if config.interval_s:
+            if times_ns:
+                if taken < len(times_ns):
+                    yield shared.env.timeout(max(0, times_ns[taken] - int(shared.env.now)))
+            elif config.interval_s:
                 yield shared.env.timeout(to_ns(config.interval_s))
             elif settled is not None:
                 yield settled
         shared.book.cameras -= 1
         shared.book.end_if_nothing_left()
 
-    def _take_image(self) -> simpy.Event | None:
+    def _take_image(self, number: int) -> simpy.Event | None:
         """Take an image; returns its ``settled`` event, or None without a route to the sink."""
         shared, config = self._shared, self._shared.config
         node = self._station.index
         waits = bool(config.first_bytes_by_node)
         first_bytes = config.first_bytes_by_node[node] if waits else 0
-        image = shared.book.capture(node, config.size_bytes(node), first_bytes)
+        image = shared.book.capture(node, config.size_bytes(node, number), first_bytes)
         if node in shared.unreachable:
             shared.book.close(image, -1, Cause.NO_ROUTE)
             return None

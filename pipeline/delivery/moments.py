@@ -22,7 +22,7 @@ from pipeline.types import BoolArray, ByteArray, FloatArray, RgbdFrame, Rig, Sur
 
 @dataclass(frozen=True, slots=True)
 class NodeArrival:
-    """Shares of one node's images that the sink has received."""
+    """Shares of a node's image, or of one keyframe of a recording, that the sink has received."""
 
     name: str
     total_bytes: int
@@ -40,7 +40,7 @@ class Moment:
     """State of a delivery at one time."""
 
     t_s: float
-    """Time since the first image was taken."""
+    """Time since a rig's cameras began, or since the first frame of a recording."""
     sent_bytes: int
     """Bytes sent over the air, retransmissions included."""
     delivered_bytes: int
@@ -52,8 +52,9 @@ class Moment:
     energy_j: float
     """Energy of all nodes' radios, computers and cameras until then."""
     nodes: tuple[NodeArrival, ...]
+    """One for each image: of a rig's nodes, or the keyframes that the camera of a recording sends."""
     T_world_camera: dict[str, FloatArray]
-    """(4, 4) registered poses of the nodes that have been received and placed by then."""
+    """(4, 4) registered poses of the images that have been received and placed by then."""
     surface: SurfaceResult | None
     """Surface measured by the rays and the depth of all cameras, received or not; None if nothing can be
     reconstructed."""

@@ -18,6 +18,8 @@ _NO_SIZES: dict[str, Any] = {
     "bytes_by_node": (),
     "first_bytes_by_node": (),
     "request_bytes_by_node": (),
+    "image_times_s": (),
+    "bytes_by_image": (),
 }
 """Settings of one value for each node of another rig."""
 
@@ -71,6 +73,8 @@ def network_of(
         count=len(rig.frames),
         images=1,
         interval_s=0.0,
+        image_times_s=(),
+        bytes_by_image=(),
         bytes_by_node=tuple(sizes_bytes),
         first_bytes_by_node=tuple(first_bytes),
         request_bytes_by_node=tuple(request_bytes),
@@ -81,7 +85,10 @@ def network_of(
 
 def replaced_settings(network: NetworkConfig) -> dict[str, str]:
     """Return the reason for each setting of a network that ``network_of`` replaces."""
-    image = "in a delivery every node of the rig sends its own image, once"
+    image = (
+        "in a delivery every node of the rig sends its own image, once, and the camera of a recording its "
+        "keyframes, each at its own time"
+    )
     own = (
         "nodes.images",
         "nodes.interval_s",
@@ -90,11 +97,13 @@ def replaced_settings(network: NetworkConfig) -> dict[str, str]:
         "nodes.bytes_by_node",
         "nodes.first_bytes_by_node",
         "nodes.request_bytes_by_node",
+        "nodes.image_times_s",
+        "nodes.bytes_by_image",
     )
     reasons = dict.fromkeys(own, image)
     reasons |= dict.fromkeys(("run.keep", "run.warmup_s"), "a delivery needs every event from the start")
     if not network.nodes.places_m:
-        reasons["nodes.count"] = "the rig has the nodes"
+        reasons["nodes.count"] = "the rig has the nodes; the camera of a recording is one"
     return reasons
 
 

@@ -44,7 +44,7 @@ class RadioReach:
 
     preset: str
     seconds_to_90_s: float
-    """Until 90 % of the lossless quality, s since the images were taken."""
+    """Until 90 % of the lossless quality, s since the images were taken, or since a recording began."""
     seconds_to_99_s: float
     radio_j: float
     """Energy of all nodes' radios until 99 %, or until the last byte that arrived; the sink's is not in

@@ -1,4 +1,4 @@
-"""Transmission of a rig's images: the bytes of every node, and the times at which they reach the sink."""
+"""Transmission of a rig's images: the bytes of every image, and the times at which they reach the sink."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from pipeline.delivery.leaving_out import (
 from pipeline.delivery.plan import network_of, placed
 from pipeline.delivery.sink import frame_at_sink, images_of
 from pipeline.delivery.tiled import Tiled
+from pipeline.delivery.walked import CAMERA, check_sends_all, walk_network
 from pipeline.spec import Spec
 from pipeline.types import BoolArray, ByteArray, RgbdFrame, Rig
 
@@ -70,15 +71,19 @@ class DeliverySpec:
 
 @dataclass(frozen=True, slots=True)
 class Sending:
-    """The sent images: bytes of every node, and their times of arrival."""
+    """The sent images and their times of arrival.
+
+    Each camera of a rig sends one image. The camera of a recording sends all images, its keyframes, in order.
+    """
 
     spec: DeliverySpec
     rig: Rig
     coding: Coding
     streams: tuple[ByteArray, ...]
-    """(S,) bytes of each node."""
+    """(S,) bytes of each image."""
     trace: NetworkTrace
     arrivals: Arrivals
+    """Of all images; ``node`` is the image's index in the rig, also where one camera sends all."""
     times_ns: NDArray[np.int64]
     """(M,) times of the moments."""
     spent: Spent
@@ -93,8 +98,13 @@ class Sending:
         """Bytes of a stream per packet."""
         return packet_bytes_of(self.trace.config)
 
+    @property
+    def ready_s(self) -> tuple[float, ...]:
+        """Time at which each image of a recording was taken, from its first frame; empty for a rig."""
+        return self.trace.config.nodes.image_times_s
+
     def decoded(self, node: int, there: BoolArray) -> Received:
-        """Decode a node's images from the bytes of its stream that are ``there`` (S,)."""
+        """Decode an image from the bytes of its stream that are ``there`` (S,)."""
         data, shape = np.where(there, self.streams[node], 0), self.rig.frames[node].rgb.shape
         size = shape[0], shape[1]
         if not isinstance(self.coding, Tiled):
@@ -106,7 +116,7 @@ class Sending:
 
 
 def send(spec: DeliverySpec, rig: Rig) -> Sending:
-    """Encode every node's images and run the network that carries them.
+    """Encode all images and run the network that carries them.
 
     Args:
         spec: what is sent, and how.
@@ -118,30 +128,39 @@ def send(spec: DeliverySpec, rig: Rig) -> Sending:
     coding = coding_named(spec.coding)
     packet_bytes = packet_bytes_of(spec.network)
     senders, left_out, ordered = senders_of(rig, spec.down), None, None
-    network = placed(rig, spec.network, senders)
-    if spec.requests and isinstance(coding, Tiled):
-        config = spec.spec.config
+    if rig.walk is not None:
+        check_sends_all(rig, spec.leave_out_seen, spec.order)
+        encoded = tuple(coding.encode(images_of(frame), packet_bytes) for frame in rig.frames)
+        trace = simulate(walk_network(rig, [len(data) for data in encoded], spec.network))
+    elif spec.requests and isinstance(coding, Tiled):
+        config, network = spec.spec.config, placed(rig, spec.network, senders)
         sent = send_requested(rig, coding, senders, network, config, spec.leave_out_seen, spec.order)
         encoded, trace, left_out, ordered = sent.streams, sent.trace, sent.left_out, sent.ordered
     else:
+        network = placed(rig, spec.network, senders)
         encoded = tuple(coding.encode(images_of(frame), packet_bytes) for frame in rig.frames)
         part = Rig(rig.name, tuple(rig.frames[node] for node in senders))
         trace = simulate(network_of(part, [len(encoded[node]) for node in senders], network))
     streams = tuple(np.frombuffer(data, np.uint8) for data in encoded)
     came = arrivals(trace)
-    came = replace(came, node=np.array(senders)[came.node])
+    came = replace(came, node=came.image if rig.walk is not None else np.array(senders)[came.node])
     times_ns = moment_times_ns(came, trace, spec.moments)
     spent = until(trace, times_ns)
     return Sending(spec, rig, coding, streams, trace, came, times_ns, spent, left_out, ordered)
 
 
+def nodes_of(rig: Rig) -> tuple[str, ...]:
+    """Return the names of the rig's nodes in a network; the camera of a recording is one."""
+    return (CAMERA,) if rig.walk is not None else tuple(frame.name for frame in rig.frames)
+
+
 def senders_of(rig: Rig, down: Sequence[str]) -> list[int]:
-    """Return the indices of the rig's nodes that send, in their order in the network.
+    """Return the indices of the nodes that send (``nodes_of``), in their order in the network.
 
     Raises:
         InputError: a node that is down is not in the rig, or none is left.
     """
-    names = [frame.name for frame in rig.frames]
+    names = nodes_of(rig)
     for name in down:
         if name not in names:
             raise InputError(f"There is no node '{name}' that could be down; try one of {', '.join(names)}")
@@ -172,7 +191,7 @@ def moment_times_ns(came: Arrivals, trace: NetworkTrace, count: int) -> NDArray[
 
 
 def arrived_bytes(sending: Sending, t_ns: int) -> list[BoolArray]:
-    """Return each node's (S,) mask of the bytes of its stream that have reached the sink by ``t_ns``."""
+    """Return each image's (S,) mask of the bytes of its stream that have reached the sink by ``t_ns``."""
     came, marks = sending.arrivals, []
     there = came.t_ns <= t_ns
     for node, stream in enumerate(sending.streams):

@@ -14,6 +14,7 @@ from pipeline.deliver import Delivery
 from pipeline.delivery.leaving_out import LeftOut, Ordered
 from pipeline.delivery.moments import Moment, NodeArrival
 from pipeline.delivery.sending import Sending
+from pipeline.delivery.walked import CAMERA
 from pipeline.delivery.worth import Worth
 from pipeline.folders.run import (
     METRICS,
@@ -27,14 +28,14 @@ from pipeline.folders.run import (
 
 def delivery_metrics(delivery: Delivery) -> dict[str, Any]:
     """Return the metrics of a delivery: lengths in metres, shares from 0 to 1."""
-    lossless = delivery.lossless
+    lossless, sending = delivery.lossless, delivery.sending
     return {
-        "moments": [_moment(moment) for moment in delivery.moments],
+        "moments": [_moment(moment, sending.ready_s) for moment in delivery.moments],
         "lossless": surface_metrics(lossless.after)
         | {"f_score_5cm": _f_score(lossless.truth_after), "bytes": raw_bytes(delivery)},
         "bytes": sum(len(stream) for stream in delivery.sending.streams),
         "packet_bytes": delivery.sending.packet_bytes,
-    } | (_left_out(delivery.sending) | _ordered(delivery.sending))
+    } | (_walk(sending) | _left_out(sending) | _ordered(sending))
 
 
 def raw_bytes(delivery: Delivery) -> int:
@@ -80,6 +81,27 @@ def summary(delivery: Delivery) -> str:
     holes = f"{last.surface.quality.no_hit_ray_share:.1%} of the rays are without a surface"
     whole = "without losses" if delivery.sending.left_out is None else "with all tiles and without losses"
     return f"{share}: {holes}, {delivery.lossless.after.quality.no_hit_ray_share:.1%} {whole}"
+
+
+def walk_sentences(sending: Sending) -> list[str]:
+    """Describe how the camera of a recording sends its keyframes; no sentence for a rig."""
+    walk, times_s = sending.rig.walk, sending.ready_s
+    if walk is None:
+        return []
+    keyframes = len(walk.keyframes)
+    return [
+        f"one walking camera with one radio sends {len(times_s)} of its {keyframes} "
+        f"keyframe{'s' * (keyframes != 1)} in order, each from the time at which it was taken, "
+        f"{times_s[0]:.3g} to {times_s[-1]:.3g} s after the recording began; in the radio model it stands in "
+        f"the middle of their places, {_sink_distance_m(sending):.3g} m from the sink"
+    ]
+
+
+def _sink_distance_m(sending: Sending) -> float:
+    """Return the distance of the first node from the sink."""
+    trace = sending.trace
+    places_m = np.asarray(trace.positions_m)
+    return float(np.linalg.norm(places_m[0] - places_m[trace.names.index("sink")]))
 
 
 def left_out_sentences(sending: Sending) -> list[str]:
@@ -198,7 +220,18 @@ def _ordered(sending: Sending) -> dict[str, Any]:
     return {"ordered": {"by": "sink", "requested_s": ordered.requested_s, "nodes": nodes}}
 
 
-def _moment(moment: Moment) -> dict[str, Any]:
+def _walk(sending: Sending) -> dict[str, Any]:
+    """Return the node and the images of a recording; nothing for a rig."""
+    if sending.rig.walk is None:
+        return {}
+    images = [
+        {"name": frame.name, "ready_s": ready_s, "bytes": len(stream)}
+        for frame, ready_s, stream in zip(sending.rig.frames, sending.ready_s, sending.streams, strict=True)
+    ]
+    return {"walk": {"node": CAMERA, "keyframes": len(sending.rig.walk.keyframes), "images": images}}
+
+
+def _moment(moment: Moment, ready_s: tuple[float, ...]) -> dict[str, Any]:
     return {
         "t_s": moment.t_s,
         "sent_bytes": moment.sent_bytes,
@@ -206,9 +239,25 @@ def _moment(moment: Moment) -> dict[str, Any]:
         "packets_lost": moment.packets_lost,
         "radio_j": moment.radio_j,
         "energy_j": moment.energy_j,
-        "nodes": [_node(node, node.name in moment.T_world_camera) for node in moment.nodes],
+        "nodes": [_walking_node(moment, ready_s)] if ready_s else _images(moment),
         "surface": None if moment.surface is None else surface_metrics(moment.surface),
         "f_score_5cm": _f_score(moment.truth),
+    }
+
+
+def _images(moment: Moment) -> list[dict[str, Any]]:
+    return [_node(node, node.name in moment.T_world_camera) for node in moment.nodes]
+
+
+def _walking_node(moment: Moment, ready_s: tuple[float, ...]) -> dict[str, Any]:
+    """Return the node of a recording with its images, each with the time at which it was taken."""
+    return {
+        "name": CAMERA,
+        "total_bytes": sum(node.total_bytes for node in moment.nodes),
+        "delivered_bytes": moment.delivered_bytes,
+        "images": [
+            {"ready_s": time_s} | image for time_s, image in zip(ready_s, _images(moment), strict=True)
+        ],
     }
 
 

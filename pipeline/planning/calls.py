@@ -77,4 +77,5 @@ def registered(done: Reconstruction) -> Rig:
     """Return the registered cameras of a reconstruction, at the poses that registration found."""
     placement = done.placement
     frames = zip(placement.placed(done.rig.frames), placement.placed(placement.T_world_camera), strict=True)
-    return Rig(done.rig.name, tuple(replace(frame, T_world_camera=pose) for frame, pose in frames))
+    posed = tuple(replace(frame, T_world_camera=pose) for frame, pose in frames)
+    return Rig(done.rig.name, posed, walk=done.rig.walk)

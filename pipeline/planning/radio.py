@@ -106,8 +106,9 @@ class _Sending:
 def deliver_plan(rig: Rig, seen: SeenPlace, plan: Plan, radio: PlanRadio) -> PlanDelivery:
     """Send one image of every present and every new camera through the network model.
 
-    The room's walls damp the links. A new camera's image has as many bytes as the present ones have on
-    average; its content, and so its surface, is not known yet.
+    The camera of a recording is no longer there: the new ones send alone. The room's walls damp the links. A
+    new camera's image has as many bytes as the present ones have on average; its content, and so its surface,
+    is not known yet.
 
     Args:
         rig: the registered cameras, at the poses that registration found (``registered``).
@@ -128,22 +129,26 @@ def _sending(rig: Rig, seen: SeenPlace, radio: PlanRadio) -> _Sending:
 
 
 def _delivered(sending: _Sending, plan: Plan, radio: PlanRadio) -> PlanDelivery:
-    rig, walls_m, present = sending.rig, sending.walls_m, len(sending.rig.frames)
+    rig, walls_m = sending.rig, sending.walls_m
+    present = len(rig.frames) if rig.walk is None else 0
     image_bytes = round(float(np.mean(sending.present_bytes)))
     damped = replace(
         radio.network.radio, walls_m=tuple(walls_m.ravel().tolist()), wall_db=DAMPING_DB[radio.walls]
     )
-    network = network_of(rig, sending.present_bytes, replace(radio.network, radio=damped))
-    old_m = np.reshape(network.nodes.places_m or places_of(rig, network.nodes.spacing_m), (-1, 2))
+    given, own_places_m = replace(radio.network, radio=damped), radio.network.nodes.places_m
+    if rig.walk is not None:
+        given = replace(given, nodes=replace(given.nodes, count=1, places_m=()))
+    network = network_of(rig, sending.present_bytes, given)
+    old_m = np.reshape(own_places_m or places_of(rig, network.nodes.spacing_m), (-1, 2))
     new_m = [camera.T_world_camera[:2, 3] for camera in plan.cameras]
-    cameras_m = np.vstack([old_m[:-1], *new_m])
+    cameras_m = np.vstack([old_m[:present], *new_m])
     sink_m = _sink_m(sending.seen, cameras_m, old_m[-1], replace(radio, network=network))
     places_m = np.vstack([cameras_m, sink_m])
     nodes = replace(
         network.nodes,
         count=present + len(new_m),
         places_m=tuple(places_m.ravel().tolist()),
-        bytes_by_node=(*sending.present_bytes, *len(new_m) * [image_bytes]),
+        bytes_by_node=(*sending.present_bytes[:present], *len(new_m) * [image_bytes]),
     )
     trace = simulate(replace(network, nodes=nodes))
     came = arrivals(trace)

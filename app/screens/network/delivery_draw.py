@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from app.drawing.clouds import clear, shorten
-from app.drawing.colors import BACKGROUND, BRAND, DELIVERED, LOSS, NEUTRAL, SOURCE
+from app.drawing.colors import BACKGROUND, DELIVERED, NEUTRAL
 from app.drawing.packing import rounded
 from app.drawing.poses import place
 from app.drawing.timeline import Color
@@ -14,7 +14,9 @@ from app.screens.network.delivery_view import DeliveryView, MomentView, PacketVi
 from app.screens.network.draw import MOST_PACKETS, ON_THE_WAY, Flights
 from app.screens.network.labels import CAUSES
 from app.screens.network.name_lifts import LINE_PX, lifts
+from app.screens.network.state_colors import BUSY, EMPTY, FULL, between, state_color
 from app.screens.network.view import What
+from app.screens.network.walk_draw import keyframe_label, places_at, routes_m
 from network_sim.types import Cause
 from pipeline.types import FloatArray
 
@@ -34,8 +36,6 @@ NARROW_PX = 600.0
 LONGEST = 8
 """Number of letters reserved for the energy, which is written after a node's name and share."""
 LIT = (255, 230, 0)
-BUSY, DOWN = BRAND, LOSS
-FULL, EMPTY = DELIVERED, SOURCE
 
 
 class DeliveryDrawing:
@@ -130,14 +130,16 @@ class DeliveryDrawing:
         run = self._view.run
         if name == "sink":
             return self._places_m[run.roles.index(name)]
-        node = next(one for one in self._view.nodes if one.name == name)
+        node = next((one for one in self._view.nodes if one.name == name), self._view.nodes[0])
         return self._places_m[node.row] if node.row >= 0 else node.T_world_camera[:3, 3]
 
     # The state at the clock's time.
 
     def show(self, now_ns: int, shown_ns: int) -> None:
         """Show the frames at ``now_ns``; flights last at least ``shown_ns``, and losses stay that long."""
-        at = self._places_m
+        at = places_at(self._view, self._places_m, now_ns)
+        if self._view.walk:
+            self._batteries[0].position = at[0]
         points, colors = self._flights.packets(now_ns, shown_ns, at)
         lost_m, red = self._flights.losses(now_ns, shown_ns, at)
         batch = np.tile(np.array((0.0, 0.0, -1000.0), np.float32), (len(self._packets.points), 1))
@@ -172,7 +174,7 @@ class DeliveryDrawing:
             share = 0.0 if now is None else now.delivered_bytes / max(node.total_bytes, 1)
             self._move_camera(row, self._pose(row, moment))
             self._show_picture(row)
-            self._frusta[row].color = _state_color(node.row < 0, share)
+            self._frusta[row].color = state_color(node.row < 0, share)
             self._show_cloud(row, None if now is None or not len(now.points_m) else now)
         self._show_mesh(b"" if moment is None else moment.glb)
 
@@ -191,6 +193,8 @@ class DeliveryDrawing:
         if self._narrow or shown is None:
             return node.name
         now = shown.nodes[row]
+        if self._view.walk:
+            return keyframe_label(node, now)
         percent = 100.0 * now.delivered_bytes / max(node.total_bytes, 1)
         return f"{node.name} · {percent:.0f} % · {now.energy_j:.3g} J"
 
@@ -203,7 +207,7 @@ class DeliveryDrawing:
     def _show_batteries(self, moment: MomentView | None, most_j: float) -> None:
         for row, battery in enumerate(self._batteries):
             used_j = 0.0 if moment is None else moment.nodes[row].energy_j
-            color = _between(FULL, EMPTY, min(used_j / most_j, 1.0) if most_j > 0.0 else 0.0)
+            color = between(FULL, EMPTY, min(used_j / most_j, 1.0) if most_j > 0.0 else 0.0)
             if battery.color != color:
                 battery.color = color
 
@@ -311,8 +315,9 @@ class DeliveryDrawing:
             )
             place(frustum, node.T_world_camera)
             self._frusta.append(frustum)
-            battery = f"battery-{node.name}"
-            self._batteries.append(self._mark(battery, self.place_m(node.name), FULL, 0.5))
+            if not self._view.walk or not self._batteries:
+                battery = f"battery-{node.name}"
+                self._batteries.append(self._mark(battery, self.place_m(node.name), FULL, 0.5))
             camera_m = node.T_world_camera[:3, 3]
             self._names.append(self._label(f"name-{node.name}", node.name, camera_m, 0.9))
             self._names[-1].anchor = "top-center"
@@ -321,7 +326,7 @@ class DeliveryDrawing:
         """Draw a line from each camera to its radio if the radio is elsewhere."""
         for node, camera_m in zip(self._view.nodes, cameras_m, strict=True):
             radio_m = self.place_m(node.name)
-            if np.linalg.norm(radio_m - camera_m) > 1e-3:
+            if not self._view.walk and np.linalg.norm(radio_m - camera_m) > 1e-3:
                 self._lines(f"moved-{node.name}", np.array([[camera_m, radio_m]]))
 
     def _add_marks(self) -> None:
@@ -355,7 +360,7 @@ class DeliveryDrawing:
         frames = frames.where(frames.what == What.AIR)
         pairs = np.unique(np.column_stack([frames.node, frames.peer]), axis=0)
         if len(pairs):
-            self._lines("routes", self._places_m[pairs])
+            self._lines("routes", routes_m(self._view, self._places_m, pairs))
 
     def _mark(self, name: str, place_m: FloatArray, color: Color, size: float = 1.0) -> viser.IcosphereHandle:
         radius_m = 0.028 * size * self._size_m
@@ -380,16 +385,3 @@ class DeliveryDrawing:
 
 def _dark(aspect: float) -> np.ndarray:
     return np.full((12, max(1, round(12 * aspect)), 3), 48, np.uint8)
-
-
-def _state_color(down: bool, share: float) -> Color:
-    if down:
-        return DOWN
-    return _between(BUSY, DELIVERED, share)
-
-
-def _between(first: Color, second: Color, share: float) -> Color:
-    """Return a colour between two others."""
-    start, end = np.array(first, float), np.array(second, float)
-    red, green, blue = np.rint(start + share * (end - start)).astype(int).tolist()
-    return red, green, blue

@@ -28,6 +28,7 @@ from app.screens.network.delivery_view import (
 )
 from app.screens.network.run_view import run_view
 from network_sim.metrics.arrivals import energy_by_node_j
+from network_sim.types import to_ns
 from packetmesh.errors import ReconstructionError
 from packetmesh.progress import Progress, part
 from pipeline.acquisition import back_project
@@ -37,11 +38,12 @@ from pipeline.delivery.sending import (
     DeliverySpec,
     Sending,
     frames_at_sink,
+    nodes_of,
     received_at,
     send,
     senders_of,
 )
-from pipeline.folders.delivery import left_out_sentences, ordered_sentences
+from pipeline.folders.delivery import left_out_sentences, ordered_sentences, walk_sentences
 from pipeline.reconstruct import Reconstruction, iterate_reconstruction
 from pipeline.spec import key as spec_key
 from pipeline.types import (
@@ -74,12 +76,12 @@ def delivery_job(store: Store, spec: Spec) -> Steps:
 def packet_job(
     store: Store, spec: Spec, row: int, first_byte: int, byte_count: int
 ) -> Generator[Progress, None, PacketView]:
-    """Return the pixels and points of a node's images that need one packet, when all others have arrived.
+    """Return the pixels and points of an image that need one packet, when all others have arrived.
 
     Args:
         store: store of the results.
         spec: spec of the delivery.
-        row: index of the node in the rig.
+        row: index of the image in the rig.
         first_byte: first byte of the packet.
         byte_count: number of bytes of the packet.
     """
@@ -165,7 +167,8 @@ def _measured(store: Store, sending: Sending) -> Generator[Progress, None, Lossl
 def _first_view(sending: Sending, sent: Sent, elapsed_s: float) -> DeliveryView:
     rig, down, left_out = sending.rig, sending.spec.down, sending.left_out
     senders = senders_of(rig, down)
-    names = tuple(rig.frames[node].name for node in senders) + sending.trace.names[len(senders) :]
+    names = tuple(nodes_of(rig)[node] for node in senders) + sending.trace.names[len(senders) :]
+    ready_s = sending.ready_s or [0.0] * len(rig.frames)
     run = replace(run_view(sending.trace, elapsed_s), names=names)
     nodes = tuple(
         CameraNode(
@@ -174,7 +177,8 @@ def _first_view(sending: Sending, sent: Sent, elapsed_s: float) -> DeliveryView:
             fov_rad=2.0 * float(np.arctan2(frame.intrinsics.height_px / 2, frame.intrinsics.fy_px)),
             aspect=frame.intrinsics.width_px / frame.intrinsics.height_px,
             total_bytes=len(stream),
-            row=senders.index(row) if row in senders else -1,
+            row=0 if sending.ready_s else senders.index(row) if row in senders else -1,
+            ready_ns=to_ns(ready_s[row]),
             left_out_tiles=0 if left_out is None else left_out.counts[row],
             left_out_bytes=0 if left_out is None else left_out.left_out_bytes[row],
         )
@@ -193,6 +197,7 @@ def _first_view(sending: Sending, sent: Sent, elapsed_s: float) -> DeliveryView:
         total[some],
         left_out=tuple(left_out_sentences(sending)),
         ordered=tuple(ordered_sentences(sending)),
+        walk="".join(walk_sentences(sending)),
     )
 
 
@@ -208,6 +213,8 @@ def _moment_view(sending: Sending, moment: Moment, t_ns: int) -> MomentView:
     used_j = energy_by_node_j(sending.trace, [t_ns])[0]
     senders = senders_of(sending.rig, sending.spec.down)
     energy_j = [used_j[senders.index(row)] if row in senders else 0.0 for row in range(len(frames))]
+    if sending.ready_s:  # one node took all images
+        energy_j = [used_j[0]] * len(frames)
     return MomentView(
         t_ns=t_ns,
         sent_bytes=moment.sent_bytes,

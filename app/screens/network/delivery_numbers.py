@@ -9,9 +9,9 @@ import numpy as np
 from app.dock.dock import time_text
 from app.drawing.colors import LOSS
 from app.drawing.timeline import Color
-from app.screens.network.delivery_draw import BUSY, DOWN, EMPTY, FULL
 from app.screens.network.delivery_view import DeliveryView, MomentView
 from app.screens.network.labels import ANSWER, CAUSES, PACKET_COLORS, PACKET_NAMES
+from app.screens.network.state_colors import BUSY, DOWN, EMPTY, FULL
 from app.screens.network.view import What
 from app.web.markup import Markdown, Markup
 from app.window.tables import Head, Row, number, table
@@ -134,7 +134,7 @@ def more_rows(view: DeliveryView, now: MomentView | None) -> Markup:
         return Markup("")
     rows = [
         (
-            node.name,
+            f"{node.name}, taken at {time_text(node.ready_ns)}" if view.walk else node.name,
             "Depth: share of the measured pixels; colour and coarse depth: share of all pixels.",
             _percent(one.depth_share),
             _percent(one.color_share),
@@ -166,13 +166,14 @@ def more_rows(view: DeliveryView, now: MomentView | None) -> Markup:
 def summary(view: DeliveryView) -> Markdown:
     """Return a sentence on the computed part of the delivery."""
     computed, planned = len(view.moments), len(view.times_ns)
-    sentence = Markdown("{} nodes sent {:.2f} MB in {:,} packets; simulated in {:.1f} s.").format(
-        len(view.senders),
+    who = "One node" if view.walk else f"{len(view.senders)} nodes"
+    sentence = Markdown("{} sent {:.2f} MB in {:,} packets; simulated in {:.1f} s.").format(
+        who,
         sum(node.total_bytes for node in view.senders) * BYTES_MB,
         view.run.packets,
         view.run.elapsed_s,
     )
-    for first in (*view.left_out[:1], *view.ordered[:1]):
+    for first in (*([view.walk] if view.walk else ()), *view.left_out[:1], *view.ordered[:1]):
         sentence += Markdown(" {}.").format(first[0].upper() + first[1:])
     if not view.run.series or not len(view.run.pieces):
         sentence += " No frame was sent in that time."

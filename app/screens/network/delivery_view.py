@@ -18,7 +18,7 @@ PICTURE_PX = 160
 
 @dataclass(frozen=True, slots=True)
 class CameraNode:
-    """One camera of the rig."""
+    """One camera of the rig, or one keyframe of the walking camera of a recording."""
 
     name: str
     T_world_camera: FloatArray
@@ -30,7 +30,9 @@ class CameraNode:
     total_bytes: int
     """Size of its encoded images."""
     row: int
-    """Its index in the network; -1 if it is down."""
+    """Index of its node in the network; -1 if it is down. All keyframes of a recording have node 0."""
+    ready_ns: int = 0
+    """When a keyframe was taken, since the recording's first frame."""
     left_out_tiles: int = 0
     left_out_bytes: int = 0
     """Tiles that it did not send because another camera shows them, and their bytes."""
@@ -56,7 +58,7 @@ class NodeMoment:
     T_world_camera: FloatArray
     """(4, 4) registered pose, or the believed one."""
     energy_j: float
-    """Energy that its radio, computer and camera have used; 0 if it is down."""
+    """Energy that its node's radio, computer and camera have used; 0 if it is down."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,10 +116,23 @@ class DeliveryView:
     """A sentence on the tiles that were left out, and one on each sender's; empty if every node sends all."""
     ordered: tuple[str, ...] = ()
     """The same on the order in which the sink requested the tiles; empty in the coding's own order."""
+    walk: str = ""
+    """How the camera of a recording sends its keyframes, in a sentence; empty for a rig."""
+
+    @property
+    def node_names(self) -> tuple[str, ...]:
+        """Names of the nodes, those that are down included; the camera of a recording is one."""
+        return self.run.names[:1] if self.walk else tuple(node.name for node in self.nodes)
+
+    def image_row(self, node: int, image: int) -> int | None:
+        """Return the row in ``nodes`` of an image that a node of the network took; None if it is unknown."""
+        if self.walk:
+            return image if 0 <= image < len(self.nodes) else None
+        return next((row for row, one in enumerate(self.nodes) if one.row == node), None)
 
     @property
     def senders(self) -> tuple[CameraNode, ...]:
-        """The nodes that are not down."""
+        """The nodes that are not down, or the keyframes of a recording."""
         return tuple(node for node in self.nodes if node.row >= 0)
 
     @property

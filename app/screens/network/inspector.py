@@ -60,9 +60,7 @@ class Inspector:
         self._text.content = story
         if view is None or not frames.carries_image(item):
             return
-        source = next(
-            (row for row, node in enumerate(view.nodes) if node.row == frames.camera_of(item)), None
-        )
+        source = view.image_row(frames.camera_of(item), int(frames.pieces.image[item]))
         if source is not None:
             first, count = frames.bytes_of(item)
 

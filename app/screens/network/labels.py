@@ -232,8 +232,8 @@ TEXT = Markdown(
 **Play** below, and watch the mesh grow from what has arrived."""
 )
 WALK_TEXT = Markdown(
-    """One camera walked through the room. Each **node** is a keyframe of its recording and sends from where
-the camera was, by radio, packet by packet; some are lost. **Play** below, and watch the mesh grow."""
+    """One camera walks through the room. It is **one node** with one radio: it sends its keyframes in order,
+each from the time at which it was taken. **Play** below, and watch the mesh grow from what has arrived."""
 )
 STREET_TEXT = Markdown(
     """Vehicles with cameras drive on a grid of streets and offer images to access points (green). **Play**

@@ -193,7 +193,7 @@ def numbers(scene: str, view: DeliveryView, frames: Frames) -> Numbers:
     return {
         **values,
         SCENE: scene,
-        "cameras": str(len(view.nodes)),
+        "cameras": str(len(view.node_names)),
         "megabytes": number(view.total_bytes, 2, "MB", 1e-6),
         "lost": f"{end.packets_lost:,}",
         "last": time_text(end.t_ns),

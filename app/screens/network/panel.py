@@ -244,8 +244,7 @@ class NetworkPanel(Panel):
             ended = self._delivery.moments[-1].t_ns == self._delivery.times_ns[-1]
             self._before = self._delivery if ended and not self._other_room else None
         self._delivery, self._runs, self._other_room = view, (), False
-        walks = getattr(self.session.results.view("scene"), "has_walk", False)
-        self._text.content = WALK_TEXT if walks else TEXT
+        self._text.content = WALK_TEXT if view.walk else TEXT
         self._frames = [Frames(view.run)]
         drawing = self._drawing = DeliveryDrawing(self.scene, self._next_name(), view)
         self._setup.what_if.load(view, drawing.place_m)

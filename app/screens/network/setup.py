@@ -67,8 +67,8 @@ class NetworkSetup:
             "Most surface first",
             False,
             hint="Every camera first sends a coarse image. By these the sink asks each for the tiles that "
-            "add most to the surface first. Needs the coding with AVIF colour, and a radio by which the sink "
-            "reaches the cameras.",
+            "add most to the surface first. Needs the coding with AVIF colour, a radio by which the sink "
+            "reaches the cameras, and cameras that stand: a walking one sends its images as it takes them.",
         )
         self._share = gui.add_slider(
             "Lose packets (%)",
@@ -295,7 +295,7 @@ class NetworkSetup:
         known before the cameras have sent."""
         what_if = self.what_if
         alone = what_if.in_room and what_if.count - len(what_if.off) < 2
-        can = coding == REQUESTABLE and network.mac.reaches_nodes
+        can = coding == REQUESTABLE and network.mac.reaches_nodes and not what_if.walks
         return can, can and not alone
 
     def runs(self) -> dict[str, NetworkConfig]:

@@ -85,7 +85,9 @@ class WhatIf:
             "radios have one rate each, set by Medium access.",
         )
         self._mover = gui.add_dropdown(
-            "Move radio of", [NO_NODE], hint="Node whose radio the arrows move; its camera stays in place."
+            "Move radio of",
+            [NO_NODE],
+            hint="Node whose radio the arrows move; its camera stays in place. Not for a walking camera.",
         )
         self._text = gui.add_markdown(Markdown(""))
         self._visible = True
@@ -94,6 +96,8 @@ class WhatIf:
             ui.when_changed(handle, on_change)
         ui.when_changed(self._mover, self._put_back_or_show)
         self._at_m: Callable[[str], FloatArray] | None = None
+        self.walks = False
+        """Whether the node is the walking camera of a recording."""
 
     @property
     def off(self) -> tuple[str, ...]:
@@ -154,7 +158,7 @@ class WhatIf:
         """Forget the nodes of the room, as the next room has others. Returns whether there were faults."""
         happened = bool(self.off or self.settings())
         self.forget()
-        self._places_m, self._at_m = {}, None
+        self._places_m, self._at_m, self.walks = {}, None, False
         self.offer([])
         return happened
 
@@ -175,7 +179,8 @@ class WhatIf:
         """
         if not view.sent.network.nodes.places_m:
             self._places_m = places_of(view)
-        self.offer([node.name for node in view.nodes], apart=_apart(view))
+        self.offer(view.node_names, apart=_apart(view))
+        self.walks = bool(view.walk)
         self._at_m = at_m
         self._draw()
 
@@ -184,7 +189,7 @@ class WhatIf:
 
         Args:
             names: names of the nodes.
-            apart: whether the cameras have different places; otherwise no radio can be moved.
+            apart: whether each camera has a place of its own; otherwise no radio can be moved.
         """
         for handle in (self._off, self._walled, self._mover):
             able = apart if handle is self._mover else handle is self._walled or len(names) > 1
@@ -263,6 +268,8 @@ class WhatIf:
 def places_of(view: DeliveryView) -> dict[str, FloatArray]:
     """Return (2,) places of a delivery's nodes and, last, its sink, m; of a failed node, its camera's."""
     positions_m = view.run.positions_m(view.run.start_ns)
+    if view.walk:
+        return {view.node_names[0]: positions_m[0], SINK: positions_m[view.run.roles.index(SINK)]}
     places_m = {
         node.name: positions_m[node.row] if node.row >= 0 else node.T_world_camera[:2, 3]
         for node in view.nodes
@@ -271,7 +278,9 @@ def places_of(view: DeliveryView) -> dict[str, FloatArray]:
 
 
 def _apart(view: DeliveryView) -> bool:
-    """Whether the cameras have different places; in a rig without poses all have the same."""
+    """Whether each camera has a place of its own: not in a rig without poses, nor if one camera walks."""
+    if view.walk:
+        return False
     cameras_m = np.array([node.T_world_camera[:3, 3] for node in view.nodes])
     return len(cameras_m) == 1 or bool(np.ptp(cameras_m, axis=0).max() > 1e-6)
 

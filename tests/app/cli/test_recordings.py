@@ -125,5 +125,11 @@ def test_a_network_carries_the_keyframes_of_a_recording(capsys, walk, tmp_path):
     assert code == 0, said
     last = json.loads(printed)["moments"][-1]
     assert last["delivered_bytes"] > 0
-    assert all(node["name"].startswith("frame_") for node in last["nodes"])
+    (node,) = last["nodes"]
+    assert node["name"] == "camera"
+    ready_s = [image["ready_s"] for image in node["images"]]
+    assert ready_s == sorted(ready_s)
+    assert last["t_s"] > ready_s[-1] >= 0.0
+    assert all(image["name"].startswith("frame_") for image in node["images"])
+    assert "one walking camera with one radio sends" in said
     assert last["surface"]["triangles"] > 1000

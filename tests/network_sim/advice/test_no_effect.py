@@ -116,9 +116,14 @@ VALUES = {
     "nodes.payload_bytes": ["100"],
     "nodes.failures_per_h": ["900"],
     "nodes.buffer_packets": ["3"],
+    "nodes.image_times_s": ["0.5"],
+    "nodes.bytes_by_image": ["900"],
 }
 """Other values of settings whose type does not suggest them."""
-REFUSED = ("scenario", "mac.kind", "nodes.first_bytes_by_node", "nodes.request_bytes_by_node")
+REFUSED = (
+    *("scenario", "mac.kind", "nodes.first_bytes_by_node", "nodes.request_bytes_by_node"),
+    *("nodes.image_times_s", "nodes.bytes_by_image"),
+)
 """Settings whose other values need further settings, which the refusal names."""
 ROWS = [(0.1 * row, 0.05 + 0.01 * (row % 7), 20 + row % 5, 0.02 * (row % 3)) for row in range(40)]
 

@@ -11,11 +11,16 @@ from pipeline.delivery.sending import DeliverySpec
 from pipeline.io.demos import load_demo
 from pipeline.sources import LoadedRig
 from pipeline.spec import Spec
-from pipeline.types import CameraIntrinsics, DepthMap, Rig
+from pipeline.types import CameraIntrinsics, DepthMap, PointCloud, Rig, Walk
 
 EVERY = 4
 """Of the pixels in each direction."""
 CONFIG = with_settings(PRESETS["packetmesh"], ["surface.max_points=2500"])
+
+TIMES_S = 1_000.0 + np.array([0.0, 0.25, 0.5, 2.0, 4.0])
+"""Clock of a recording at its frames."""
+KEYFRAMES, READY_S = (1, 2, 4), (0.25, 0.5, 4.0)
+"""Its keyframes, and their times since its first frame."""
 
 
 def small_rig(nodes=2, scene="office"):
@@ -28,6 +33,14 @@ def small_rig(nodes=2, scene="office"):
         intrinsics=tuple(frame.intrinsics for frame in frames),
     )
     return Rig(rig.name, frames, truth)
+
+
+def walked(rig):
+    """Three images as the keyframes of one camera that walks; it stood still before, and was lost once."""
+    first, second, third = (frame.T_world_camera for frame in rig.frames)
+    poses, nothing = (first, first, second, None, third), PointCloud(np.zeros((0, 3)))
+    walk = Walk(TIMES_S, poses, KEYFRAMES, (), nothing, 0.01, np.zeros(0, int), poses)
+    return replace(rig, truth=None, walk=walk)
 
 
 def small_frame(frame):

@@ -1,6 +1,7 @@
 """Images of planned cameras on the network model: walls, distance, budget and deadline."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -41,6 +42,15 @@ def test_more_cameras_at_once_wait_for_each_other(office):
     )
     last_s = max(one.seconds_to_99_s for one in shared.cameras)
     assert last_s > alone.cameras[0].seconds_to_99_s
+
+
+def test_the_camera_of_a_recording_has_left_and_the_new_ones_send_alone(office):
+    chosen, walked = plan(office, 1), replace(office.rig, walk=SimpleNamespace())
+    beside, alone = (deliver_plan(rig, office.seen, chosen, PlanRadio()) for rig in (office.rig, walked))
+    assert (alone.image_bytes, alone.sink_m) == (beside.image_bytes, beside.sink_m)
+    assert alone.cameras[0].seconds_to_99_s < beside.cameras[0].seconds_to_99_s
+    given = with_settings(PRESETS["office"], ["nodes.count=1", "nodes.places_m=0,0,3,4"])
+    assert deliver_plan(walked, office.seen, chosen, PlanRadio(network=given)).sink_m == (3.0, 4.0)
 
 
 def test_days_on_a_battery_are_those_of_an_image_and_sleep_in_each_period(office):

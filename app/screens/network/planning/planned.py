@@ -103,13 +103,13 @@ def sending_of(place: Place, request: PlanRequest) -> tuple[Rig, PlanRadio]:
             "No present camera is registered and switched on, so nothing can be planned; switch one on"
         )
     network = sent.network
-    if network.nodes.places_m:
+    if network.nodes.places_m and whole.walk is None:
         names = [frame.name for frame in whole.frames]
         network = placed(whole, network, [names.index(frame.name) for frame in frames])
     radio = PlanRadio(
         network, sent.coding, request.walls, budget_j=request.budget_j, deadline_s=request.deadline_s
     )
-    return Rig(found.name, frames), radio
+    return Rig(found.name, frames, walk=found.walk), radio
 
 
 def moved(place: Place, plan: Plan, poses: Poses) -> tuple[Plan, list[Judged]]:

@@ -18,7 +18,6 @@ from app.drawing.colors import COVERAGE_STOPS, linear
 from app.lesson.reading import read_lesson
 from app.looking.look import Look, text_of
 from app.screens.network import setup
-from app.screens.network.delivery_draw import EMPTY, FULL
 from app.screens.network.delivery_numbers import legend, moment_table
 from app.screens.network.delivery_view import DeliveryView, PacketView
 from app.screens.network.draw import STREET, ground_of
@@ -29,6 +28,7 @@ from app.screens.network.lesson import CROSSING, KIND, LOST_PACKET, PLACING, Net
 from app.screens.network.packets import Frames
 from app.screens.network.panel import NetworkPanel
 from app.screens.network.setup import NetworkSetup
+from app.screens.network.state_colors import EMPTY, FULL
 from app.screens.network.view import What
 from app.screens.network.what_if import WhatIf
 from network_sim.presets import PRESETS
@@ -125,14 +125,11 @@ def test_the_first_visit_sends_the_room(screen):
     assert "Rays without a surface" in screen.gui.text()
 
 
-def test_of_a_recording_it_is_said_that_the_nodes_are_keyframes(screen):
-    view = Results.view
-    recording = SimpleNamespace(title="walk", has_walk=True)
+def test_of_a_recording_it_is_said_that_its_camera_is_one_node(screen):
     assert "The cameras of the room send" in screen.gui.text()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Results, "view", lambda self, step: recording if step == "scene" else view(self, step))
-        screen.panel._take_delivery(screen.view)
-        assert "**node** is a keyframe of its recording" in screen.gui.text()
+    screen.panel._take_delivery(replace(screen.view, walk="one walking camera sends its keyframes"))
+    assert "It is **one node** with one radio" in screen.gui.text()
+    assert "One node sent" in screen.gui.text()
     screen.panel._take_delivery(screen.view)
     assert "The cameras of the room send" in screen.gui.text()
 
