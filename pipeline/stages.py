@@ -60,7 +60,7 @@ from pipeline.types import DepthMap, PointCloud, Rig, Surface, SurfaceResult
 Result = TypeVar("Result")
 _NODES_AT_A_TIME = 3
 """Nodes computed in parallel: with two, the last node of three would run alone; more need more memory."""
-TRACKED = (0.0, 0.05, 0.9, 1.0), (0.0, 0.45, 0.9, 1.0)
+TRACKED = (0.0, 0.01, 0.05, 0.9, 1.0), (0.0, 0.01, 0.45, 0.9, 1.0)
 """Shares of progress of a rig, and those of a recording at the same places: tracking, loops and map of a walk
 take nearly half of the time."""
 Steps = Generator[Progress, None, Result]
