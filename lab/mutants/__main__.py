@@ -64,13 +64,14 @@ def answered(copies: list[Path], drawn: list[Mutation], answers: Path) -> list[b
         InputError: a test fails without a fault, or tests were killed.
     """
     seen = dict.fromkeys((one.name for one in drawn if one.place in reasons().equivalent), False)
-    seen |= _read(answers, copies[0], drawn)
+    counting, before = _read(answers, copies[0], drawn)
+    seen |= counting
     waiting = [one for one in drawn if one.name not in seen]
 
     def work(mutation: Mutation, limit_s: float) -> None:
         copy = copies.pop()
         try:
-            answer = sees(copy, mutation, limit_s)
+            answer = sees(copy, mutation, limit_s, before.get(mutation.name, ""))
         finally:
             copies.append(copy)
         line = {"name": mutation.name, "digest": digest(copy, mutation, answer.by), **asdict(answer)}
@@ -88,17 +89,21 @@ def answered(copies: list[Path], drawn: list[Mutation], answers: Path) -> list[b
     return [seen[one.name] for one in drawn]
 
 
-def _read(answers: Path, copy: Path, drawn: list[Mutation]) -> dict[str, bool]:
-    """Return the stored answers that count, by name of the mutant."""
+def _read(answers: Path, copy: Path, drawn: list[Mutation]) -> tuple[dict[str, bool], dict[str, str]]:
+    """Return, by name of the mutant, the stored answers that count, and the tests that ever saw it."""
     if not answers.exists():
-        return {}
+        return {}, {}
     by_name = {one.name: one for one in drawn}
-    seen = {}
+    seen, tests = {}, {}
     for line in map(json.loads, answers.read_text(encoding="utf-8").splitlines()):
         mutation = by_name.get(line["name"])
-        if mutation is not None and line["digest"] == digest(copy, mutation, line["by"]):
+        if mutation is None:
+            continue
+        if line["by"]:
+            tests[mutation.name] = line["by"]
+        if line["digest"] == digest(copy, mutation, line["by"]):
             seen[mutation.name] = line["seen"]
-    return seen
+    return seen, tests
 
 
 if __name__ == "__main__":

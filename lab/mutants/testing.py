@@ -98,10 +98,11 @@ def time_limit_s(copy: Path, group: str, mutations: Iterable[Mutation]) -> float
     return PATIENCE * (time.perf_counter() - started)
 
 
-def sees(copy: Path, mutation: Mutation, limit_s: float) -> Answer:
+def sees(copy: Path, mutation: Mutation, limit_s: float, before: str = "") -> Answer:
     """Return whether a test fails, or exceeds the time, with the fault in the copy.
 
-    The module's own tests run first, then those of its group.
+    The test file ``before`` that saw the fault in an earlier version runs first, then the module's own tests,
+    then those of its group.
 
     Raises:
         InputError: a run was stopped from outside, which tells nothing of the fault.
@@ -111,7 +112,8 @@ def sees(copy: Path, mutation: Mutation, limit_s: float) -> Answer:
     module.write_text(mutation.applied(code), encoding="utf-8")
     _keep_compiled(copy, mutation)
     try:
-        for paths in (own_tests(copy, mutation), group_tests(copy, mutation.group)):
+        earlier = [copy / before] if before and (copy / before).exists() else []
+        for paths in (earlier, own_tests(copy, mutation), group_tests(copy, mutation.group)):
             if paths and (answer := _answer(copy, mutation, paths, limit_s)).seen:
                 return answer
         return Answer(False)

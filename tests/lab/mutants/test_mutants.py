@@ -124,7 +124,7 @@ def test_an_answer_counts_until_the_module_or_a_test_that_matters_changes(
 ):
     answers = tmp_path / "answers.jsonl"
     first = (0, code) if code else (0, 0, 0)
-    ran = _exits(monkeypatch, *first, 0, 0, 0)
+    ran = _exits(monkeypatch, *first, 0, 0, 0, 0)
     one = _doubles(copy)
     assert answered([copy], [one], answers) == [code == 1]
     assert answered([copy], [one], answers) == [code == 1]
@@ -133,6 +133,17 @@ def test_an_answer_counts_until_the_module_or_a_test_that_matters_changes(
         file.write("\n# longer\n")
     assert answered([copy], [one], answers) == [counts]
     assert len(answers.read_text().splitlines()) == (1 if counts else 2)
+
+
+def test_the_test_that_saw_a_fault_before_runs_first(copy, monkeypatch, tmp_path):
+    monkeypatch.setitem(globals(), "FAILED", "FAILED tests/shop/test_all.py::test_all - assert 4 == 1\n")
+    ran, answers = _exits(monkeypatch, 0, 0, 1, 0, 1), tmp_path / "answers.jsonl"
+    assert answered([copy], [_doubles(copy)], answers) == [True]
+    with (copy / "tests/shop/test_all.py").open("a") as file:
+        file.write("\n# longer\n")
+    assert answered([copy], [_doubles(copy)], answers) == [True]
+    assert ran[1:3] == [["test_half.py"], ["shop"]]
+    assert ran[4:] == [["test_all.py"]]
 
 
 def test_what_was_compiled_is_kept_but_for_the_module_and_all_that_import_it(tmp_path):
