@@ -238,15 +238,18 @@ def _constants(trees: Iterable[ast.Module]) -> Mapping[str, list[ast.expr]]:
     """Return the values of the modules' constants by their names."""
     found: dict[str, list[ast.expr]] = {}
     for node in (node for tree in trees for node in tree.body):
-        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.value is not None:
-            found.setdefault(node.target.id, []).append(node.value)
-        for target in node.targets if isinstance(node, ast.Assign) else ():
-            pairs = [(target, node.value)]
-            if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
-                pairs = list(zip(target.elts, node.value.elts, strict=False))
-            for name, value in pairs:
-                if isinstance(name, ast.Name):
-                    found.setdefault(name.id, []).append(value)
+        pairs = list[tuple[ast.expr, ast.expr]]()
+        if isinstance(node, ast.AnnAssign) and node.value is not None:
+            pairs = [(node.target, node.value)]
+        elif isinstance(node, ast.Assign):
+            for target in node.targets:
+                if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
+                    pairs += zip(target.elts, node.value.elts, strict=False)
+                else:
+                    pairs.append((target, node.value))
+        for name, value in pairs:
+            if isinstance(name, ast.Name):
+                found.setdefault(name.id, []).append(value)
     return found
 
 
