@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from itertools import repeat
 from pathlib import Path
+from typing import Any
 
 from lab.mutants.mutations import GROUPS, Mutation, draw
 from lab.mutants.page import page, reasons, scored
@@ -24,7 +25,10 @@ DESCRIPTION = "Plant faults one at a time, run the tests, and list the faults th
 
 
 def main() -> None:
-    """Test the mutants that have no answer yet, then write the page; exit with 1 below ``AIM``."""
+    """Test the mutants that have no answer yet, then write the page; exit with 1 below ``AIM``.
+
+    After Ctrl-C the page says how many were tested, and the same command goes on with the others.
+    """
     parser = argparse.ArgumentParser(prog="make mutants", description=DESCRIPTION)
     parser.add_argument("--count", type=int, default=300, help="mutants to draw")
     parser.add_argument("--seed", type=int, default=1, help="seed of the random draw")
@@ -37,12 +41,15 @@ def main() -> None:
         copies = [copied(Path(folder) / str(k)) for k in range(options.workers)]
         drawn = draw(copies[0], options.count, options.seed)
         try:
-            seen = answered(copies, drawn, answers)
+            answered(copies, drawn, answers)
         except InputError as error:
             sys.exit(str(error))
+        except KeyboardInterrupt:
+            print("stopped; the same command goes on where it was", file=sys.stderr)
+        seen = _known(answers, copies[0], drawn)
     found = scored(drawn, seen)
     PAGE.write_text(page(found, options.seed), encoding="utf-8")
-    counted = len(drawn) - len(found.equivalents)
+    counted = len(found.tested) - len(found.equivalents)
     if found.share < AIM:
         sys.exit(
             f"{found.share:.1%} of {counted} mutants that change a result were seen; the aim is {AIM:.0%}"
@@ -63,9 +70,7 @@ def answered(copies: list[Path], drawn: list[Mutation], answers: Path) -> list[b
     Raises:
         InputError: a test fails without a fault, or tests were killed.
     """
-    seen = dict.fromkeys((one.name for one in drawn if one.place in reasons().equivalent), False)
-    counting, before = _read(answers, copies[0], drawn)
-    seen |= counting
+    seen, before = _known(answers, copies[0], drawn), _seen_by(answers)
     waiting = [one for one in drawn if one.name not in seen]
 
     def work(mutation: Mutation, limit_s: float) -> None:
@@ -89,21 +94,24 @@ def answered(copies: list[Path], drawn: list[Mutation], answers: Path) -> list[b
     return [seen[one.name] for one in drawn]
 
 
-def _read(answers: Path, copy: Path, drawn: list[Mutation]) -> tuple[dict[str, bool], dict[str, str]]:
-    """Return, by name of the mutant, the stored answers that count, and the tests that ever saw it."""
-    if not answers.exists():
-        return {}, {}
+def _known(answers: Path, copy: Path, drawn: list[Mutation]) -> dict[str, bool]:
+    """Return, by name, the stored answers that count, and those of the equivalent mutants."""
     by_name = {one.name: one for one in drawn}
-    seen, tests = {}, {}
-    for line in map(json.loads, answers.read_text(encoding="utf-8").splitlines()):
+    seen = dict.fromkeys((one.name for one in drawn if one.place in reasons().equivalent), False)
+    for line in _lines(answers):
         mutation = by_name.get(line["name"])
-        if mutation is None:
-            continue
-        if line["by"]:
-            tests[mutation.name] = line["by"]
-        if line["digest"] == digest(copy, mutation, line["by"]):
+        if mutation is not None and line["digest"] == digest(copy, mutation, line["by"]):
             seen[mutation.name] = line["seen"]
-    return seen, tests
+    return seen
+
+
+def _seen_by(answers: Path) -> dict[str, str]:
+    """Return, by name of the mutant, the test file that saw it last, in whatever version."""
+    return {line["name"]: line["by"] for line in _lines(answers) if line["by"]}
+
+
+def _lines(answers: Path) -> list[dict[str, Any]]:
+    return list(map(json.loads, answers.read_text(encoding="utf-8").splitlines())) if answers.exists() else []
 
 
 if __name__ == "__main__":

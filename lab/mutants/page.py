@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,15 +31,18 @@ def reasons() -> Reasons:
 class Score:
     """Which of the drawn mutants were seen."""
 
-    drawn: Sequence[Mutation]
+    drawn: int
+    """Number of mutants that were drawn."""
+    tested: Sequence[Mutation]
+    """Those with an answer."""
     seen: Sequence[bool]
-    """In the order of ``drawn``."""
+    """In the order of ``tested``."""
     reasons: Reasons
 
     @property
     def survivors(self) -> list[Mutation]:
         """The mutants that were not seen."""
-        return [one for one, seen in zip(self.drawn, self.seen, strict=True) if not seen]
+        return [one for one, seen in zip(self.tested, self.seen, strict=True) if not seen]
 
     @property
     def equivalents(self) -> list[Mutation]:
@@ -49,35 +52,36 @@ class Score:
     @property
     def share(self) -> float:
         """Share of the mutants that change a result, as far as is known, that were seen."""
-        return sum(self.seen) / (len(self.drawn) - len(self.equivalents))
+        return sum(self.seen) / (len(self.tested) - len(self.equivalents))
 
 
-def scored(drawn: Sequence[Mutation], seen: Sequence[bool]) -> Score:
-    """Return the score of drawn mutants, with the reasons of ``WHYS``."""
-    return Score(drawn, seen, reasons())
+def scored(drawn: Sequence[Mutation], seen: Mapping[str, bool]) -> Score:
+    """Return the score of drawn mutants with answers by their names, and the reasons of ``WHYS``."""
+    tested = [one for one in drawn if one.name in seen]
+    return Score(len(drawn), tested, [seen[one.name] for one in tested], reasons())
 
 
 def page(score: Score, seed: int) -> str:
     """Return the page: the score, also of each group, and each survivor with its reason."""
-    drawn, seen, equivalents = len(score.drawn), sum(score.seen), len(score.equivalents)
+    tested, seen, equivalents = len(score.tested), sum(score.seen), len(score.equivalents)
     rows = []
     for group in GROUPS:
-        planted = [seen for one, seen in zip(score.drawn, score.seen, strict=True) if one.group == group]
+        planted = [seen for one, seen in zip(score.tested, score.seen, strict=True) if one.group == group]
         same = sum(one.group == group for one in score.equivalents)
         rows.append(f"| {group} | {len(planted)} | {sum(planted)} | {same} |")
     return "\n".join(
         [
             "# Mutants",
             "",
-            f'`make mutants ARGS="--count {drawn} --seed {seed}"` plants {drawn} faults, drawn with '
-            f"seed {seed} from the modules that hold formulae, one at a time, and runs the tests of their "
+            f'`make mutants ARGS="--count {score.drawn} --seed {seed}"` plants {score.drawn} faults, drawn '
+            f"with seed {seed} from the modules that hold formulae, one at a time, and runs the tests of their "
             "group. A fault is seen if a test fails. A fault that changes no result (an equivalent mutant) "
             "cannot be seen; the table says which ones were judged so by reading the code.",
             "",
-            f"Seen: {seen} of {drawn} ({seen / drawn:.1%}). Without the equivalent mutants ({equivalents}): "
-            f"{seen} of {drawn - equivalents} ({score.share:.1%}).",
+            f"Tested so far: {tested}. Seen: {seen} of {tested} ({seen / tested:.1%}). Without the "
+            f"equivalent mutants ({equivalents}): {seen} of {tested - equivalents} ({score.share:.1%}).",
             "",
-            *("| group | planted | seen | equivalent |", "| --- | --- | --- | --- |", *rows),
+            *("| group | tested | seen | equivalent |", "| --- | --- | --- | --- |", *rows),
             "",
             *("| not seen | equivalent | why |", "| --- | --- | --- |"),
             *(_row(one, score) for one in score.survivors),

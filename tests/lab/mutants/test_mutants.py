@@ -170,12 +170,14 @@ def test_reasons_belong_to_a_source_line_and_equivalent_mutants_are_counted_apar
     moved = replace(same, source="LIMIT = 5", line=9)
     seen = [False, True, True, True, False, False]
     score = Score(
-        [same, *others, moved], seen, Reasons({same.place: "The same."}, {others[-1].place: "Rare."})
+        300, [same, *others, moved], seen, Reasons({same.place: "The same."}, {others[-1].place: "Rare."})
     )
     assert score.share == 3 / 5
     text = page(score, 7)
-    assert '`make mutants ARGS="--count 6 --seed 7"` plants 6 faults' in text
-    assert "Seen: 3 of 6 (50.0%). Without the equivalent mutants (1): 3 of 5 (60.0%)." in text
+    assert '`make mutants ARGS="--count 300 --seed 7"` plants 300 faults' in text
+    assert (
+        "Tested so far: 6. Seen: 3 of 6 (50.0%). Without the equivalent mutants (1): 3 of 5 (60.0%)." in text
+    )
     assert "| mac | 6 | 3 | 1 |" in text
     assert r"| line 1, `LIMIT = 3 \| 4`: `shop/half.py NumberReplacer 0` | yes | The same. |" in text
     assert "`shop/half.py NumberReplacer 5` | no | Rare. |" in text
