@@ -75,8 +75,8 @@ def page(score: Score, seed: int) -> str:
             "",
             f'`make mutants ARGS="--count {score.drawn} --seed {seed}"` plants {score.drawn} faults, drawn '
             f"with seed {seed} from the modules that hold formulae, one at a time, and runs the tests of "
-            "their group. A fault is seen if a test fails. A fault that changes no result (an equivalent mutant) "
-            "cannot be seen; the table says which ones were judged so by reading the code.",
+            "their group. A fault is seen if a test fails. A fault that changes no result (an equivalent "
+            "mutant) cannot be seen; the table says which ones were judged so by reading the code.",
             "",
             f"Tested so far: {tested}. Seen: {seen} of {tested} ({seen / tested:.1%}). Without the "
             f"equivalent mutants ({equivalents}): {seen} of {tested - equivalents} ({score.share:.1%}).",
