@@ -27,7 +27,7 @@ VERSION = 4
 EVERY_S = 10.0
 """Least time between two writings of the state."""
 OLD_S = 14 * 86400.0
-"""States that were not written for so long are deleted."""
+"""Age, relative to the newest state, from which a state is deleted."""
 GOES_ON = "the tracking so far is kept, and the same command goes on after it"
 """Note on an error of a run of which a state was written."""
 State = Mapping[str, NDArray[Any]]
@@ -91,11 +91,11 @@ def deleted_after(state: Path | None) -> Iterator[None]:
 
 
 def delete_old() -> None:
-    """Delete the states that were not written for ``OLD_S``."""
-    for path in (cache_folder() / "tracking").glob("*.npz"):
-        with suppress(OSError):  # deleted by another run
-            if time.time() - path.stat().st_mtime > OLD_S:
-                path.unlink()
+    """Delete the states that were written ``OLD_S`` or longer before the newest one."""
+    with suppress(OSError):  # deleted by another run
+        written_s = {path: path.stat().st_mtime for path in (cache_folder() / "tracking").glob("*.npz")}
+        for path in (path for path, at_s in written_s.items() if max(written_s.values()) - at_s > OLD_S):
+            path.unlink()
 
 
 def checkpoint_of(recording: Recording, given: Sequence[FloatArray | None] | None) -> Checkpoint | None:

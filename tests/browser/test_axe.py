@@ -29,10 +29,14 @@ OF_VISER = {"color-contrast": r"packetmesh-old|>(Save Canvas|Reset View)<"}
 to other settings, and two buttons of viser are there, in its own blue, until the app's panel has come."""
 
 
+def without_policy(browser):
+    """A context without the content policy, which forbids what axe-core is started with."""
+    return browser.new_context(viewport={"width": 1280, "height": 800}, bypass_csp=True)
+
+
 @pytest.fixture(scope="module")
 def page(few, browser, app):
-    """A page without the content policy, which forbids what axe-core is started with."""
-    context = browser.new_context(viewport={"width": 1280, "height": 800}, bypass_csp=True)
+    context = without_policy(browser)
     page = context.new_page()
     page.set_default_timeout(PATIENCE_MS)
     page.goto(app.url)
@@ -77,10 +81,13 @@ def test_a_screen(page, step):
     assert grave(page) == []
 
 
-def test_a_lecture_with_the_address_of_the_class(page, app):
-    """The landing, the desk and the address as the teacher sees them, and a lesson."""
+def test_a_lecture_with_the_address_of_the_class(browser, app):
+    """The landing, the desk and the address as the teacher sees them."""
     from app.server import build_server
 
+    context = without_policy(browser)
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE_MS)
     lecture = build_server("box-on-table", port=0, lecture=True, pool=app.pool)
     try:
         page.goto(lecture.teacher_url)
@@ -94,7 +101,7 @@ def test_a_lecture_with_the_address_of_the_class(page, app):
     finally:
         lecture.pool = SimpleNamespace(close=lambda: None)
         lecture.stop()
-        page.goto(app.url)
+        context.close()
 
 
 def test_a_lesson_and_its_language(page):

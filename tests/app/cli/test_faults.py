@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.cli.runs import RigTask, _record, reconstruct_one
+from app.cli.runs import RigTask, _inputs_of, reconstruct_one
 from packetmesh.files import write_json
 from packetmesh.settings import with_settings
 from pipeline.config import PipelineConfig
@@ -183,7 +183,7 @@ def test_a_run_of_other_images_at_the_same_path_is_computed_again(task, tmp_path
     shutil.copytree(task.path, rig)
     shutil.copytree(task.out, out)
     moved = replace(task, path=str(rig), out=str(out))
-    write_json(out / "task.json", _record(moved))
+    write_json(out / "task.json", _inputs_of(moved))
     assert reconstruct_one(moved).state == "kept"
     CHANGES[change](rig)
     monkeypatch.setattr("app.cli.runs.iterate_run", begun)

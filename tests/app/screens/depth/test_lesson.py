@@ -65,7 +65,7 @@ def test_to_hide_nothing_takes_back_what_was_to_be_hidden(tmp_path):
 def test_a_bad_setting_is_one_sentence(tmp_path, setting, sentence):
     with pytest.raises(InputError) as error:
         lesson(tmp_path, f"# A\n## One\nset: {setting}\nx")
-    assert str(error.value).startswith("The lesson lesson.md, line 3, section 'One' cannot set ")
+    assert str(error.value).startswith("The lesson lesson.md, line 3, stop 'One' cannot set ")
     assert sentence in str(error.value)
     assert "\n" not in str(error.value)
 

@@ -140,7 +140,7 @@ def test_an_address_with_an_unknown_loop_shows_the_rest_of_its_walk(store, recor
     told = [call for call in posted if call != (part._draw,)]  # a slow machine draws again meanwhile
     assert len(told) == (not chosen)
     for take, text in told:
-        with pytest.raises(InputError, match="5-7, but no loop"):
+        with pytest.raises(InputError, match="loop=5-7, which is no loop; choose one"):
             take(text)
     server.stop()
 

@@ -49,7 +49,7 @@ def test_a_recording_in_a_zip_becomes_a_rig(session, tmp_path, write):
     assert session.gui.find("Scene").value == "my-desk"
     assert session.gui.find("Node").options == ("node_00", "node_01", "node_02")
     assert "3 of 5 frames became nodes" in session.gui.text(FOLDER)
-    assert "units in a metre" in session.gui.text(FOLDER)
+    assert "in a metre" in session.gui.text(FOLDER)
     pictures = [frame.rgb for frame in written.frames]
     assert all(any(np.array_equal(node.color.rgb, rgb) for rgb in pictures) for node in nodes)
 

@@ -87,7 +87,7 @@ def test_all_that_can_be_shown_has_a_short_name(tmp_path):
 def test_a_bad_setting_is_one_sentence(tmp_path, setting, sentence):
     with pytest.raises(InputError) as error:
         lesson(tmp_path, f"# A\n## One\nset: {setting}\nx")
-    assert str(error.value).startswith("The lesson lesson.md, line 3, section 'One' cannot set ")
+    assert str(error.value).startswith("The lesson lesson.md, line 3, stop 'One' cannot set ")
     assert sentence in str(error.value)
     assert "\n" not in str(error.value)
 
