@@ -14,7 +14,7 @@ ANYTHING = (
     *(None, [], {}, [[]], {"value": 1}, b"", b"\x00\xff", [None], ["a", "b"], [1.0], [1, 2], [1, 2, 3, 4, 5]),
     *(math.nan, math.inf, -math.inf, 1e308, -1e308, 10**18, -(10**18), 2**63, 1e-320),
     *([math.nan, 0.0], [math.nan] * 3, ["1", "2", "3"], [True, False, True], [1e300] * 2, [1e300] * 3),
-    *("/tmp/attack", "../../attack", "..\\attack", "\0", "a\nb", "\x1b[31m", "x" * 5000, "\u0085"),
+    *("/tmp/attack", "../../attack", "..\\attack", "\0", "a\nb", "\x1b[31m", "x" * 8000, "\u0085"),
     *("<script>parent.pwned = 1</script>", "{{7*7}}", "__class__", "true", "0", "node_00/../../x"),
 )
 """Forty-odd values, most of them wrong for any control."""
@@ -23,7 +23,7 @@ ANYTHING = (
 def wrong_for(handle):
     """Those that no hand could give a control."""
     if isinstance(handle, viser.GuiTextHandle):
-        plain = (one for one in ANYTHING if isinstance(one, str) and one.isprintable() and len(one) <= 4096)
+        plain = (one for one in ANYTHING if isinstance(one, str) and one.isprintable() and len(one) <= 7168)
         return without(ANYTHING, plain)
     extra = (True, False, 1, 0.5, "", "a") if isinstance(handle, viser.GuiUploadButtonHandle) else ()
     if isinstance(handle, viser.GuiCheckboxHandle | viser.GuiButtonHandle):
