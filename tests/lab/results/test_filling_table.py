@@ -86,7 +86,7 @@ def test_what_completion_is_worth_is_said_of_the_target_the_hidden_and_the_own_h
         run("packetmesh", "rooms, own holes", 0.091),
         run("colour network", "rooms, own holes", 0.1),
     ]
-    assert "It has at 75 px in rooms (0.66); elsewhere it has 1.04 to 1.04 times" in target(runs)
+    assert "It reaches this at 75 px in rooms (0.66); elsewhere it has 1.04 to 1.04 times" in target(runs)
     said = whole_holes(runs)
     assert "rooms +5 %, which is not certain" in said
     assert "own holes, which is where it is used and why it ships: rooms -9 %" in said
@@ -99,6 +99,6 @@ def test_confidence_is_too_low_where_more_are_right_and_too_high_where_fewer_are
         {"tables": [{"title": "Confidence in bins", "rows": [*rows, ["a", "0% to 10%", 1, "", ""]]}]}
     )
     assert (
-        "a: 93% [1%, 2%]; b: 71% [1%, 2%]; of all of them together 76.5 %. Confidence too low in: a; too "
+        "a: 93% [1%, 2%]; b: 71% [1%, 2%]; of all groups together 76.5 %. Confidence too low in: a; too "
         "high in: b." in said
     )
