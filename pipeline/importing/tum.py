@@ -20,6 +20,8 @@ from pipeline.types import CameraIntrinsics, FloatArray
 
 UNITS_PER_METRE = 5000.0
 LARGEST_GAP_S = 0.02
+MOST_COMPARED = 2000
+"""First images of each list whose times are compared for a difference of their clocks."""
 LARGEST_TIME_S = 1e11
 _LENGTH_WITHIN = 0.05
 """Largest departure of a quaternion's length from 1."""
@@ -86,22 +88,33 @@ def _without_partner(pairs: int, pictures: int, depths: int) -> tuple[str, ...]:
 
 
 def _no_pair(folder: Path, rgb_s: FloatArray, depth_s: FloatArray) -> str:
-    """Return the sentence on lists of which no two images are of one moment, with their median offset."""
+    """Return the sentence on lists of which no two images are of one moment.
+
+    It names the difference of their clocks if with that half of the colour images would have a partner.
+    """
     told = (
         f"Of the {len(rgb_s)} images in {folder / 'rgb.txt'} and the {len(depth_s)} in depth.txt no two are "
         f"less than {1000 * LARGEST_GAP_S:g} ms apart"
     )
     if not len(rgb_s) or not len(depth_s):
         return f"{told}; check that the lists are whole"
-    after = np.searchsorted(depth_s, rgb_s).clip(1, max(1, len(depth_s) - 1))
-    around = np.stack([depth_s[after - 1], depth_s[np.minimum(after, len(depth_s) - 1)]]) - rgb_s
-    offset_s = float(np.median(np.where(np.abs(around[0]) <= np.abs(around[1]), *around)))
-    late = "later" if offset_s > 0.0 else "earlier"
+    offset_s = round(_commonest_offset_s(rgb_s, depth_s), 3)
+    pairs = len(associate(rgb_s, depth_s - offset_s))
+    if 2 * pairs < len(rgb_s):
+        return f"{told}; check that their clocks agree, and that the times are in seconds"
     change = "subtract this from" if offset_s > 0.0 else "add this to"
     return (
-        f"{told}: the nearest depth image is {abs(offset_s):.4g} s {late} (median). If the clocks differ, "
-        f"{change} the times in depth.txt; and check that the times are in seconds"
+        f"{told}, but {pairs} would be pairs if the depth images were not {abs(offset_s):.3f} s "
+        f"{'later' if offset_s > 0.0 else 'earlier'}; if the clocks differ, {change} the times in depth.txt"
     )
+
+
+def _commonest_offset_s(rgb_s: FloatArray, depth_s: FloatArray) -> float:
+    """Return the difference of a depth and a colour image's times that most pairs of images have."""
+    offsets_s = np.sort((depth_s[:MOST_COMPARED] - rgb_s[:MOST_COMPARED, None]).ravel())
+    alike = np.searchsorted(offsets_s, offsets_s + LARGEST_GAP_S, side="right") - np.arange(len(offsets_s))
+    first = int(alike.argmax())
+    return float(np.median(offsets_s[first : first + alike[first]]))
 
 
 def associate(first_s: FloatArray, second_s: FloatArray) -> list[tuple[int, int]]:

@@ -80,8 +80,21 @@ def test_lists_whose_clocks_differ_open_when_the_clocks_agree(tmp_path):
     right = rgb.read_text()
     lines = [line.split(" ", 1) for line in right.splitlines() if not line.startswith("#")]
     rgb.write_text("".join(f"{float(time_s) + 5000.0:.6f} {name}\n" for time_s, name in lines))
-    with pytest.raises(InputError, match="check that their clocks agree"):
+    with pytest.raises(
+        InputError, match=r"4999\.992 s earlier; if the clocks differ, add this to the times in"
+    ):
         drain(iterate_import(tmp_path / "recording", tmp_path / "rig"))
+    depth = tmp_path / "recording" / "depth.txt"
+    told = [line.split(" ", 1) for line in depth.read_text().splitlines() if not line.startswith("#")]
+    depth.write_text("".join(f"{float(time_s) + 5000.0:.6f} {name}\n" for time_s, name in told))
+    (tmp_path / "recording" / "groundtruth.txt").unlink()
+    drain(iterate_import(tmp_path / "recording", tmp_path / "other"))
     rgb.write_text(right)
+    with pytest.raises(InputError, match=r"5000\.008 s later; if the clocks differ, subtract this from"):
+        drain(iterate_import(tmp_path / "recording", tmp_path / "rig"))
+    depth.write_text("".join(f"{3.0 * float(time_s):.6f} {name}\n" for time_s, name in told))
+    with pytest.raises(InputError, match="check that their clocks agree, and that the times are in seconds"):
+        drain(iterate_import(tmp_path / "recording", tmp_path / "rig"))
+    depth.write_text("".join(f"{time_s} {name}\n" for time_s, name in told))
     drain(iterate_import(tmp_path / "recording", tmp_path / "rig"))
     assert len(load_rig(tmp_path / "rig").frames) == 2
