@@ -169,8 +169,8 @@ def distinct(candidates: tuple[Candidate, ...]) -> tuple[tuple[Candidate, ...], 
             times_s.add(candidate.time_s)
     notes = []
     if again:
-        frames = "1 frame names" if again == 1 else f"{again} frames name"
-        notes.append(f"{frames} an image that an earlier frame has; left out")
+        names, were = ("1 frame names", "was") if again == 1 else (f"{again} frames name", "were")
+        notes.append(f"{names} an image that an earlier frame has, and {were} left out")
     if repeated:
         notes.append(
             f"{repeated} frames have the time of another frame and were left out; each needs its own time"

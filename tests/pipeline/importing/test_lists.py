@@ -176,4 +176,4 @@ def test_images_that_are_listed_again_are_left_out_and_counted(tmp_path, written
         file.write_text(file.read_text() + f"{float(time_s) + 10.0} {image}\n")
     report, frames = imported(tmp_path)
     assert len(frames) == 3
-    assert "1 frame names an image that an earlier frame has; left out" in report.notes
+    assert "1 frame names an image that an earlier frame has, and was left out" in report.notes
