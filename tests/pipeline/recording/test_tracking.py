@@ -202,7 +202,7 @@ def test_the_first_keyframe_is_the_first_frame_with_depth():
     assert next(iter(track.clouds)) == 2
     assert errors(chained(track)[2:], walk.T_true[2:])[0].max() < 0.005
     nothing = tracked(in_the_living_room(around(3), blind=frozenset({0, 1, 2})))
-    assert nothing == Track((None, None, None), {}, ())
+    assert nothing == Track((None, None, None), {}, (), blind=(0, 1, 2))
 
 
 @pytest.mark.parametrize("given", [False, True])
@@ -431,7 +431,9 @@ def test_a_painted_wall_holds_the_camera_and_a_bare_one_does_not():
 def test_photographs_do_not_move_the_camera_to_where_depth_denies_it(monkeypatch):
     """Two metres along the wall, where the images no longer overlap."""
     far = rigid(np.eye(3), np.array([2.0, 0.0, 0.0]))
-    monkeypatch.setattr(Brightness, "held", lambda self, source, keyframe, T, motions: (T @ far, np.eye(6)))
+    monkeypatch.setattr(
+        Brightness, "corrected", lambda self, source, keyframe, T, motions: (T @ far, np.eye(6))
+    )
     assert worst_m(WallFrames(painted)) < 0.2
 
 
