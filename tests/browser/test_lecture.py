@@ -196,4 +196,3 @@ def test_a_lesson_begins_in_its_scene_and_one_without_a_scene_in_the_one_that_is
     assert "screen=surface" in url
     assert "welcome" not in url
     assert "scene=uncalibrated" in learn(teacher, lecture, "How good is this scene?", "stop-own-here")
-    assert "screen=depth" in learn(teacher, lecture, "Can a picture measure?", "scene=living-room**stop")
