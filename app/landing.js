@@ -29,30 +29,28 @@
     leave();
   }
 
-  // Open a place; one without a scene leaves a lecture's class in the scene that it sees.
-  function goTo(place) {
-    const query = new URLSearchParams(place);
-    if (!shared || query.has("scene")) return window.packetmeshAddress.ask(place);
-    const steps = () => [...document.querySelectorAll("div:has(> .packetmesh-steps) + div button")];
-    once(() => steps().find(one => one.textContent.toLowerCase().startsWith(query.get("screen"))), step => step.click());
+  // Open a place, and call `act` then. One without a scene leaves a lecture's class in the scene that it sees.
+  function goTo(place, act) {
+    const ask = kept => {
+      window.packetmeshAddress.ask(kept + place);
+      act();
+    };
+    if (!shared || new URLSearchParams(place).has("scene")) return ask("");
+    const settings = () => [...new URLSearchParams(location.search)].filter(([key]) => ["scene", "preset", "set"].includes(key));
+    once(() => settings().length, () => ask(`${new URLSearchParams(settings())}&`));
   }
 
   const seen = element => element.offsetParent !== null;
+  const lesson = () => window.packetmeshAddress.received && document.querySelector(".packetmesh-lesson");
 
-  // Open the folder of one of these labels, and call `act` with it.
-  function openFolder(labels, act) {
+  // Open the folder with this label, and leave.
+  function openFolder(label) {
     const head = () => window.packetmeshAddress.received && [...document.querySelectorAll("svg.tabler-icon-chevron-down")]
-      .map(arrow => arrow.parentElement).find(one => labels.includes(one.textContent.trim()) && seen(one));
+      .map(arrow => arrow.parentElement).find(one => one.textContent.trim() === label && seen(one));
     once(head, found => {
       found.click();
-      act(found.parentElement);
+      leave();
     });
-  }
-
-  // Open the lesson with one of these titles: the title in the language of the session.
-  function openLesson(titles) {
-    const next = folder => () => [...folder.querySelectorAll("button")].find(one => one.textContent === "Next" && seen(one));
-    openFolder(titles.map(title => `Lesson: ${title}`), folder => once(next(folder), go => { go.click(); leave(); }));
   }
 
   // The cards of the lessons are in the chosen language, at first the one that the browser prefers.
@@ -78,10 +76,11 @@
     if ("explore" in card.dataset) return leave();
     landing.style.cursor = "progress";
     const language = "titles" in card.dataset && choice.value !== preferred ? `&lang=${choice.value}` : "";
-    goTo(card.dataset.place + language);
-    if ("titles" in card.dataset) openLesson(Object.values(JSON.parse(card.dataset.titles)));
-    else if ("folder" in card.dataset) openFolder([card.dataset.folder], leave);
-    else leave();
+    goTo(card.dataset.place + language, () => {
+      if ("titles" in card.dataset) once(lesson, leave);
+      else if ("folder" in card.dataset) openFolder(card.dataset.folder);
+      else leave();
+    });
   });
   window.addEventListener("keydown", escape, true);
   landing.inert = false; // earlier clicks would have no effect

@@ -18,24 +18,25 @@ from app.lesson.reading import head_of, languages, titles_of
 from app.web.entrance import WELCOME
 from app.web.markup import Markup
 from app.web.page import Page
+from app.window.in_address import STOP
 from app.window.teaching import ENGLISH
 from pipeline.io.demos import DEMOS
 
 PICTURES = Path(__file__).resolve().parents[1] / "assets" / "landing"
 """Folder with the picture ``NAME.jpg`` of each shipped lesson and each demo scene."""
-SHIPPED = (
-    "can-a-picture-measure",
-    "icp-against-ceicp",
-    "which-ball-radius",
-    "how-images-cross-a-network",
-    "what-one-lost-packet-costs",
-    "how-good-is-my-calibration",
-    "how-a-walk-becomes-a-room",
-    "where-should-the-camera-stand",
-)
-"""Names of the lessons that ship, in the order in which they are offered."""
+SHIPPED = {
+    "can-a-picture-measure": STOP,
+    "icp-against-ceicp": STOP,
+    "which-ball-radius": STOP,
+    "how-images-cross-a-network": STOP,
+    "what-one-lost-packet-costs": f"{STOP}-lost",
+    "how-good-is-my-calibration": STOP,
+    "how-a-walk-becomes-a-room": f"{STOP}-walk",
+    "where-should-the-camera-stand": f"{STOP}-camera",
+}
+"""Lessons that ship, in the order in which they are offered, each with the key of its stop in the address."""
 OwnCards = Sequence[tuple[Lesson[Any], str]]
-"""A teacher's own lessons, each with the query of its scene and screen."""
+"""A teacher's own lessons, each with the query of its first stop."""
 OWN_FOLDER = "Use your own images"
 """Title of the Scene screen's folder for uploads."""
 
@@ -97,9 +98,9 @@ def landing_html(lecture: bool = False, own: OwnCards = ()) -> Markup:
 
 
 def _place(lesson: str) -> str:
-    """Return the query of an address that opens the scene and screen of a lesson that ships."""
+    """Return the query of an address that opens a lesson that ships at its first stop."""
     head, _ = head_of((LESSONS / f"{lesson}.md").read_text(encoding="utf-8"))
-    return f"scene={head['scene'][1]}&screen={screen_of(head['screen'][1])}"
+    return f"scene={head['scene'][1]}&{SHIPPED[lesson]}=1&screen={screen_of(head['screen'][1])}"
 
 
 def _languages(own: OwnCards) -> Markup:
@@ -125,7 +126,7 @@ def _card(name: str, title: str, place: str, titles: Mapping[str, str] | None = 
         name: name of the lesson or scene.
         title: text on the button.
         place: query of the address to open.
-        titles: titles of the lesson by language, by which the page then begins it; None for a scene.
+        titles: titles of the lesson by language; None for a scene.
     """
     picture = base64.b64encode((PICTURES / f"{name}.jpg").read_bytes()).decode()
     image = Markup('<img alt="" src="data:image/jpeg;base64,{}">').format(picture)

@@ -15,6 +15,7 @@ from typing import Any
 from app.lesson.faults import Fault, first_of
 from app.lesson.files import LESSONS, Kind, Lesson, screen_of
 from app.lesson.languages import NAMES
+from app.lesson.on_screen import OWN
 from app.lesson.reading import (
     TRANSLATION,
     check_lesson,
@@ -50,9 +51,9 @@ class OwnLesson:
 
     @property
     def place(self) -> str:
-        """Query of an address that opens its scene and screen."""
+        """Query of an address that opens it at its first stop, in its scene if it names one."""
         scene = f"scene={self.lesson.scene}&" if self.lesson.scene else ""
-        return f"{scene}screen={screen_of(self.kind)}"
+        return f"{scene}{OWN}{self.lesson.name}=1&screen={screen_of(self.kind)}"
 
 
 def own_lessons(places: Iterable[Path]) -> list[OwnLesson]:

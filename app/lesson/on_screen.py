@@ -42,11 +42,15 @@ class ScreenLessons(Generic[Look]):
             numbers: returns the texts for the fields; empty while they are computed.
             on_end: called when a lesson is left.
         """
-        self._kind, self._on_stop, self._numbers = kind, on_stop, numbers
+        self._kind, self._on_stop, self._on_end = kind, on_stop, on_end
+        self.waiting: Look | None = None
+        """What a stop sets once the screen has a result; the screen then makes it None. Before that, the stop
+        has no numbers."""
+        self._numbers = lambda: numbers() if self.waiting is None else {}
         lessons = {key: shipped_lesson(path, kind) for key, path in shipped.items()}
         lessons |= {f"{OWN}{one.name}": one for one in ui.teaching.own.get(kind.name, ())}
         self._folders = {
-            key: LessonFolder(ui, lesson, partial(self._take_stop, key), numbers, on_end)
+            key: LessonFolder(ui, lesson, partial(self._take_stop, key), self._numbers, self._leave)
             for key, lesson in lessons.items()
         }
         self._stated = ""
@@ -60,6 +64,10 @@ class ScreenLessons(Generic[Look]):
             if other != key and folder.place():
                 folder.take("")
         self._on_stop(look)
+
+    def _leave(self) -> None:
+        self.waiting = None
+        self._on_end()
 
     def leave(self) -> None:
         """Leave the lesson that is shown."""

@@ -140,8 +140,11 @@ def test_every_card_leads_to_a_place_that_an_address_can_name():
     sources = {name: demo_of(name) for name in DEMOS}
     titles = tuple(panel.title for panel in PANELS)
     places = [html.unescape(place) for place in re.findall('data-place="([^"]+)"', landing_html())]
-    found, wrong = zip(*(place_of(place, start, titles, sources) for place in places), strict=True)
+    keys = [*dict.fromkeys(SHIPPED.values())]
+    found, wrong = zip(*(place_of(place, start, titles, sources, keys) for place in places), strict=True)
     assert not any(wrong)
+    stops = [((key, "1"),) for key in SHIPPED.values()] + [()] * (len(DEMOS) + 1)
+    assert [place.added for place in found] == stops
     heads = [head_of((LESSONS / f"{name}.md").read_text())[0] for name in SHIPPED]
     wanted = [(head["scene"][1], screen_of(head["screen"][1])) for head in heads]
     wanted += [(name, "scene") for name in DEMOS]

@@ -53,7 +53,6 @@ class CalibratePanel(Panel):
         """Every camera before a view of it was dropped."""
         self._answers = Answers(session, self._judged, self._show_view)
         self._framed: tuple[Hashable, ...] = ()
-        self._look: CalibrateLook | None = None
         self._loaded: SceneView | None = None
         """The scene as it was loaded."""
         self._groups = list[Any]()
@@ -324,7 +323,7 @@ class CalibratePanel(Panel):
             self._noise.forget()
         if not look.used and isinstance(self.session.spec.source, Calibrated):
             self._use.put_back()
-        self._look = look
+        self._lessons.waiting = look
         views = self.session.spec.views
         if views is not None:
             self._use_views(replace(views, dropped=()))
@@ -333,10 +332,10 @@ class CalibratePanel(Panel):
 
     def _show_look(self) -> None:
         """Apply the stop's settings that need all cameras, once these are computed."""
-        look, views = self._look, self.session.spec.views
+        look, views = self._lessons.waiting, self.session.spec.views
         if look is None or views is None or not self.session.results.fresh("calibrate", self.session.spec):
             return
-        self._look = None
+        self._lessons.waiting = None
         self._show_camera()
         dropped = sorted(one for camera in self._whole.values() for one in left_out(camera, look.keep))
         if dropped:
@@ -350,7 +349,7 @@ class CalibratePanel(Panel):
         """Return the numbers of the camera that is shown; empty while it is computed."""
         session, view, camera = self.session, self._view, self._shown()
         scene: SceneView | None = session.results.view("scene")
-        fresh = session.results.fresh("calibrate", session.spec) and self._look is None
+        fresh = session.results.fresh("calibrate", session.spec)
         if scene is None or view is None or camera is None or not fresh:
             return {}
         return numbers(scene.title, len(view.board.points_m), camera)

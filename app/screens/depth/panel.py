@@ -54,7 +54,6 @@ class DepthPanel(Panel):
     def build(self) -> None:
         """Add the lesson, the main controls, two pictures to compare, one node's numbers, and the folders."""
         gui, session = self.gui, self.session
-        self._look: DepthLook | None = None
         self._here, self._undrawn = False, True
         self._source, self._key = session.spec.source, session.spec.key("depth")
         gui.add_markdown(TEXT)
@@ -263,7 +262,7 @@ class DepthPanel(Panel):
             self._coloring.value = next(name for name, key in COLORINGS.items() if key == look.coloring)
             self._drawn.value = look.drawn
             self._hide.clear()
-        self._look = look
+        self._lessons.waiting = look
         session.edit(
             lambda config: replace(
                 config,
@@ -280,9 +279,9 @@ class DepthPanel(Panel):
 
     def _show_look(self) -> None:
         """Hide and fill the region that the stop names, once the depth of its settings has been computed."""
-        look, session = self._look, self.session
+        look, session = self._lessons.waiting, self.session
         if look is None or not session.results.fresh("depth", session.spec):
             return
-        self._look = None
+        self._lessons.waiting = None
         if look.hide is not None:
             self._hide.set(look.hide)

@@ -56,7 +56,6 @@ class WalkPart:
         self._requested_frame: int | None = None
         """Frame from the address, kept until the walk is computed; ``_requested_loop`` likewise."""
         self._requested_loop = ""
-        self._look: WalkLook | None = None
         self._rest = self._ui.debounce(DRAW_S, self._draw)
 
     # The controls.
@@ -301,14 +300,14 @@ class WalkPart:
     def _take_look(self, look: WalkLook) -> None:
         """Show a stop of the lesson, at once or as soon as the walk is computed."""
         self._choose_walk()
-        self._look = look
+        self.lessons.waiting = look
         self._take_waiting_look()
 
     def _take_waiting_look(self) -> None:
-        look, view = self._look, self._view
+        look, view = self.lessons.waiting, self._view
         if look is None or view is None:
             return
-        self._look = None
+        self.lessons.waiting = None
         self._dock.seek(self._time_of(frame_of(look, view)))
         self._loop.value = self._loop.options[1 + loop_of(look, view)]
         self._large.value = look.enlarged

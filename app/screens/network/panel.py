@@ -76,7 +76,6 @@ class NetworkPanel(Panel):
         self._moment_s = 0.0
         self._resting = ui.debounce(REST_S, self._run)
         self._hand = ui.debounce(HAND_S, self._show_moment)
-        self._look: NetworkLook | None = None
         self._numbers = DeliveryNumbers()
         self._requested_ns: int | None = None
         """The moment that an address asks for, until its run is there."""
@@ -316,7 +315,7 @@ class NetworkPanel(Panel):
         """Run the network that a stop of a lesson sets; go to the stop's place once it is simulated."""
         with self.ui.atomic():
             self._setup.take(look)
-        self._look = look
+        self._lessons.waiting = look
         self._run()
         if self._delivery is not None and self._delivery.sent == self.session.spec.sent:
             self._aim(self._delivery.run)  # it is already being computed
@@ -327,7 +326,7 @@ class NetworkPanel(Panel):
         """Return the numbers of what is shown; empty while something else is computed."""
         session = self.session
         scene = session.results.view("scene")
-        if scene is None or self._look is not None or not session.results.fresh("network", session.spec):
+        if scene is None or not session.results.fresh("network", session.spec):
             return {}
         if self._delivery is None:
             return street_numbers(scene.title, self._runs) if self._runs else {}
@@ -335,7 +334,7 @@ class NetworkPanel(Panel):
 
     def _aim(self, run: NetworkView) -> None:
         """Go to the place of the lesson's stop and describe the frame there."""
-        look, self._look = self._look, None
+        look, self._lessons.waiting = self._lessons.waiting, None
         if look is not None:
             self._aim_at(look, run)
         if self._requested_ns is not None:

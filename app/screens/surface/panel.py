@@ -51,7 +51,6 @@ class SurfacePanel(Panel):
         """Add radius, rule, drawing choices, histogram and quality."""
         gui, session, hints = self.gui, self.session, labels.HINTS
         self._view: SurfaceView | None = None
-        self._look: SurfaceLook | None = None
         self._quick_line = Markup("")
         self._by_click = self._quickly_drawn = False
         self._key = session.spec.key("surface")
@@ -360,7 +359,7 @@ class SurfacePanel(Panel):
             self._loops.value = look.rims
             self._walks.close()
             self._picked_coloring()
-        self._look = look
+        self._lessons.waiting = look
         session.edit(lambda config: replace(config, surface=surface_of(look, config.surface)))
         if self._view is not None and session.results.fresh("surface", session.spec):
             self._take(self._view)
@@ -369,23 +368,23 @@ class SurfacePanel(Panel):
         """Return the numbers of the current surfaces; empty while they are computed."""
         session, view = self.session, self._view
         scene: SceneView | None = session.results.view("scene")
-        if scene is None or view is None or self._look is not None:
+        if scene is None or view is None:
             return {}
         fresh = session.results.fresh("surface", session.spec) and view.holes
         return numbers(scene.title, view, self._baselines.views) if fresh else {}
 
     def _show_look(self) -> None:
         """Apply the stop's settings that needed the surface, which has just been computed."""
-        look, session = self._look, self.session
+        look, session = self._lessons.waiting, self.session
         if look is None or self._view is None or not session.results.fresh("surface", session.spec):
             return
         if look.radius_in_r_F is not None:
-            self._look = replace(look, radius_in_r_F=None)
+            self._lessons.waiting = replace(look, radius_in_r_F=None)
             self._take_radius(look.radius_in_r_F * self._view.spacing.r_F_m)
             if session.results.fresh("surface", session.spec):
                 self._show_look()
             return
-        self._look = None
+        self._lessons.waiting = None
         if look.shown in labels.BASELINES:
             self._shown.value = look.shown
         self._picked_shown()

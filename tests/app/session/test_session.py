@@ -12,7 +12,11 @@ import pytest
 from app.compute.pool import Outcome
 from app.compute.shared import SharedViews
 from app.compute.store import Store
+from app.landing import SHIPPED
+from app.lesson.files import LESSONS, screen_of
+from app.lesson.reading import head_of
 from app.screens.scene.panel import ScenePanel
+from app.server import PANELS
 from app.session.session import CANCELLED, Session
 from app.web.uploads import Uploads
 from tests.app.fakes import START
@@ -101,6 +105,17 @@ def test_what_a_person_cancels_has_failed_until_it_is_asked_for_again(session, p
     session.post(session._act, "Retry")
     settle(session)
     assert len(pool.begun) == 2
+
+
+def test_the_start_page_names_each_lesson_by_the_key_that_its_screen_gives_it(server, store, pool, tmp_path):
+    shared = SharedViews(Store(str(tmp_path)))
+    session = Session(server, pool, store, Uploads(tmp_path), shared, START, PANELS)
+    with contextlib.closing(session):
+        settle(session)
+        parts = {panel.title.lower(): panel.in_address for panel in session.panels}
+        for name, key in SHIPPED.items():
+            head, _ = head_of((LESSONS / f"{name}.md").read_text(encoding="utf-8"))
+            assert parts[screen_of(head["screen"][1])][key].lesson.name == name
 
 
 def commands(server):
