@@ -98,10 +98,12 @@ class Stage extends View {
       gl.drawElements(gl.TRIANGLES, this.mesh.count, gl.UNSIGNED_INT, 0);
       gl.bindVertexArray(null);
     }
-    this.record.nodes.forEach((node, row) => this.paintNode(node, row, matrix, at));
+    const away = this.record.nodes.map((node, row) => this.paintNode(node, row, matrix, at));
+    this.thinNames(away);
   }
 
-  // Draw a frustum's lines as thin bands (WebGL's own lines are too thin), and the picture on its plane.
+  // Draw a frustum's lines as thin bands (WebGL's own lines are too thin), and the picture on its plane. Returns
+  // the distance from the viewer.
   paintNode(node, row, matrix, at) {
     const gl = this.gl, depth = FRUSTUM * this.first;
     const pose = node.T_world_camera, [[fx, , cx], [, fy, cy]] = node.matrix, [width, height] = node.size_px;
@@ -130,7 +132,7 @@ class Stage extends View {
     gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
     gl.drawArrays(gl.TRIANGLES, 0, 6 * edges.length);
     gl.disableVertexAttribArray(0);
-    this.placeName(row, tip, matrix);
+    return this.placeName(row, tip, matrix);
   }
 
   band(from, to) {
@@ -148,5 +150,18 @@ class Stage extends View {
     name.hidden = w <= 0;
     name.style.left = `${50 + 50 * x / w}%`;
     name.style.top = `${50 - 50 * y / w}%`;
+    return w;
+  }
+
+  // Of names that would cover each other show the nearest to the viewer.
+  thinNames(away) {
+    const areas = this.names.map(name => name.getBoundingClientRect());
+    const covers = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+    const shown = [];
+    for (const row of [...away.keys()].sort((a, b) => away[a] - away[b])) {
+      const free = !shown.some(other => covers(areas[row], areas[other]));
+      this.names[row].style.visibility = free ? "" : "hidden";
+      if (free && away[row] > 0) shown.push(row);
+    }
   }
 }

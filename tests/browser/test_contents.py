@@ -8,6 +8,7 @@ import pytest
 import app
 from app.drawing.packing import pack, rounded
 from tests.app.drawing.test_packing import FILES
+from tests.browser.hands import PATIENCE_MS
 
 HOME = Path(app.__file__).parent
 PAGE = """<!doctype html><meta charset="utf-8"><script>
@@ -17,7 +18,10 @@ window.packetmesh = {notice: sentence => notices.push(sentence)};
 window.got = [];
 const source = "onmessage = event => postMessage(event.data)";
 const worker = new Worker(URL.createObjectURL(new Blob([source], {type: "text/javascript"})));
-worker.onmessage = ({data}) => got.push(...data.type === "message_batch" ? data.messages : [data]);
+worker.onmessage = ({data}) => {
+  if (data.type === "connected") got.length = 0; // what was still on its way belongs to the last connection
+  got.push(...data.type === "message_batch" ? data.messages : [data]);
+};
 window.send = (...messages) => worker.postMessage({type: "message_batch", messages});
 window.connect = () => worker.postMessage({type: "connected"});
 </script>"""
@@ -30,7 +34,7 @@ RAW = {"dtype": "", "bytes": 5}
 def tab(browser):
     context = browser.new_context()
     page = context.new_page()
-    page.set_default_timeout(10_000)
+    page.set_default_timeout(PATIENCE_MS)
     yield page
     context.close()
 
@@ -77,7 +81,7 @@ def page(tab):
 
 def connect(page):
     page.evaluate("() => { got.length = 0; connect(); }")
-    page.wait_for_function("() => got.length === 1")
+    page.wait_for_function("() => got[0]?.type === 'connected'")
 
 
 def named(name, **kind):
@@ -325,7 +329,7 @@ def slow(browser):
     """A page that came at 100 kB/s."""
     context = browser.new_context()
     tab = context.new_page()
-    tab.set_default_timeout(10_000)
+    tab.set_default_timeout(PATIENCE_MS)
     tab.line = Line()
     tab.route("**/*", tab.line.answer)
     tab.add_init_script(f"({SLOW})()")

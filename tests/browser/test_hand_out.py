@@ -7,6 +7,7 @@ import re
 import cv2
 import numpy as np
 import pytest
+from playwright.sync_api import expect
 
 from app.reports.delivery import delivery_page
 from tests.app.hand_outs import END_S, frames, hand_out
@@ -130,6 +131,17 @@ def test_dragging_turns_the_room(page):
     page.mouse.up()
     page.wait_for_timeout(500)
     assert page.locator("#stage canvas").screenshot() != before
+
+
+def test_of_names_that_would_cover_each_other_one_is_shown(page):
+    names = page.locator("#names span:not([hidden])")
+    expect(names.locator("visible=true")).to_have_count(2)
+    large = page.add_style_tag(content="#names span { padding: 300px }")
+    box = page.locator("#stage canvas").bounding_box()
+    page.mouse.move(box["x"] + 200, box["y"] + 100)
+    page.mouse.wheel(0, 10)  # draws anew
+    expect(names.locator("visible=true")).to_have_count(1)
+    large.evaluate("style => style.remove()")
 
 
 def test_on_a_phone_nothing_is_cut_off(opened):

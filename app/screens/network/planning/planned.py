@@ -100,7 +100,8 @@ def sending_of(place: Place, request: PlanRequest) -> tuple[Rig, PlanRadio]:
     frames = tuple(frame for frame in found.frames if frame.name not in sent.down)
     if not frames:
         raise InputError(
-            "No present camera is registered and switched on, so nothing can be planned; switch one on"
+            "All registered cameras are switched off, so nothing can be planned; "
+            f"switch on {found.frames[0].name}"
         )
     network = sent.network
     if network.nodes.places_m and whole.walk is None:

@@ -200,7 +200,9 @@ def test_where_nothing_is_allowed_or_nothing_reaches_or_nobody_is_there_a_senten
     )
     assert "The radio does not carry a new camera" in screen.suggest()
     screen.panel.sent = Sent(PRESETS["office"], "raw", 4, down=("node_00", "node_01"))
-    assert "No present camera is registered and switched on" in screen.suggest()
+    assert "All registered cameras are switched off, so nothing can be planned; switch on node_00" in (
+        screen.suggest()
+    )
     screen.gui.set("Budget (J)", "much")
     with pytest.raises(InputError, match="'much'; try a number above 0"):
         screen.gui.press("Suggest")
