@@ -16,6 +16,7 @@ from pipeline.calibration.depth_samples import board_depth_samples
 from pipeline.calibration.detection import whole
 from pipeline.calibration.estimate import calibrate
 from pipeline.calibration.from_images import CameraReport
+from pipeline.calibration.lens import Optics
 from pipeline.io.depth_correction import (
     DepthCorrection,
     map_means,
@@ -282,3 +283,15 @@ def test_bad_input_is_refused_in_a_sentence():
     with pytest.raises(InputError, match="3 views have depth on the board's white paper, and it takes 4"):
         fit_depth(board_depth_samples(found, [*depths[:3], None, None, None], BOARD))
     assert CAMERA.width_px == SIZE[0]
+
+
+def test_samples_begin_three_pixels_inside_the_outermost_points_on_every_side():
+    focal_px, away_m = 100.0, 1.0  # 3.5 pixels from circle to circle: 35 x 28 from rim to rim
+    lens = Optics("thesis", np.array([[focal_px, 0, 30], [0, focal_px, 30], [0, 0, 1.0]]), np.zeros(5))
+    T = np.eye(4)
+    T[2, 3] = away_m
+    rim_px = lens.project(BOARD.points_m, T)
+    pixels = depth_samples._pixels_on_board(BOARD, T, lens, DepthMap(np.full((60, 90), away_m, np.float32)))
+    low, high = np.rint(rim_px.min(axis=0)), np.rint(rim_px.max(axis=0))
+    assert pixels.min(axis=0).tolist() == (low + depth_samples.RIM_PX).tolist()
+    assert pixels.max(axis=0).tolist() == (high - depth_samples.RIM_PX).tolist()
