@@ -12,7 +12,6 @@ from __future__ import annotations
 from network_sim.config import MacConfig
 from network_sim.mac.cellular import SUBFRAME_NS, Carrier
 
-BLOCK_BYTES = 125
 HEADER_BYTES = 5
 """MAC 1, RLC in acknowledged mode 2, PDCP with 12 bits of sequence number 2 (36.321, 36.322, 36.323)."""
 PROCESSES = 3

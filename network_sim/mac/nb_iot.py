@@ -13,7 +13,6 @@ from functools import partial
 from network_sim.config import MacConfig
 from network_sim.mac.cellular import SUBFRAME_NS, Carrier
 
-BLOCK_BYTES = 125
 HEADER_BYTES = 4
 """MAC 1, RLC in acknowledged mode 2, PDCP with 7 bits of sequence number 1 (36.321, 36.322, 36.323)."""
 SUBCARRIERS = 12
@@ -36,7 +35,7 @@ def block_ns(size_bytes: int, tones: int) -> int:
     """Return the time on the air of a block in the fewest resource units that hold it.
 
     Args:
-        size_bytes: bytes of the block, headers included; at most ``BLOCK_BYTES``.
+        size_bytes: bytes of the block, headers included; at most 125.
         tones: its subcarriers.
     """
     sizes_bits = SINGLE_BITS if tones == 1 else MULTI_BITS

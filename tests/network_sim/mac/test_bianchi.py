@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from network_sim.config import MacConfig, NetworkConfig, NodesConfig
-from network_sim.mac.bianchi import Timing, bianchi
+from network_sim.mac import physical_layer
+from network_sim.mac.bianchi import Timing, bianchi, timing_of
 from network_sim.mac.ieee80211b import EIFS_NS
 from network_sim.mac.saturation import saturation
 from network_sim.types import Cause
@@ -42,6 +43,13 @@ def test_eleven_megabits() -> None:
     rates_mbps = [bianchi(n).throughput_bps / 1e6 for n in STATIONS]
     assert rates_mbps == pytest.approx(SPEC_MBPS, abs=0.0055)
     assert bianchi(1).throughput_bps == pytest.approx(8000 / (1275.818182e-6 + 310e-6), rel=1e-9)
+
+
+def test_the_timing_of_a_layer_is_that_of_its_standard() -> None:
+    timing = timing_of(physical_layer(MacConfig("ieee80211b")), 1028, 28)
+    assert (timing.slot_us, timing.sifs_us, timing.difs_us, timing.delay_us) == (20, 10, 50, 1)
+    assert (timing.ack_us, timing.rts_us, timing.cts_us) == (248, 272, 248)
+    assert timing.payload_bits == 8000
 
 
 def test_the_two_probabilities_agree() -> None:

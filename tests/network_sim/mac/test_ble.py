@@ -78,6 +78,7 @@ def test_a_lost_frame_is_sent_again_in_the_next_event_until_it_arrives():
     events = scene.run()
     frames, losses = events.of(EventKind.AIR), events.of(EventKind.LOSS)
     assert [number for _, number, _ in scene.received] == list(range(300))
+    assert all(outcome.ok for _, _, outcome in scene.outcomes)
     assert len(losses) == len(frames) - 300
     assert len(losses) / len(frames) == pytest.approx(0.3, abs=0.06)
     ends_ns = (frames.t_ns + frames.duration_ns).tolist()

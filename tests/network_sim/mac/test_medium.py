@@ -214,6 +214,19 @@ def test_overlapping_frames_are_one_busy_time_and_damaged() -> None:
     assert calls == [(0, None), (150, True), (200, None), (300, False)]
 
 
+@pytest.mark.parametrize(("far_m", "damaged"), [(64, False), (62, True)])
+def test_an_overheard_frame_is_read_from_ten_decibels_above_the_others_on(
+    far_m: float, damaged: bool
+) -> None:
+    it = scene(-20, 0, far_m, -60)
+    ends: list[tuple[int, bool]] = []
+    it.medium.subscribe(1, lambda t_ns: None, lambda t_ns, bad: ends.append((t_ns // US, bad)))
+    it.frame(0, 50, 2, 1)
+    it.frame(10, 100, 0, 3)
+    it.run()
+    assert ends == [(110, damaged)]
+
+
 def test_a_late_listener_joins_what_is_on_the_air_and_can_leave() -> None:
     it = scene(0, 50)
     calls: list[int] = []

@@ -102,6 +102,7 @@ def test_interframe_spaces() -> None:
         assert (layer.slot_ns, layer.gap_ns, layer.difs_ns) == (9_000, 10_000, 37_000)
         assert layer.eifs_ns == 10_000 + 50_000 + 37_000
         assert layer.reply_wait_ns == 10_000 + 9_000 + 20_000
+        assert (layer.min_window, layer.max_window) == (16, 1024)
     layer = physical_layer(MacConfig(AH))
     assert (layer.slot_ns, layer.gap_ns, layer.difs_ns) == (52_000, 160_000, 316_000)
     layer = physical_layer(MacConfig("ieee80211b"))
