@@ -106,6 +106,7 @@ def test_the_noise_law_decides_whether_two_surfaces_are_one(distance, same):
     second = left_out(view, farther, sigmas=sigmas, least_share=0.1)[1]
     assert second.all() == same
     assert second.any() == same
+    assert shared_views((view, farther)).leave_out[1].all() == same  # the default is two as well
 
 
 def test_a_sensor_with_less_noise_is_judged_by_its_own_law():
