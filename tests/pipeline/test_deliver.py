@@ -9,7 +9,8 @@ from packetmesh.errors import InputError
 from packetmesh.progress import drain
 from packetmesh.settings import with_settings
 from pipeline.deliver import iterate_delivery
-from pipeline.delivery import CODINGS
+from pipeline.delivery import CODINGS, moments
+from pipeline.delivery.coding import Received
 from pipeline.delivery.moments import Rebuilder
 from pipeline.delivery.sending import arrived_bytes, moment_times_ns, received_at, send
 from pipeline.folders.delivery import delivery_metrics, summary
@@ -245,6 +246,18 @@ def test_one_node_alone(rig):
 def test_a_coding_that_does_not_exist(rig):
     with pytest.raises(InputError, match="layered"):
         deliver(delivery_spec(rig, coding="zip"))
+
+
+def test_shares_of_an_image_are_those_of_what_arrived():
+    frame = small_rig().frames[0]
+    received = Received.nothing(frame.depth.z_m.shape)
+    height, width = received.depth.shape
+    received.rgb_known[: height // 2] = True
+    received.coarse[:, : width // 4] = 1500
+    arrival = moments._arrival(frame, np.zeros(100, np.uint8), np.arange(100) < 30, received)
+    assert (arrival.total_bytes, arrival.delivered_bytes) == (100, 30)
+    assert (arrival.color_share, arrival.depth_share) == (0.5, 0.0)
+    assert arrival.coarse_share == pytest.approx(width // 4 / width)
 
 
 def test_times_of_moments_by_hand():

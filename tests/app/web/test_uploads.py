@@ -64,6 +64,15 @@ def test_the_one_left_longest_ago_makes_room(shelf, monkeypatch):
     assert shelf.find(name_in(second)) == second
 
 
+@pytest.mark.parametrize(("limit_bytes", "stays"), [(199, False), (200, True)])
+def test_one_byte_too_many_makes_room(shelf, monkeypatch, limit_bytes, stays):
+    monkeypatch.setattr(module, "LIMIT_BYTES", limit_bytes)
+    first, second = shelf.rig(100), shelf.rig(100)
+    shelf.leave(shelf.here)
+    assert (shelf.find(name_in(first)) == first) == stays
+    assert shelf.find(name_in(second)) == second
+
+
 def test_a_calibration_laid_over_an_upload_is_another_one_and_holds_it(shelf):
     rig, folder = shelf.rig(), shelf.new_folder(shelf.here) / "calibration_01"
     both = Calibrated(rig, str(folder))

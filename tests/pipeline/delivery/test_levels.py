@@ -87,6 +87,8 @@ def test_another_version_is_named_and_what_is_no_header_refused():
     header = encoded(smooth_images(40, 40, seed=1).depth).header
     with pytest.raises(InputError, match=r"version 2 of its tables, and this program has version 1"):
         levels.read_header(bytes([2]) + header[1:])
+    with pytest.raises(InputError, match="version 0"):
+        levels.read_header(bytes([0]) + header[1:])
     with pytest.raises(InputError, match="version 2"):
         levels.read_header(bytes([2, 9]))  # which may have more tables, and another form
     for junk in (b"", header[:3], header[:1] + b"\x07" + header[2:], header[:6]):

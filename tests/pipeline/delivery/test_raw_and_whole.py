@@ -5,6 +5,7 @@ import pytest
 
 from pipeline.delivery import CODINGS
 from pipeline.delivery.coding import Images
+from pipeline.delivery.raw import tile_after_tile
 from tests.pipeline.delivery.pictures import received, smooth_images
 
 RAW = ["raw", "raw-color-first", "raw-rows", "raw-tiles"]
@@ -88,3 +89,9 @@ def test_each_file_stands_by_itself_and_one_lost_packet_loses_it(name):
     tail = received(coding, images, 40, without(-1), stream)
     np.testing.assert_array_equal(tail.depth, images.depth)
     assert not tail.rgb_known.any()
+
+
+def test_tiles_of_16_pixels_follow_each_other_along_a_row():
+    order = tile_after_tile((20, 40))  # two rows of three tiles, the last ones 8 pixels wide or 4 high
+    assert order[[0, 16, 256, 512, 640]].tolist() == [0, 40, 16, 32, 16 * 40]
+    assert sorted(order) == list(range(800))
